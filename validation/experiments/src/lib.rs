@@ -5,13 +5,18 @@ pub mod bulk;
 pub mod calibrate;
 pub mod check;
 pub mod crosscheck;
+mod error;
 pub mod from_eos;
 pub mod hardcases;
+mod jobs;
+mod machine;
 pub mod measure;
 pub mod papers;
 pub mod pareto;
 pub mod sweep;
 pub mod theory_page;
+
+pub use error::ExperimentError;
 
 #[cfg(test)]
 #[path = "../../dynamics/src/test_support.rs"]

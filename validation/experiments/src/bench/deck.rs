@@ -1,11 +1,11 @@
 //! A timed run of LAMMPS.
 
-use super::BenchError;
 use super::contender::{Code, Contender, Suffix};
 use super::fluids::Subject;
 use super::length::Length;
 use super::log::{Loop, parse};
 use super::start::{SEED, Start};
+use crate::ExperimentError;
 use psidpd_lammps_host::Host;
 use psidpd_lammps_host::export::eam::{self, Grid};
 use std::collections::HashSet;
@@ -103,10 +103,10 @@ fn model(place: &Place, subject: &Subject) -> PathBuf {
 }
 
 /// Writes what decks of a fluid refer to.
-pub fn prepare(place: &Place, subject: &Subject, with_tables: bool) -> Result<(), BenchError> {
-    std::fs::create_dir_all(&place.work).map_err(BenchError::io(&place.work))?;
+pub fn prepare(place: &Place, subject: &Subject, with_tables: bool) -> Result<(), ExperimentError> {
+    std::fs::create_dir_all(&place.work).map_err(ExperimentError::io(&place.work))?;
     let path = model(place, subject);
-    std::fs::write(&path, subject.text).map_err(BenchError::io(&path))?;
+    std::fs::write(&path, subject.text).map_err(ExperimentError::io(&path))?;
     if with_tables {
         let fluid = subject.model()?.at(1.0)?;
         // Small enough to stay in a cache, as in the validation.
@@ -124,19 +124,19 @@ pub fn run(
     start: &Start,
     skin: f64,
     length: Length,
-) -> Result<Loop, BenchError> {
+) -> Result<Loop, ExperimentError> {
     let script = place.work.join("in.bench");
     let text = deck(place, subject, contender, start, skin, length);
-    std::fs::write(&script, text).map_err(BenchError::io(&script))?;
+    std::fs::write(&script, text).map_err(ExperimentError::io(&script))?;
     let run = place.host.run_script(contender.ranks, &place.work, &script, &["-log", "none"], LIMIT)?;
-    parse(&run.stdout).map_err(|problem| BenchError::Output { what: contender.id(), problem })
+    parse(&run.stdout).map_err(|problem| ExperimentError::Printed { what: contender.id(), problem })
 }
 
 /// The names of the pair styles that the host has, by its own list.
-pub fn pair_styles(place: &Place) -> Result<HashSet<String>, BenchError> {
-    std::fs::create_dir_all(&place.work).map_err(BenchError::io(&place.work))?;
+pub fn pair_styles(place: &Place) -> Result<HashSet<String>, ExperimentError> {
+    std::fs::create_dir_all(&place.work).map_err(ExperimentError::io(&place.work))?;
     let script = place.work.join("in.styles");
-    std::fs::write(&script, "info styles pair\n").map_err(BenchError::io(&script))?;
+    std::fs::write(&script, "info styles pair\n").map_err(ExperimentError::io(&script))?;
     let run = place.host.run_script(1, &place.work, &script, &["-log", "none"], LIMIT)?;
     Ok(run.stdout.split_whitespace().map(str::to_owned).collect())
 }

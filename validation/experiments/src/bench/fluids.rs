@@ -1,6 +1,6 @@
 //! The fluids that are timed.
 
-use super::BenchError;
+use crate::ExperimentError;
 use psidpd_core::model::Model;
 
 /// A fluid with everything the codes need to be told.
@@ -64,7 +64,7 @@ impl Subject {
     ///
     /// # Errors
     /// The text is none: never, since a test reads it.
-    pub fn model(&self) -> Result<Model, BenchError> {
+    pub fn model(&self) -> Result<Model, ExperimentError> {
         Ok(Model::parse(self.name, self.text)?)
     }
 

@@ -1,9 +1,9 @@
 //! Timed runs of the native runner, and the test that threads change no bit.
 
-use super::BenchError;
 use super::fluids::Subject;
 use super::length::Length;
 use super::start::SEED;
+use crate::ExperimentError;
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation, State};
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ fn simulation(
     subject: &Subject,
     state: &State,
     settings: Option<Settings>,
-) -> Result<Simulation, BenchError> {
+) -> Result<Simulation, ExperimentError> {
     let mut simulation = Simulation::new(&subject.model()?, 1.0, state.clone(), SEED)?;
     match settings {
         Some(settings) => {
@@ -36,7 +36,7 @@ fn simulation(
     Ok(simulation)
 }
 
-fn advance(simulation: &mut Simulation, subject: &Subject, steps: u64) -> Result<(), BenchError> {
+fn advance(simulation: &mut Simulation, subject: &Subject, steps: u64) -> Result<(), ExperimentError> {
     Ok(simulation.advance(steps, subject.dt, Integrator::VelocityVerlet)?)
 }
 
@@ -46,7 +46,7 @@ pub fn run(
     state: &State,
     settings: Option<Settings>,
     length: Length,
-) -> Result<Measured, BenchError> {
+) -> Result<Measured, ExperimentError> {
     let mut simulation = simulation(subject, state, settings)?;
     advance(&mut simulation, subject, length.warm_up)?;
     let before = simulation.engine().times();
@@ -76,7 +76,7 @@ pub fn equal_on_threads(
     state: &State,
     settings: Settings,
     threads: &[NonZeroUsize],
-) -> Result<bool, BenchError> {
+) -> Result<bool, ExperimentError> {
     let mut first: Option<State> = None;
     for &threads in threads {
         let mut simulation = simulation(subject, state, Some(Settings { threads, ..settings }))?;

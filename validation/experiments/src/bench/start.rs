@@ -1,7 +1,7 @@
 //! The state that every code starts from: made once, kept in the run folder.
 
-use super::BenchError;
 use super::fluids::Subject;
+use crate::ExperimentError;
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Settings, Want};
 use psidpd_dynamics::particles::thermal_velocities;
@@ -28,10 +28,10 @@ pub struct Start {
 }
 
 /// Random particles at kT = 1.
-pub fn random(subject: &Subject, size: usize) -> Result<State, BenchError> {
+pub fn random(subject: &Subject, size: usize) -> Result<State, ExperimentError> {
     let (count, edge) = (subject.particles(size), Subject::edge(size));
     if edge < 3.0 {
-        return Err(BenchError::TooSmall(size));
+        return Err(ExperimentError::TooSmall(size));
     }
     let domain = PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3])
         .map_err(|e| RunError::State(e.to_string()))?;
@@ -44,8 +44,8 @@ pub fn random(subject: &Subject, size: usize) -> Result<State, BenchError> {
 }
 
 /// The fluid in equilibrium, from `folder` if it is there.
-pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Start, BenchError> {
-    std::fs::create_dir_all(folder).map_err(BenchError::io(folder))?;
+pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Start, ExperimentError> {
+    std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
     // The state depends on model, seed and length of the run.
     let key = crc32fast::hash(format!("{} {SEED} {STEPS}", subject.text).as_bytes());
     let file = |end: &str| folder.join(format!("{}-{size}-{key:08x}.{end}", subject.name));
@@ -67,7 +67,7 @@ pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Sta
     text.write_mdpd(&data_mdpd)?;
     // Written last: its presence shows that the others are complete.
     let bytes = postcard::to_stdvec(&state)
-        .map_err(|e| BenchError::io(&kept)(std::io::Error::other(e.to_string())))?;
+        .map_err(|e| ExperimentError::io(&kept)(std::io::Error::other(e.to_string())))?;
     psidpd_formats::files::write_atomically(&kept, &bytes)?;
     Ok(Start { state, data, data_mdpd })
 }
@@ -118,7 +118,7 @@ mod tests {
         let kept = equilibrated(&DPD, 400, folder.path()).unwrap();
         assert_eq!(made.state, kept.state);
         assert_eq!(made.state.len(), DPD.particles(400));
-        assert!(matches!(random(&DPD, 20), Err(BenchError::TooSmall(20))));
+        assert!(matches!(random(&DPD, 20), Err(ExperimentError::TooSmall(20))));
     }
 
     /// A temperature of 1200 and more degrees of freedom varies by 0.04: five times that is met once in 10⁶

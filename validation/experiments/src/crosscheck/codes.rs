@@ -1,7 +1,8 @@
 //! The codes, and how each is told about the fluid.
 
+use super::Context;
 use super::fluids::{A, RC, RD, WarrenSet};
-use super::{Context, ValidateError};
+use crate::ExperimentError;
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
 use psidpd_lammps_host::export::eam::{self, Grid};
@@ -94,8 +95,8 @@ impl<'a> Setup<'a> {
         state: &State,
         folder: &Path,
         absolute: bool,
-    ) -> Result<String, ValidateError> {
-        std::fs::create_dir_all(folder).map_err(ValidateError::io(folder))?;
+    ) -> Result<String, ExperimentError> {
+        std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
         let place = |name: &str| {
             if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
         };
@@ -122,7 +123,7 @@ impl<'a> Setup<'a> {
                 let precision = if self.code == Code::Psi { "double" } else { "mixed" };
                 let text = self.set.model_text(self.law, gamma)?;
                 let path = folder.join("model.toml");
-                std::fs::write(&path, text).map_err(ValidateError::io(&path))?;
+                std::fs::write(&path, text).map_err(ExperimentError::io(&path))?;
                 format!(
                     "pair_style dpd/psi 1.0 {seed} precision {precision}\npair_coeff * * \"{}\" F\n",
                     place("model.toml")
@@ -167,7 +168,7 @@ pub(super) fn preamble(atom_style: &str, newton: bool, data: &str) -> String {
 
 /// ψ as embedding function, w as density and φ as pair potential of `eam/alloy`: LAMMPS's own route to
 /// the same conservative forces.
-fn write_tables(set: &WarrenSet, spacing: f64, path: &Path) -> Result<(), ValidateError> {
+fn write_tables(set: &WarrenSet, spacing: f64, path: &Path) -> Result<(), ExperimentError> {
     let fluid = set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
     let grid = Grid { spacing, largest_density: 60.0, densities: 6001 };
     Ok(eam::write(&fluid, &[1.0], grid, path)?)

@@ -3,10 +3,11 @@
 
 use super::codes::{Code, Setup};
 use super::fluids::{GAMMA, SET5, SET6, WarrenSet};
-use super::jobs::{self, Job};
 use super::start::{Filling, equilibrated};
 use super::trace::{Length, Trace, run as run_code};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::jobs::{self, Job};
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width, tension_series};
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
@@ -66,7 +67,7 @@ fn name(code: Code, law: ForceLaw) -> String {
 }
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let sets = [SET5, SET6];
     // A wide and thin slab: the error of the tension goes with the root of thickness over area.
     let (edge, height, thickness, steps) =
@@ -80,7 +81,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let count: usize = sets.iter().map(|set| runs(set, context.full).len()).sum();
     let made = context.progress.overall("equilibrium", steps * count as u64);
     let made = &made;
-    let mut jobs: Vec<Job<Result<Trace, ValidateError>>> = Vec::new();
+    let mut jobs: Vec<Job<Result<Trace, ExperimentError>>> = Vec::new();
     for (k, set) in sets.iter().enumerate() {
         for (n, &(code, law, _)) in runs(set, context.full).iter().enumerate() {
             let state = &starts[k];
@@ -153,10 +154,10 @@ fn compared(code: Code, other: Option<usize>) -> impl Iterator<Item = Quantity> 
         .filter(move |(what, ..)| other.is_some() && !(code == Code::BuiltIn && *what == "energy"))
 }
 
-fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ValidateError> {
+fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ExperimentError> {
     let of = |what: &str, series: &[f64]| {
         let kept = &series[series.len() / 5..];
-        estimate(kept).map_err(|source| ValidateError::Statistics { what: what.to_owned(), source })
+        estimate(kept).map_err(|source| ExperimentError::Statistics { what: what.to_owned(), source })
     };
     let bins = (height / 0.1).round() as usize;
     let mut profile = ProfileAccumulator::new(height, bins, edge * edge)?;
@@ -177,7 +178,7 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ValidateEr
         pressure: of("pressure", &trace.scalar_pressure())?,
         energy: of("energy", &per_particle)?,
         liquid: estimate(&liquid)
-            .map_err(|source| ValidateError::Statistics { what: "liquid density".into(), source })?,
+            .map_err(|source| ExperimentError::Statistics { what: "liquid density".into(), source })?,
         tension: of("surface tension", &tension_series(height, xx, yy, zz)?)?,
         conservative_tension,
         width: interface_width(&shape),
@@ -197,7 +198,7 @@ fn report_set(
     set: &WarrenSet,
     measured: &[Measured],
     comparisons: usize,
-) -> Result<(), ValidateError> {
+) -> Result<(), ExperimentError> {
     let slug = set.name.replace(' ', "");
     let mut table = Table::new([
         "code",

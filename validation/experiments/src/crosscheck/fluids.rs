@@ -1,6 +1,6 @@
 //! The fluids that the codes are compared in: Warren's sets 5 and 6.
 
-use super::ValidateError;
+use crate::ExperimentError;
 use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab, warren_ab_text};
 
 /// One of Warren's parameter sets, with what he measured at kT = 1 (Phys. Rev. E 68, 066702, Table 2).
@@ -59,17 +59,17 @@ impl WarrenSet {
     }
 
     /// The model with friction `gamma` and one of the two force laws.
-    pub fn model(&self, law: ForceLaw, gamma: f64) -> Result<Model, ValidateError> {
+    pub fn model(&self, law: ForceLaw, gamma: f64) -> Result<Model, ExperimentError> {
         Ok(warren_ab(&["F".to_owned()], &self.pair(gamma), 3, law)?)
     }
 
     /// The text of the same model file.
-    pub fn model_text(&self, law: ForceLaw, gamma: f64) -> Result<String, ValidateError> {
+    pub fn model_text(&self, law: ForceLaw, gamma: f64) -> Result<String, ExperimentError> {
         Ok(warren_ab_text(&["F".to_owned()], &self.pair(gamma), 3, law)?)
     }
 
     /// The shipped model.
-    pub fn shipped(&self) -> Result<Model, ValidateError> {
+    pub fn shipped(&self) -> Result<Model, ExperimentError> {
         Ok(Model::parse(self.name, self.file)?)
     }
 }

@@ -3,7 +3,8 @@
 use super::codes::{Code, FINE, Setup};
 use super::fluids::{RC, RD, SET6};
 use super::start::{Filling, equilibrated};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
 use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
@@ -57,12 +58,12 @@ fn native(
     model: &Model,
     state: &State,
     step: Option<Step>,
-) -> Result<Point, ValidateError> {
+) -> Result<Point, ExperimentError> {
     point_of(context.simulation(model, 1.0, state, SEED)?, step)
 }
 
 /// What the native runner says.
-pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ValidateError> {
+pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ExperimentError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
         forces: by_tag(simulation.tags(), simulation.forces()),
@@ -72,7 +73,7 @@ pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result
 }
 
 /// The sums over pairs as they are written down, which share no code with those that runs are made with.
-fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, ValidateError> {
+fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, ExperimentError> {
     let fluid = model.at(1.0)?;
     let domain = &state.domain;
     let mut x = state.x.clone();
@@ -91,7 +92,7 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Vali
 
 /// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these,
 /// were it wrong.
-fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ValidateError> {
+fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ExperimentError> {
     let native = |model: &Model, step| {
         let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
         fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
@@ -133,15 +134,15 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
 }
 
 /// dU/d ln A as the faces normal to z are stretched to A at constant volume.
-fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64, ValidateError> {
-    let energy = |change: f64| -> Result<f64, ValidateError> {
+fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64, ExperimentError> {
+    let energy = |change: f64| -> Result<f64, ExperimentError> {
         let scale = [(1.0 + change).sqrt(), (1.0 + change).sqrt(), 1.0 / (1.0 + change)];
         let lengths = state.domain.lengths();
         let lengths = std::array::from_fn(|c| scale[c] * lengths[c]);
         let origin = state.domain.origin();
         let mut stretched = state.clone();
         stretched.domain = PeriodicBox::orthogonal(origin, lengths, state.domain.periodic())
-            .map_err(|e| ValidateError::Run(psidpd_dynamics::run::RunError::State(e.to_string())))?;
+            .map_err(|e| ExperimentError::Run(psidpd_dynamics::run::RunError::State(e.to_string())))?;
         for x in &mut stretched.x {
             *x = stretched.domain.point(state.domain.fraction(*x));
         }
@@ -155,7 +156,7 @@ fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64,
     Ok((energy(H)? - energy(-H)?) / (2.0 * H))
 }
 
-fn native_mixed(context: &Context, model: &Model, state: &State) -> Result<Point, ValidateError> {
+fn native_mixed(context: &Context, model: &Model, state: &State) -> Result<Point, ExperimentError> {
     let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
     simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
     context.fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
@@ -171,12 +172,12 @@ fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// An instance of LAMMPS with the fluid set up and the virial of the pair forces as `c_virial`.
-pub fn open(context: &Context, setup: &Setup, state: &State, name: &str) -> Result<Lammps, ValidateError> {
+pub fn open(context: &Context, setup: &Setup, state: &State, name: &str) -> Result<Lammps, ExperimentError> {
     open_deck(context, &setup.prepare(context, state, &context.work.join(name), true)?)
 }
 
 /// The same with any commands up to the pair style.
-pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, ValidateError> {
+pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, ExperimentError> {
     let lammps = Lammps::open(context.host, &[])?;
     lammps.commands(deck)?;
     lammps.commands(
@@ -187,7 +188,7 @@ pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, Validat
 }
 
 /// What LAMMPS says.
-pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ValidateError> {
+pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentError> {
     lammps.command("run 0 post no")?;
     let forces = lammps.gather("f", 3)?.as_chunks::<3>().0.to_vec();
     let pressure = lammps.compute_vector("virial")?;
@@ -199,7 +200,7 @@ pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ValidateError
 }
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let lengths = if context.full { [15.0, 15.0, 20.0] } else { [10.0, 10.0, 15.0] };
     let filling = Filling { lengths, thickness: 0.5 * lengths[2], density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 500, SEED)?;
@@ -241,7 +242,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
                 format!("forces.{id}"),
                 json!({"force": difference.force, "energy": difference.energy, "virial": difference.virial}),
             ));
-            Ok::<(), ValidateError>(())
+            Ok::<(), ExperimentError>(())
         };
     let setup = |code, law, gamma, newton| Setup {
         gamma,
@@ -345,7 +346,7 @@ fn heading(particles: usize) -> Section {
 }
 
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.
-fn gradient(context: &Context) -> Result<Check, ValidateError> {
+fn gradient(context: &Context) -> Result<Check, ExperimentError> {
     let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 300, SEED)?;
     let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
@@ -354,7 +355,7 @@ fn gradient(context: &Context) -> Result<Check, ValidateError> {
     let rms = (truth.forces.iter().flatten().map(|c| c * c).sum::<f64>() / truth.forces.len() as f64).sqrt();
     let x0 = lammps.gather("x", 3)?;
     const H: f64 = 1e-3;
-    let energy = |index: usize, shift: f64| -> Result<f64, ValidateError> {
+    let energy = |index: usize, shift: f64| -> Result<f64, ExperimentError> {
         let mut x = x0.clone();
         x[index] += shift;
         lammps.scatter("x", 3, &x)?;

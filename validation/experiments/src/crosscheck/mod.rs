@@ -13,10 +13,8 @@ pub mod codes;
 mod conclusion;
 pub mod energy;
 pub mod equilibrium;
-mod error;
 pub mod fluids;
 pub mod forces;
-pub mod jobs;
 pub mod mixture;
 pub mod observables;
 pub mod start;
@@ -25,14 +23,13 @@ pub mod trace;
 pub mod trajectory;
 mod validate;
 
-pub use error::ValidateError;
+use crate::ExperimentError;
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Simulation, State};
 use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
 use std::path::{Path, PathBuf};
-pub(crate) use validate::machine;
 pub use validate::{Options, check_table, validate};
 
 /// What every part of the validation works with.
@@ -60,7 +57,7 @@ impl Context<'_> {
         kt: f64,
         state: &State,
         seed: u64,
-    ) -> Result<Simulation, ValidateError> {
+    ) -> Result<Simulation, ExperimentError> {
         let mut simulation = Simulation::new(model, kt, state.clone(), seed)?;
         self.fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
         Ok(simulation)

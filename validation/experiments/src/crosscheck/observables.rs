@@ -1,7 +1,8 @@
 //! Distances and displacements: LAMMPS's `compute rdf` and `compute msd` beside `rdf` and `msd` of the same configurations.
 
 use super::codes::preamble;
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
 use psidpd_core::engine::Pool;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
@@ -29,9 +30,9 @@ const BINS: usize = 40;
 const LARGEST: f64 = 1e-9;
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let folder = context.work.join("observables");
-    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
     let scene = scene(&folder)?;
     let state = scene.initial_state();
     let [g, msd] = by_lammps(context, &state, &folder)?;
@@ -79,10 +80,10 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// The fluid, its start, and the observables.
-fn scene(folder: &Path) -> Result<Scene, ValidateError> {
+fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     let model = folder.join("model.toml");
     std::fs::write(&model, include_str!("../../../models/standard-dpd.toml"))
-        .map_err(ValidateError::io(&model))?;
+        .map_err(ExperimentError::io(&model))?;
     let text = format!(
         "title = \"distances and displacements\"\nmodel = \"model.toml\"\nkT = 1.0\nseed = {SEED}\nbox = [5.0, 6.0, 7.0]\n\
          density = 3.0\ndt = {DT}\nsteps = {steps}\n[observe]\nevery = {EVERY}\n\
@@ -93,14 +94,14 @@ fn scene(folder: &Path) -> Result<Scene, ValidateError> {
 }
 
 /// A table that LAMMPS wrote: without comments, and words that are no numbers.
-fn rows(path: &PathBuf) -> Result<Vec<Vec<f64>>, ValidateError> {
-    let text = std::fs::read_to_string(path).map_err(ValidateError::io(path))?;
+fn rows(path: &PathBuf) -> Result<Vec<Vec<f64>>, ExperimentError> {
+    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
     let row = |line: &str| line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
     Ok(text.lines().filter(|l| !l.starts_with('#')).map(row).collect())
 }
 
 /// g of every shell, and the mean-square displacement of every configuration after the first.
-fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64>; 2], ValidateError> {
+fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64>; 2], ExperimentError> {
     state.to_data_by_tag("psidpd").write(&folder.join("start.data"))?;
     let last = EVERY * (FRAMES + 1);
     let deck = format!(
@@ -116,7 +117,7 @@ fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64
         EVERY * FRAMES,
     );
     let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
+    std::fs::write(&script, deck).map_err(ExperimentError::io(&script))?;
     context.host.run_script(1, folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
     let [g, msd] = ["rdf.txt", "msd.txt"].map(|name| folder.join(name));
     // A line with the step and the number of shells, and for each shell its number and g.
@@ -127,9 +128,9 @@ fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64
 }
 
 /// What the observables make of the configurations of a dump.
-fn by_us(scene: &Scene, state: &State, path: &Path) -> Result<Vec<Observation>, ValidateError> {
+fn by_us(scene: &Scene, state: &State, path: &Path) -> Result<Vec<Observation>, ExperimentError> {
     let missing =
-        || ValidateError::Output { path: path.into(), problem: "it has no columns of positions".into() };
+        || ExperimentError::Output { path: path.into(), problem: "it has no columns of positions".into() };
     let stage = scene.stages.last().map_or("", |stage| stage.name.as_str());
     let mut observers = Observers::new(&scene.observe, [stage]);
     let pool = Pool::new(NonZeroUsize::MIN);

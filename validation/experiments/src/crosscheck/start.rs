@@ -1,7 +1,7 @@
 //! Configurations that the codes start from, made by the native runner.
 
-use super::ValidateError;
 use super::fluids::WarrenSet;
+use crate::ExperimentError;
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_dynamics::particles::thermal_velocities;
@@ -26,11 +26,11 @@ pub fn equilibrated(
     filling: Filling,
     steps: u64,
     seed: u64,
-) -> Result<State, ValidateError> {
+) -> Result<State, ExperimentError> {
     let [lx, ly, lz] = filling.lengths;
     let count = (lx * ly * filling.thickness * filling.density).round() as usize;
     let domain = PeriodicBox::orthogonal([0.0; 3], filling.lengths, [true; 3])
-        .map_err(|e| ValidateError::Run(psidpd_dynamics::run::RunError::State(e.to_string())))?;
+        .map_err(|e| ExperimentError::Run(psidpd_dynamics::run::RunError::State(e.to_string())))?;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let low = 0.5 * (lz - filling.thickness);
     let x: Vec<[f64; 3]> = (0..count)

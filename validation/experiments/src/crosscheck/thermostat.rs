@@ -4,7 +4,8 @@ use super::codes::preamble;
 use super::fluids::SET6;
 use super::forces::{open_deck, point, point_of};
 use super::start::{Filling, equilibrated};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
 use psidpd_core::engine::{PeriodicBox, Step, Want};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, State};
@@ -37,7 +38,7 @@ const FALSE_ALARM: f64 = 1e-3;
 const VAGUE: f64 = 0.02;
 
 /// A fluid of LAMMPS's `dpd`.
-fn model(strength: f64, gamma: f64) -> Result<Model, ValidateError> {
+fn model(strength: f64, gamma: f64) -> Result<Model, ExperimentError> {
     let pair = format!(
         "[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = {strength:?}\nrange = 1.0\n"
     );
@@ -56,9 +57,9 @@ fn deck(
     state: &State,
     [strength, gamma, kt]: [f64; 3],
     name: &str,
-) -> Result<String, ValidateError> {
+) -> Result<String, ExperimentError> {
     let folder = context.work.join(name);
-    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
     let data = folder.join("start.data");
     state.to_data("psidpd").write(&data)?;
     let style = format!("pair_style dpd {kt:?} 1.0 {SEED}\npair_coeff 1 1 {strength:?} {gamma:?}\n");
@@ -66,7 +67,7 @@ fn deck(
 }
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut part = Part::default();
     let mut forces = Table::new(["", "force", "energy", "virial"]);
     let filling = Filling { lengths: [6.0; 3], thickness: 6.0, density: SET6.liquid };
@@ -120,7 +121,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// The variances of the noise of both codes.
-fn noise(context: &Context, part: &mut Part) -> Result<Table, ValidateError> {
+fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
     let state = pairs()?;
     let mut table = Table::new(["γ", "kT", "Δt", "r", "native", "LAMMPS dpd"]);
     let comparisons = 2 * SETTINGS.len() * DISTANCES.len();
@@ -191,10 +192,10 @@ fn independent_mean(values: &[f64]) -> Measured {
 }
 
 /// Pairs along x at rest, with tags in turn.
-fn pairs() -> Result<State, ValidateError> {
+fn pairs() -> Result<State, ExperimentError> {
     let edge = PAIRS as f64 * APART;
     let domain = PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3])
-        .map_err(|e| ValidateError::Run(RunError::State(e.to_string())))?;
+        .map_err(|e| ExperimentError::Run(RunError::State(e.to_string())))?;
     let x = (0..PAIRS.pow(3)).flat_map(|k| {
         let [x, y, z] = [k % PAIRS, k / PAIRS % PAIRS, k / PAIRS / PAIRS].map(|i| (i as f64 + 0.5) * APART);
         [[x, y, z], [x + DISTANCES[k % DISTANCES.len()], y, z]]

@@ -3,7 +3,8 @@
 use super::codes::{Code, Setup};
 use super::fluids::{GAMMA, SET6};
 use super::start::{Filling, equilibrated};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
 use psidpd_core::engine::Want;
 use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
@@ -22,7 +23,7 @@ const DT: f64 = 0.01;
 const LARGEST: f64 = 1e-10;
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 500, SEED)?;
     let ours = native(context, &state)?;
@@ -75,7 +76,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// Positions by tag.
-fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ValidateError> {
+fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ExperimentError> {
     let model = SET6.model(ForceLaw::Conservative, GAMMA)?;
     let mut simulation = context.simulation(&model, 1.0, state, SEED)?;
     simulation.prepare(DT, Want::FORCES)?;
@@ -93,7 +94,7 @@ fn lammps(
     code: Code,
     ranks: usize,
     newton: bool,
-) -> Result<Vec<[f64; 3]>, ValidateError> {
+) -> Result<Vec<[f64; 3]>, ExperimentError> {
     let folder = context.work.join(format!("trajectory-{}-{ranks}-{newton}", code.slug()));
     let setup = Setup { gamma: GAMMA, seed: SEED, newton, ..Setup::new(code, &SET6, ForceLaw::Conservative) };
     let mut deck = setup.prepare(context, state, &folder, false)?;
@@ -102,12 +103,12 @@ fn lammps(
          write_dump all custom final.txt id x y z modify sort id format float %.17g\n"
     ));
     let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
+    std::fs::write(&script, deck).map_err(ExperimentError::io(&script))?;
     context.host.run_script(ranks, &folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
     let path = folder.join("final.txt");
     let frames = dump::read(&path)?;
     frames.first().and_then(|f| f.vectors(["x", "y", "z"])).filter(|x| x.len() == state.len()).ok_or_else(
-        || ValidateError::Output {
+        || ExperimentError::Output {
             path,
             problem: format!("expected one frame of {} particles", state.len()),
         },

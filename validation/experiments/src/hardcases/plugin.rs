@@ -1,8 +1,8 @@
 //! Cases in LAMMPS with the plugin: those of velocity Verlet, which a deck can have.
 
-use super::HardCasesError;
 use super::case::{Case, Found, Must};
 use super::native;
+use crate::ExperimentError;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_lammps_host::export::lammps as deck;
@@ -53,7 +53,7 @@ impl Plugin {
         case: &Case,
         precision: Precision,
         folder: &Path,
-    ) -> Result<Found, HardCasesError> {
+    ) -> Result<Found, ExperimentError> {
         let scene = match native::scene(&case.run, Integrator::VelocityVerlet, precision, folder)? {
             Ok(scene) => scene,
             Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
@@ -63,7 +63,7 @@ impl Plugin {
             return Ok(Found::Refused(refusal.to_string()));
         }
         let path = out.join(deck::SCRIPT);
-        let script = std::fs::read_to_string(&path).map_err(HardCasesError::io(&path))?;
+        let script = std::fs::read_to_string(&path).map_err(ExperimentError::io(&path))?;
         let counts = "compute counts all pair dpd/psi\nthermo_style custom step temp c_counts[3] c_counts[4]\nthermo 4\n";
         let (before, last) = script.rsplit_once("timestep").unwrap_or((&script, ""));
         let mut script = format!("{before}{counts}timestep{last}");
@@ -73,7 +73,7 @@ impl Plugin {
                 .filter(|l| !l.starts_with("plugin  "))
                 .fold(String::new(), |a, l| a + l + "\n");
         }
-        std::fs::write(&path, script).map_err(HardCasesError::io(&path))?;
+        std::fs::write(&path, script).map_err(ExperimentError::io(&path))?;
         let plugin = self.plugin.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
         let arguments = ["-log", "none", "-var", "plugin", plugin.as_str()];
         let text = match self.host.run_script(1, &out, &path, &arguments, LIMIT) {

@@ -1,12 +1,12 @@
 //! LAMMPS among the points: the plugin, which takes the native steps, and LAMMPS's own style for the fluid, where it has one.
 
-use super::ParetoError;
 use super::origin::Origin;
 use super::own_style::OwnStyle;
 use super::quantity::{Class, Quantities};
 use super::recommend::scene_of;
 use super::sample::{Effort, FAR_OFF, Sampled, observe};
 use super::setting::{Host as Who, Physics, Setting};
+use crate::ExperimentError;
 use crate::bench::log;
 use psidpd_core::engine::Pool;
 use psidpd_formats::dump;
@@ -37,7 +37,7 @@ impl Lammps {
     ///
     /// # Errors
     /// There is none, or the plugin cannot be built.
-    pub fn open(origin: &Origin, work: &Path, note: &dyn Fn(&str)) -> Result<Lammps, ParetoError> {
+    pub fn open(origin: &Origin, work: &Path, note: &dyn Fn(&str)) -> Result<Lammps, ExperimentError> {
         let host = Host::find()?;
         let plugin = psidpd_lammps_host::plugin::build(&host, note)?;
         psidpd_lammps_host::plugin::check(&host, &plugin)?;
@@ -52,10 +52,10 @@ impl Lammps {
     ///
     /// # Errors
     /// LAMMPS stops.
-    pub fn time(&self, origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ParetoError> {
+    pub fn time(&self, origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ExperimentError> {
         let text = self.run(origin, setting, &[10, steps], "time", |script| script)?;
         let account = log::parse(&text)
-            .map_err(|problem| ParetoError::Output { what: "a timed run of LAMMPS".into(), problem })?;
+            .map_err(|problem| ExperimentError::Printed { what: "a timed run of LAMMPS".into(), problem })?;
         Ok(account.seconds / account.steps as f64)
     }
 
@@ -71,7 +71,7 @@ impl Lammps {
         effort: Effort,
         step: f64,
         name: &str,
-    ) -> Result<Sampled, ParetoError> {
+    ) -> Result<Sampled, ExperimentError> {
         let every = physics.interval();
         let samples = match effort {
             Effort::Seconds(s) => ((s / (step * every as f64)) as u64).clamp(20, 400),
@@ -92,7 +92,7 @@ impl Lammps {
         let steps = [samples / 4 * every, samples * every];
         let text = match self.run(origin, &setting, &steps, name, add) {
             Ok(text) => text,
-            Err(ParetoError::Lammps(error @ psidpd_lammps_host::LammpsError::Run { .. })) => {
+            Err(ExperimentError::Lammps(error @ psidpd_lammps_host::LammpsError::Run { .. })) => {
                 return Ok(Sampled::Unstable(
                     error.to_string().lines().next().unwrap_or_default().to_owned(),
                 ));
@@ -133,9 +133,11 @@ impl Lammps {
         k: usize,
         (every, interval): (u64, f64),
         observers: &mut Observers,
-    ) -> Result<(), ParetoError> {
-        let missing =
-            || ParetoError::Output { what: "a dump of LAMMPS".into(), problem: "no columns of positions" };
+    ) -> Result<(), ExperimentError> {
+        let missing = || ExperimentError::Printed {
+            what: "a dump of LAMMPS".into(),
+            problem: "no columns of positions",
+        };
         let x = frame.vectors(["x", "y", "z"]).ok_or_else(missing)?;
         let images = frame.vectors(["ix", "iy", "iz"]).ok_or_else(missing)?;
         let images: Vec<[i32; 3]> = images.iter().map(|i| i.map(|c| c as i32)).collect();
@@ -176,13 +178,13 @@ impl Lammps {
         steps: &[u64],
         name: &str,
         change: impl Fn(String) -> String,
-    ) -> Result<String, ParetoError> {
+    ) -> Result<String, ExperimentError> {
         let folder = self.work.join(name);
         let scene = scene_of(origin, &setting.physics, steps);
         deck::write(&scene, &folder)?;
         deck::write_start(&scene, &origin.state, &folder.join(deck::START))?;
         let path = folder.join(deck::SCRIPT);
-        let mut script = std::fs::read_to_string(&path).map_err(ParetoError::io(&path))?;
+        let mut script = std::fs::read_to_string(&path).map_err(ExperimentError::io(&path))?;
         if self.plugin.is_none() || setting.host == Who::Lammps {
             script = without(&script, "plugin  ");
         }
@@ -194,7 +196,7 @@ impl Lammps {
             }
         }
         script = change(without(&script, "write_data"));
-        std::fs::write(&path, script).map_err(ParetoError::io(&path))?;
+        std::fs::write(&path, script).map_err(ExperimentError::io(&path))?;
         let plugin = self.plugin.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
         let arguments = ["-log", "none", "-var", "plugin", plugin.as_str()];
         Ok(self.host.run_script(1, &folder, &path, &arguments, LIMIT)?.stdout)

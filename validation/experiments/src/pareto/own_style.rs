@@ -1,7 +1,7 @@
 //! LAMMPS's own pair style for a fluid, where it has one.
 
-use super::ParetoError;
 use super::origin::Origin;
+use crate::ExperimentError;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
 use std::fmt::Write;
@@ -30,7 +30,7 @@ impl OwnStyle {
     ///
     /// # Errors
     /// The model does not hold at the temperature.
-    pub fn of(origin: &Origin) -> Result<Option<OwnStyle>, ParetoError> {
+    pub fn of(origin: &Origin) -> Result<Option<OwnStyle>, ExperimentError> {
         let scene = origin.scene;
         let fluid = scene.model.at(origin.stage.kt)?;
         let [Some(thermostat)] = fluid.thermostats[..] else { return Ok(None) };
@@ -102,7 +102,7 @@ impl OwnStyle {
 }
 
 /// Whether forces at the start are the same.
-fn same(origin: &Origin, fluid: Fluid, other: &Model) -> Result<bool, ParetoError> {
+fn same(origin: &Origin, fluid: Fluid, other: &Model) -> Result<bool, ExperimentError> {
     let state = &origin.state;
     let kt = origin.stage.kt;
     let evaluate = |fluid: Fluid| {

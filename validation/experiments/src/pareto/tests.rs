@@ -110,7 +110,7 @@ fn what_is_not_measured_has_no_tolerance() {
     let mut options = options(folder.path(), &["sigma=1%"]);
     options.fixed = Some((Effort::Samples(4), Pace { rounds: 1, seconds: 0.001 }));
     assert!(
-        matches!(run(&scene, &options, &Progress::new()), Err(ParetoError::Unmeasured(name)) if name == "sigma")
+        matches!(run(&scene, &options, &Progress::new()), Err(ExperimentError::Unmeasured(name)) if name == "sigma")
     );
 }
 
