@@ -6,13 +6,16 @@ pub mod calibrate;
 pub mod check;
 pub mod crosscheck;
 mod error;
+pub mod fluids;
 pub mod from_eos;
 pub mod hardcases;
 mod jobs;
 mod machine;
 pub mod measure;
+mod models;
 pub mod papers;
 pub mod pareto;
+pub mod start;
 pub mod sweep;
 pub mod theory_page;
 

@@ -1,11 +1,11 @@
 //! A timed run of LAMMPS.
 
 use super::contender::{Code, Contender, Suffix};
-use super::fluids::Subject;
 use super::length::Length;
 use super::log::{Loop, parse};
-use super::start::{SEED, Start};
 use crate::ExperimentError;
+use crate::fluids::Subject;
+use crate::start::{SEED, Start};
 use psidpd_lammps_host::Host;
 use psidpd_lammps_host::export::eam::{self, Grid};
 use std::collections::HashSet;

@@ -1,8 +1,8 @@
 //! Memory of the native runner, by the peak of a process that does nothing else.
 
-use super::fluids::MDPD;
-use super::start::{SEED, random};
 use crate::ExperimentError;
+use crate::fluids::MDPD;
+use crate::start::{Filling, SEED, random};
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation};
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ const SMALL: usize = 1000;
 /// # Errors
 /// The system does not say how much memory a process has.
 pub fn child(particles: usize) -> Result<Child, ExperimentError> {
-    let state = random(&MDPD, particles)?;
+    let state = random(&MDPD, Filling::of_size(particles)?, SEED)?;
     let mut simulation = Simulation::new(&MDPD.model()?, 1.0, state, SEED)?;
     simulation.set_settings(Settings::default())?;
     simulation.set_reordering(true);

@@ -7,32 +7,31 @@
 mod clock;
 pub mod contender;
 pub mod deck;
-pub mod fluids;
 pub mod length;
 pub mod log;
 pub mod memory;
 pub mod native;
 pub mod outcome;
 pub mod page;
+mod pairs;
 mod spread;
-pub mod start;
 mod turns;
 
 pub use outcome::Outcome;
 pub use spread::Spread;
 
 use crate::ExperimentError;
+use crate::fluids::{MDPD, SUBJECTS, Subject};
 use crate::machine::machine;
+use crate::start::{self, Start};
 use contender::{Choice, Contender, Field, Suffix};
 use deck::Place;
-use fluids::{MDPD, SUBJECTS, Subject};
 use length::{FEWEST, Length};
 use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
 use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
-use start::Start;
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -228,10 +227,10 @@ fn entries(
     for &size in &options.sizes {
         for subject in SUBJECTS {
             let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
-            let start = start::equilibrated(&subject, size, &out.join("starts"))?;
+            let start = start::kept(&subject, size, &out.join("starts"))?;
             spinner.finish();
             let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
-            let pairs = start::pairs_per_particle(&start.state, cutoff);
+            let pairs = pairs::pairs_per_particle(&start.state, cutoff);
             cases.insert((subject.name, size), Case { start, pairs });
             deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
             let field = Field::of(size, Some(size) == smallest, options.every_code, options.few_above);

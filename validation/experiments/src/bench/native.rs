@@ -1,9 +1,9 @@
 //! Timed runs of the native runner, and the test that threads change no bit.
 
-use super::fluids::Subject;
 use super::length::Length;
-use super::start::SEED;
 use crate::ExperimentError;
+use crate::fluids::Subject;
+use crate::start::SEED;
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation, State};
 use std::collections::BTreeMap;
@@ -93,15 +93,15 @@ pub fn equal_on_threads(
 
 #[cfg(test)]
 mod tests {
-    use super::super::fluids::{FORMULA, SUBJECTS};
-    use super::super::start::equilibrated;
     use super::*;
+    use crate::fluids::{FORMULA, SUBJECTS};
+    use crate::start::kept;
     use psidpd_core::engine::Precision;
 
     #[test]
     fn parts_add_up_to_the_whole() {
         let folder = tempfile::tempdir().unwrap();
-        let start = equilibrated(&FORMULA, 400, folder.path()).unwrap();
+        let start = kept(&FORMULA, 400, folder.path()).unwrap();
         let length = Length { warm_up: 1, steps: 3 };
         let measured = run(&FORMULA, &start.state, Some(Settings::default()), length).unwrap();
         let sum: f64 = measured.parts.values().sum();
@@ -116,7 +116,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap());
         for subject in &SUBJECTS {
-            let start = equilibrated(subject, 400, folder.path()).unwrap();
+            let start = kept(subject, 400, folder.path()).unwrap();
             for (_, precision) in Precision::ALL {
                 let settings = Settings { precision, ..Settings::default() };
                 assert!(equal_on_threads(subject, &start.state, settings, &threads).unwrap());

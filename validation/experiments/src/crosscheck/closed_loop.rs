@@ -7,9 +7,10 @@
 
 use super::Context;
 use super::codes::{Code, Setup};
-use super::fluids::SET6;
 use crate::ExperimentError;
-use psidpd_core::engine::{PeriodicBox, Want};
+use crate::fluids::SET6;
+use crate::start::periodic;
+use psidpd_core::engine::Want;
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
 use std::f64::consts::TAU;
@@ -33,9 +34,7 @@ pub struct Work {
 
 fn state_at(angle: f64) -> Result<State, ExperimentError> {
     let third = [CENTRE[0] + RADIUS * angle.cos(), CENTRE[1] + RADIUS * angle.sin(), CENTRE[2]];
-    let domain = PeriodicBox::orthogonal([0.0; 3], [10.0; 3], [true; 3])
-        .map_err(|e| psidpd_dynamics::run::RunError::State(e.to_string()))?;
-    Ok(State::at_rest(domain, vec![1.0], vec![REST[0], REST[1], third]))
+    Ok(State::at_rest(periodic([10.0; 3])?, vec![1.0], vec![REST[0], REST[1], third]))
 }
 
 fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ExperimentError>) -> Result<Work, ExperimentError> {

@@ -1,8 +1,8 @@
 //! The codes, and how each is told about the fluid.
 
 use super::Context;
-use super::fluids::{A, RC, RD, WarrenSet};
 use crate::ExperimentError;
+use crate::fluids::{A, RC, RD, WarrenSet};
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
 use psidpd_lammps_host::export::eam::{self, Grid};

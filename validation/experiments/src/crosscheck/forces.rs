@@ -1,10 +1,10 @@
 //! One configuration, liquid and interface, in every code: forces, energy, virial.
 
 use super::codes::{Code, FINE, Setup};
-use super::fluids::{RC, RD, SET6};
-use super::start::{Filling, equilibrated};
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::fluids::{GAMMA, RC, RD, SET6};
+use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
@@ -102,7 +102,7 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
     for (id, law, gamma, step) in [
         ("conservative", ForceLaw::Conservative, 0.0, None),
         ("lucy", ForceLaw::LucyLammps, 0.0, None),
-        ("thermostat", ForceLaw::Conservative, super::fluids::GAMMA, step),
+        ("thermostat", ForceLaw::Conservative, GAMMA, step),
     ] {
         let model = SET6.model(law, gamma)?;
         let found = native(&model, step)?.against(&plain(&model, state, step)?);
@@ -202,8 +202,8 @@ pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentErr
 /// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let lengths = if context.full { [15.0, 15.0, 20.0] } else { [10.0, 10.0, 15.0] };
-    let filling = Filling { lengths, thickness: 0.5 * lengths[2], density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 500, SEED)?;
+    let filling = Filling { lengths, thickness: 0.5 * lengths[2] };
+    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let volume = state.domain.volume(3);
     let mut part = Part { section: heading(state.len()), ..Part::default() };
     let mut table = Table::new(["code", "law", "against", "force", "energy", "virial"]);
@@ -253,8 +253,8 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     };
 
     // These sums go over every pair and its images.
-    let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5, density: SET6.liquid };
-    against_plain(&mut part, &equilibrated(&SET6, small, 500, SEED)?, context.fault)?;
+    let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
+    against_plain(&mut part, &equilibrated(&SET6.fluid, small, 500, SEED)?, context.fault)?;
     use ForceLaw::{Conservative, LucyLammps};
     let truth = native(context, &SET6.model(Conservative, 0.0)?, &state, None)?;
     let tight = [1e-12; 3];
@@ -290,10 +290,10 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     ));
 
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
-    let noisy = native(context, &SET6.model(Conservative, super::fluids::GAMMA)?, &state, Some(step))?;
+    let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
     compare(
         &mut part,
-        setup(Code::Psi, Conservative, super::fluids::GAMMA, true),
+        setup(Code::Psi, Conservative, GAMMA, true),
         "psi-noise",
         &noisy,
         tight,
@@ -347,8 +347,8 @@ fn heading(particles: usize) -> Section {
 
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.
 fn gradient(context: &Context) -> Result<Check, ExperimentError> {
-    let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 300, SEED)?;
+    let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5 };
+    let state = equilibrated(&SET6.fluid, filling, 300, SEED)?;
     let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
     let lammps = open(context, &setup, &state, "forces-gradient")?;
     let truth = point(&lammps, state.domain.volume(3))?;
@@ -403,8 +403,8 @@ mod tests {
     /// An engine one of whose terms is 5 % wrong fails the checks of `psidpd validate`.
     #[test]
     fn every_fault_of_the_engine_fails_a_check() {
-        let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0, density: SET6.liquid };
-        let state = equilibrated(&SET6, filling, 100, SEED).unwrap();
+        let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0 };
+        let state = equilibrated(&SET6.fluid, filling, 100, SEED).unwrap();
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let mut part = Part::default();
             against_plain(&mut part, &state, fault).unwrap();
@@ -425,14 +425,14 @@ mod tests {
     /// A term that is 5 % wrong, in the forces or in the virial, is far beyond every limit; so is what is no number.
     #[test]
     fn wrong_terms_and_numbers_that_are_none_show() {
-        let filling = Filling { lengths: [4.0; 3], thickness: 4.0, density: SET6.liquid };
-        let state = equilibrated(&SET6, filling, 20, SEED).unwrap();
+        let filling = Filling::cube(4.0);
+        let state = equilibrated(&SET6.fluid, filling, 20, SEED).unwrap();
         let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
-        let model = SET6.model(ForceLaw::Conservative, super::super::fluids::GAMMA).unwrap();
+        let model = SET6.model(ForceLaw::Conservative, GAMMA).unwrap();
         let right = point_of(Simulation::new(&model, 1.0, state.clone(), SEED).unwrap(), step).unwrap();
         let whole = right.against(&plain(&model, &state, step).unwrap());
         assert!(whole.force < 1e-11 && whole.energy < 1e-11 && whole.virial < 1e-11, "{whole:?}");
-        let text = SET6.model_text(ForceLaw::Conservative, super::super::fluids::GAMMA).unwrap();
+        let text = SET6.model_text(ForceLaw::Conservative, GAMMA).unwrap();
         let wrong = |from: &str, to: &str| {
             assert!(text.contains(from), "{text}");
             let model = Model::parse("wrong.toml", &text.replace(from, to)).unwrap();

@@ -3,6 +3,7 @@
 use super::codes::preamble;
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::models;
 use psidpd_core::engine::Pool;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
@@ -82,8 +83,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
 /// The fluid, its start, and the observables.
 fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     let model = folder.join("model.toml");
-    std::fs::write(&model, include_str!("../../../models/standard-dpd.toml"))
-        .map_err(ExperimentError::io(&model))?;
+    std::fs::write(&model, models::STANDARD).map_err(ExperimentError::io(&model))?;
     let text = format!(
         "title = \"distances and displacements\"\nmodel = \"model.toml\"\nkT = 1.0\nseed = {SEED}\nbox = [5.0, 6.0, 7.0]\n\
          density = 3.0\ndt = {DT}\nsteps = {steps}\n[observe]\nevery = {EVERY}\n\

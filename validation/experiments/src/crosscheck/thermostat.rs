@@ -1,14 +1,14 @@
 //! Pair force, drag and noise against LAMMPS's own `dpd`, which shares no code with psidpd.
 
 use super::codes::preamble;
-use super::fluids::SET6;
 use super::forces::{open_deck, point, point_of};
-use super::start::{Filling, equilibrated};
 use super::{Context, Part};
 use crate::ExperimentError;
-use psidpd_core::engine::{PeriodicBox, Step, Want};
+use crate::fluids::SET6;
+use crate::start::{Filling, equilibrated, periodic};
+use psidpd_core::engine::{Step, Want};
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::{RunError, State};
+use psidpd_dynamics::run::State;
 use psidpd_observe::{Measured, threshold};
 use psidpd_report::quantity::with_error;
 use psidpd_report::{Check, Item, Section, Table};
@@ -70,8 +70,8 @@ fn deck(
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut part = Part::default();
     let mut forces = Table::new(["", "force", "energy", "virial"]);
-    let filling = Filling { lengths: [6.0; 3], thickness: 6.0, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 100, SEED)?;
+    let filling = Filling::cube(6.0);
+    let state = equilibrated(&SET6.fluid, filling, 100, SEED)?;
     let volume = state.domain.volume(3);
     for (id, strength, gamma) in [("pair force", 25.0, 0.0), ("drag", 0.0, 18.0), ("both", 25.0, 4.5)] {
         let kt = if gamma > 0.0 { COLD } else { 1.0 };
@@ -194,11 +194,9 @@ fn independent_mean(values: &[f64]) -> Measured {
 /// Pairs along x at rest, with tags in turn.
 fn pairs() -> Result<State, ExperimentError> {
     let edge = PAIRS as f64 * APART;
-    let domain = PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3])
-        .map_err(|e| ExperimentError::Run(RunError::State(e.to_string())))?;
     let x = (0..PAIRS.pow(3)).flat_map(|k| {
         let [x, y, z] = [k % PAIRS, k / PAIRS % PAIRS, k / PAIRS / PAIRS].map(|i| (i as f64 + 0.5) * APART);
         [[x, y, z], [x + DISTANCES[k % DISTANCES.len()], y, z]]
     });
-    Ok(State::at_rest(domain, vec![1.0], x.collect()))
+    Ok(State::at_rest(periodic([edge; 3])?, vec![1.0], x.collect()))
 }

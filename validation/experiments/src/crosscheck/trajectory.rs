@@ -1,10 +1,10 @@
 //! The same trajectory in both hosts: noise on, same seed, same integrator, on one rank and on two.
 
 use super::codes::{Code, Setup};
-use super::fluids::{GAMMA, SET6};
-use super::start::{Filling, equilibrated};
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::fluids::{GAMMA, SET6};
+use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::Want;
 use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
@@ -24,8 +24,8 @@ const LARGEST: f64 = 1e-10;
 
 /// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
-    let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 500, SEED)?;
+    let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0 };
+    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let ours = native(context, &state)?;
     let mut part = Part::default();
     let mut table = Table::new(["code", "ranks", "newton", "largest distance from native"]);

@@ -3,7 +3,7 @@
 //! A file for each group of cases; [`case`] says what a case is and judges, [`native`] and [`plugin`] carry it out.
 
 mod case;
-mod fluids;
+mod data_file;
 mod forces;
 mod long;
 mod native;

@@ -2,7 +2,7 @@ use super::*;
 use std::path::Path;
 
 fn tiny(folder: &Path) -> Scene {
-    let model = include_str!("../../../models/warren2003-set6.toml");
+    let model = crate::models::SET6;
     std::fs::write(folder.join("m.toml"), model).unwrap();
     let text = "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = 4.0\ndensity = 6.05\nequilibrate = 200\nsteps = 500\ndt = 0.01\n";
     Scene::parse("tiny", text, folder).unwrap()
