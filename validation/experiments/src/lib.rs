@@ -10,6 +10,7 @@ pub mod fluids;
 pub mod from_eos;
 pub mod hardcases;
 mod jobs;
+pub mod lammps;
 mod machine;
 pub mod measure;
 mod models;

@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::fluids::Subject;
 use chacha20::ChaCha8Rng;
-use psidpd_core::engine::{PeriodicBox, Settings, Want};
+use psidpd_core::engine::{PeriodicBox, Precision, Settings, Want};
 use psidpd_dynamics::particles::thermal_velocities;
 use psidpd_dynamics::run::{Integrator, RunError, Simulation, State};
 use rand::{RngExt, SeedableRng};
@@ -60,17 +60,27 @@ pub fn random(subject: &Subject, filling: Filling, seed: u64) -> Result<State, E
     Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })
 }
 
-/// The same brought to equilibrium by `steps` steps with the thermostat on, after 100 short ones.
+/// The same brought to equilibrium by `steps` steps with the thermostat on, after 100 short ones, in double precision.
 pub fn equilibrated(
     subject: &Subject,
     filling: Filling,
     steps: u64,
     seed: u64,
 ) -> Result<State, ExperimentError> {
+    in_precision(Precision::Double, subject, filling, steps, seed)
+}
+
+fn in_precision(
+    precision: Precision,
+    subject: &Subject,
+    filling: Filling,
+    steps: u64,
+    seed: u64,
+) -> Result<State, ExperimentError> {
     let mut simulation = Simulation::new(&subject.model()?, 1.0, random(subject, filling, seed)?, seed)?;
-    // They change no bit of it.
+    // Threads change no bit of it.
     let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    simulation.set_settings(Settings { threads, ..Settings::default() })?;
+    simulation.set_settings(Settings { precision, threads, ..Settings::default() })?;
     for (dt, steps) in [(0.1 * subject.dt, 100), (subject.dt, steps)] {
         simulation.prepare(dt, Want::FORCES)?;
         simulation.advance(steps, dt, Integrator::VelocityVerlet)?;
@@ -106,7 +116,7 @@ pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, Expe
     if let Some(state) = found.filter(|_| data.is_file() && data_mdpd.is_file()) {
         return Ok(Start { state, data, data_mdpd });
     }
-    let state = equilibrated(subject, Filling::of_size(size)?, STEPS, SEED)?;
+    let state = in_precision(Precision::Mixed, subject, Filling::of_size(size)?, STEPS, SEED)?;
     let text = state.to_data("psidpd bench");
     text.write(&data)?;
     text.write_mdpd(&data_mdpd)?;

@@ -8,7 +8,6 @@ mod clock;
 pub mod contender;
 pub mod deck;
 pub mod length;
-pub mod log;
 pub mod memory;
 pub mod native;
 pub mod outcome;
@@ -22,6 +21,8 @@ pub use spread::Spread;
 
 use crate::ExperimentError;
 use crate::fluids::{MDPD, SUBJECTS, Subject};
+use crate::lammps::host::PluginHost;
+use crate::lammps::log::Loop;
 use crate::machine::machine;
 use crate::start::{self, Start};
 use contender::{Choice, Contender, Field, Suffix};
@@ -186,14 +187,8 @@ fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, S
         None => psidpd_lammps_host::plugin::install_to_build(&note)?,
     };
     let version = host.version()?;
-    let plugin = psidpd_lammps_host::plugin::build(&host, &note)?;
-    psidpd_lammps_host::plugin::check(&host, &plugin)?;
-    // A LAMMPS without plugins has its own program with the styles in it.
-    let (host, load) = match psidpd_lammps_host::plugin::launcher(&plugin) {
-        Some(launcher) => (host.with_program(&launcher), None),
-        None => (host, Some(plugin)),
-    };
-    Ok((Place { host, plugin: load, work: out.join("runs") }, version.name))
+    let lammps = PluginHost::open(host, &note)?;
+    Ok((Place { lammps, work: out.join("runs") }, version.name))
 }
 
 /// Who can be timed here, and the styles that LAMMPS lacks.
@@ -210,7 +205,7 @@ fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), Exp
         suffixes,
         words: options.words.clone(),
         threads: options.threads.clone(),
-        two_ranks: place.host.mpirun.is_some(),
+        two_ranks: place.lammps.host.mpirun.is_some(),
     };
     Ok((choice, missing))
 }
@@ -306,7 +301,8 @@ fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> R
     // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
     let skins = if entry.contender.needs_no_ghosts() { [0.0; SKINS.len()] } else { SKINS };
     for skin in skins {
-        let seconds = once(entry, cases, place, skin)?.0 / (entry.length.steps as f64 * entry.particles());
+        let seconds =
+            once(entry, cases, place, skin)?.seconds / (entry.length.steps as f64 * entry.particles());
         if seconds < pace.seconds {
             pace = Pace { skin, seconds };
         }
@@ -341,27 +337,21 @@ fn time(
     Ok(())
 }
 
-/// Seconds, seconds of the parts, ghosts and list builds.
-type Once = (f64, BTreeMap<String, f64>, Option<(f64, u64)>);
-
-fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Once, ExperimentError> {
+fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Loop, ExperimentError> {
     let start = &cases[&(entry.subject.name, entry.size)].start;
-    if entry.contender.in_lammps() {
-        let account = deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length)?;
-        Ok((account.seconds, account.parts, Some((account.ghosts, account.builds))))
-    } else {
-        let measured = native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length)?;
-        Ok((measured.seconds, measured.parts, None))
+    match entry.contender.in_lammps() {
+        true => deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length),
+        false => native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length),
     }
 }
 
 fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), ExperimentError> {
-    let (seconds, parts, lammps) = once(entry, cases, place, entry.skin)?;
-    entry.seconds.push(seconds);
-    entry.parts.push(parts);
-    if let Some((ghosts, builds)) = lammps {
-        entry.ghosts = Some(ghosts);
-        entry.builds = Some(entry.builds.unwrap_or(0) + builds);
+    let made = once(entry, cases, place, entry.skin)?;
+    entry.seconds.push(made.seconds);
+    entry.parts.push(made.parts);
+    if entry.contender.in_lammps() {
+        entry.ghosts = Some(made.ghosts);
+        entry.builds = Some(entry.builds.unwrap_or(0) + made.builds);
     }
     Ok(())
 }

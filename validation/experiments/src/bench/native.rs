@@ -3,21 +3,13 @@
 use super::length::Length;
 use crate::ExperimentError;
 use crate::fluids::Subject;
+use crate::lammps::log::Loop;
 use crate::start::SEED;
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation, State};
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::time::Instant;
-
-/// A timed loop.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
-    /// Wall time in seconds.
-    pub seconds: f64,
-    /// Seconds of each part of the steps; empty for the reference.
-    pub parts: BTreeMap<String, f64>,
-}
 
 fn simulation(
     subject: &Subject,
@@ -40,13 +32,13 @@ fn advance(simulation: &mut Simulation, subject: &Subject, steps: u64) -> Result
     Ok(simulation.advance(steps, subject.dt, Integrator::VelocityVerlet)?)
 }
 
-/// Times steps with these settings, or of the reference if there are none.
+/// Times steps with these settings, or of the reference if there are none, which tells no parts.
 pub fn run(
     subject: &Subject,
     state: &State,
     settings: Option<Settings>,
     length: Length,
-) -> Result<Measured, ExperimentError> {
+) -> Result<Loop, ExperimentError> {
     let mut simulation = simulation(subject, state, settings)?;
     advance(&mut simulation, subject, length.warm_up)?;
     let before = simulation.engine().times();
@@ -67,7 +59,7 @@ pub fn run(
         parts.extend(named.map(|(name, t)| (name.to_owned(), t)));
         parts.insert("integrate".to_owned(), rest);
     }
-    Ok(Measured { seconds, parts })
+    Ok(Loop { seconds, steps: length.steps, particles: state.len(), parts, ..Loop::default() })
 }
 
 /// Whether trajectories of some steps on each number of threads are the same, bit for bit.

@@ -178,7 +178,7 @@ pub fn open(context: &Context, setup: &Setup, state: &State, name: &str) -> Resu
 
 /// The same with any commands up to the pair style.
 pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, ExperimentError> {
-    let lammps = Lammps::open(context.host, &[])?;
+    let lammps = Lammps::open(&context.lammps.host, &[])?;
     lammps.commands(deck)?;
     lammps.commands(
         "compute virial all pressure NULL virial\nthermo_style custom step pe press c_virial[1]\n\

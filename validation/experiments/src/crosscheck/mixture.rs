@@ -1,9 +1,10 @@
 //! Two species in a tilted box, as tables of LAMMPS's `eam/alloy`, which finds pairs and images by itself.
 
-use super::codes::preamble;
 use super::forces::{open_deck, point, point_of};
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::lammps::deck::Deck;
+use crate::lammps::style::PairStyle;
 use chacha20::ChaCha8Rng;
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
@@ -40,8 +41,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     state.to_data("psidpd").write(&data)?;
     let grid = Grid { spacing: 1e-5, largest_density: 60.0, densities: 20_001 };
     eam::write(&model.at(1.0)?, &state.mass, grid, &tables)?;
-    let deck = preamble("atomic", true, &data.display().to_string())
-        + &format!("pair_style eam/alloy\npair_coeff * * \"{}\" A B\n", tables.display());
+    let style =
+        PairStyle::Eam { tables: tables.display().to_string(), species: "A B".to_owned(), thermostat: None };
+    let deck = Deck::new(&style, SEED, data.display().to_string()).text();
     let theirs = point(&open_deck(context, &deck)?, state.domain.volume(3))?;
     let found = point_of(context.simulation(&model, 1.0, &state, SEED)?, None)?.against(&theirs);
     let mut part = Part::default();

@@ -22,21 +22,22 @@ pub mod trajectory;
 mod validate;
 
 use crate::ExperimentError;
+use crate::lammps::host::PluginHost;
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Simulation, State};
-use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 pub use validate::{Options, check_table, validate};
+
+/// What LAMMPS writes beside the results of a run.
+const LOG: &str = "log.lammps";
 
 /// What every part of the validation works with.
 #[derive(Debug)]
 pub struct Context<'a> {
-    /// The LAMMPS.
-    pub host: &'a Host,
-    /// The plugin built for it.
-    pub plugin: &'a Path,
+    /// LAMMPS with the plugin.
+    pub lammps: &'a PluginHost,
     /// A folder for decks and data.
     pub work: PathBuf,
     /// Whether long runs are wanted.
@@ -83,10 +84,11 @@ mod tests {
     fn independent_checks_tell_of_faults() {
         let folder = tempfile::tempdir().unwrap();
         let host = psidpd_lammps_host::install(&|line| eprintln!("{line}")).unwrap();
+        let lammps = PluginHost { host, plugin: None };
         let progress = Progress::new();
         let failed = |fault: Option<Fault>| -> Vec<String> {
-            let (work, plugin) = (folder.path().to_owned(), Path::new(""));
-            let context = Context { host: &host, plugin, work, full: false, progress: &progress, fault };
+            let work = folder.path().to_owned();
+            let context = Context { lammps: &lammps, work, full: false, progress: &progress, fault };
             let mut parts = vec![thermostat::run(&context).unwrap(), mixture::run(&context).unwrap()];
             // Configurations of LAMMPS alone.
             parts.extend(fault.is_none().then(|| observables::run(&context).unwrap()));

@@ -1,10 +1,11 @@
 //! Pair force, drag and noise against LAMMPS's own `dpd`, which shares no code with psidpd.
 
-use super::codes::preamble;
 use super::forces::{open_deck, point, point_of};
 use super::{Context, Part};
 use crate::ExperimentError;
 use crate::fluids::SET6;
+use crate::lammps::deck::Deck;
+use crate::lammps::style::PairStyle;
 use crate::start::{Filling, equilibrated, periodic};
 use psidpd_core::engine::{Step, Want};
 use psidpd_core::model::Model;
@@ -62,8 +63,8 @@ fn deck(
     std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
     let data = folder.join("start.data");
     state.to_data("psidpd").write(&data)?;
-    let style = format!("pair_style dpd {kt:?} 1.0 {SEED}\npair_coeff 1 1 {strength:?} {gamma:?}\n");
-    Ok(preamble("atomic", true, &data.display().to_string()) + &style)
+    let style = PairStyle::Dpd { a: strength, gamma, rc: 1.0 };
+    Ok(Deck { kt, ..Deck::new(&style, SEED, data.display().to_string()) }.text())
 }
 
 /// Runs the comparison.

@@ -1,6 +1,7 @@
 //! One run of any code, as series of what is compared.
 
 use super::Context;
+use super::LOG;
 use super::codes::{Code, Setup};
 use crate::ExperimentError;
 use psidpd_core::engine::{Fault, Precision, Settings, Want};
@@ -155,8 +156,6 @@ fn lammps(
         ));
     }
     deck.push_str(&format!("thermo {}\nrun {}\n", length.steps, length.steps));
-    let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ExperimentError::io(&script))?;
     let limit = Duration::from_secs(if context.full { 6 * 3600 } else { 1200 });
     let over = AtomicBool::new(false);
     let series = folder.join("series.txt");
@@ -169,7 +168,7 @@ fn lammps(
                 }
             }
         });
-        let done = context.host.run_script(1, folder, &script, &["-log", "log.lammps"], limit);
+        let done = context.lammps.run(1, folder, &deck, LOG, limit);
         over.store(true, Ordering::Relaxed);
         done
     })?;

@@ -1,5 +1,6 @@
 //! The same trajectory in both hosts: noise on, same seed, same integrator, on one rank and on two.
 
+use super::LOG;
 use super::codes::{Code, Setup};
 use super::{Context, Part};
 use crate::ExperimentError;
@@ -102,9 +103,7 @@ fn lammps(
         "fix move all nve\ntimestep {DT}\nthermo {STEPS}\nrun {STEPS}\n\
          write_dump all custom final.txt id x y z modify sort id format float %.17g\n"
     ));
-    let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ExperimentError::io(&script))?;
-    context.host.run_script(ranks, &folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
+    context.lammps.run(ranks, &folder, &deck, LOG, Duration::from_secs(300))?;
     let path = folder.join("final.txt");
     let frames = dump::read(&path)?;
     frames.first().and_then(|f| f.vectors(["x", "y", "z"])).filter(|x| x.len() == state.len()).ok_or_else(

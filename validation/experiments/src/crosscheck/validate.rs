@@ -2,6 +2,7 @@ use super::{
     Context, Part, conclusion, energy, equilibrium, forces, mixture, observables, thermostat, trajectory,
 };
 use crate::ExperimentError;
+use crate::lammps::host::PluginHost;
 use crate::machine::machine;
 use psidpd_core::engine::Fault;
 use psidpd_formats::files::write_atomically;
@@ -45,12 +46,10 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Exper
     let version = host.version()?;
     spinner.finish();
     let spinner = progress.spinner("plugin");
-    let plugin = psidpd_lammps_host::plugin::build(&host, &|line| progress.note(line))?;
-    psidpd_lammps_host::plugin::check(&host, &plugin)?;
+    let lammps = PluginHost::open(host, &|line| progress.note(line))?;
     spinner.finish();
     let context = Context {
-        host: &host,
-        plugin: &plugin,
+        lammps: &lammps,
         work: out.join("runs"),
         full: options.full,
         progress,

@@ -31,6 +31,7 @@ use crate::jobs::{self, Job};
 use crate::machine::machine;
 use lammps::Lammps;
 use origin::Origin;
+use own_style::is_another_law;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::scene::Scene;
@@ -353,7 +354,7 @@ fn own_points(
     native: &Quantities,
     progress: &Progress,
 ) -> Result<Option<Own>, ExperimentError> {
-    let Some(own) = lammps.own else { return Ok(None) };
+    let Some(own) = &lammps.own else { return Ok(None) };
     let physics = OWN.map(|multiple| Physics {
         integrator: Integrator::VelocityVerlet,
         multiple,
@@ -372,7 +373,7 @@ fn own_points(
     }
     let sampled: Vec<Sampled> = jobs::counted(jobs, &bar).into_iter().collect::<Result<_, _>>()?;
     let mut known = known;
-    let (reference, first) = match (&sampled[0], own.is_another_law()) {
+    let (reference, first) = match (&sampled[0], is_another_law(own)) {
         (Sampled::Made { quantities, .. }, true) => {
             known.temperature = false;
             (quantities.as_ref().clone(), 1)
@@ -388,7 +389,7 @@ fn own_points(
         };
         points.push(point(origin, setting(*physics), sampled, errors));
     }
-    let itself = own.is_another_law().then(|| reference_of(origin, &physics[0], &sampled[0], known));
+    let itself = is_another_law(own).then(|| reference_of(origin, &physics[0], &sampled[0], known));
     Ok(Some((itself, points)))
 }
 
