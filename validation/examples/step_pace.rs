@@ -3,9 +3,10 @@
 //!
 //! `cargo run --release -p psidpd --example step_pace mdpd mixed avx512 1 6050`
 
-use psidpd::bench::fluids::SUBJECTS;
 use psidpd::bench::length::Length;
-use psidpd::bench::{native, start};
+use psidpd::bench::native;
+use psidpd::experiments::fluids::SUBJECTS;
+use psidpd::experiments::start;
 use psidpd_core::engine::{Instructions, Precision, Settings};
 use std::error::Error;
 use std::path::Path;
@@ -25,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (_, instructions) =
         Instructions::ALL.into_iter().find(|(name, _)| name == instructions).ok_or("no such instructions")?;
     let settings = Settings { precision, instructions, threads: threads.parse()? };
-    let start = start::equilibrated(&subject, size.parse()?, Path::new("target/bench/starts"))?;
+    let start = start::kept(&subject, size.parse()?, Path::new("target/bench/starts"))?;
     let particles = start.state.x.len() as f64;
     let length = Length { warm_up: 30, steps: (3e6 / particles).ceil() as u64 };
     let per_step = 1e9 / (particles * length.steps as f64);

@@ -3,7 +3,7 @@
 pub mod cli;
 
 pub use psidpd_dynamics::{checkpoint, run, scene};
-pub use psidpd_experiments::bench;
+pub use psidpd_experiments::{self as experiments, bench};
 pub use psidpd_formats as formats;
 pub use psidpd_lammps_host::{self as lammps, export};
 pub use psidpd_observe as observe;

@@ -202,7 +202,7 @@ fn nothing_is_met_that_was_not_measured() {
 #[test]
 fn whom_goals_name_is_timed_at_their_sizes() {
     use psidpd::bench::contender::{Choice, FEW_ABOVE, Field, Suffix, contenders};
-    use psidpd::bench::fluids::{SIZES, SUBJECTS};
+    use psidpd::experiments::fluids::{SIZES, SUBJECTS};
     let choice = Choice {
         built_in: true,
         eam: true,

@@ -5,13 +5,22 @@ pub mod bulk;
 pub mod calibrate;
 pub mod check;
 pub mod crosscheck;
+mod error;
+pub mod fluids;
 pub mod from_eos;
 pub mod hardcases;
+mod jobs;
+pub mod lammps;
+mod machine;
 pub mod measure;
+mod models;
 pub mod papers;
 pub mod pareto;
+pub mod start;
 pub mod sweep;
 pub mod theory_page;
+
+pub use error::ExperimentError;
 
 #[cfg(test)]
 #[path = "../../dynamics/src/test_support.rs"]

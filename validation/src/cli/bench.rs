@@ -1,7 +1,8 @@
 use super::run::thread_count;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
-use psidpd_experiments::bench::{Options, contender::FEW_ABOVE, fluids::SIZES, memory, page, run as measure};
+use psidpd_experiments::bench::{Options, contender::FEW_ABOVE, memory, page, run as measure};
+use psidpd_experiments::fluids::SIZES;
 use psidpd_report::Progress;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

@@ -6,8 +6,8 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::RunError;
+use psidpd_experiments::ExperimentError;
 use psidpd_experiments::calibrate::CalibrateError;
-use psidpd_experiments::crosscheck::ValidateError;
 use psidpd_experiments::from_eos::FromEosError;
 use psidpd_experiments::sweep::SweepError;
 use std::path::PathBuf;
@@ -90,8 +90,8 @@ impl Failure {
 /// The error inside a transparent error, whose own `source` skips that error.
 fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::error::Error + 'static) {
     match error.downcast_ref() {
-        Some(ValidateError::File(found)) => return found,
-        Some(ValidateError::Run(found)) => return found,
+        Some(ExperimentError::File(found)) => return found,
+        Some(ExperimentError::Run(found)) => return found,
         _ => {}
     }
     if let Some(SweepError::File(found)) = error.downcast_ref() {

@@ -1,6 +1,6 @@
 //! Who is timed, under which name.
 
-use super::fluids::{DPD, MDPD, Subject};
+use crate::fluids::{DPD, MDPD, Subject};
 use psidpd_core::engine::{Instructions, Precision, Settings};
 use std::num::NonZeroUsize;
 
@@ -256,8 +256,8 @@ fn everyone(subject: &Subject, choice: &Choice) -> Vec<Contender> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fluids::SUBJECTS;
     use super::*;
+    use crate::fluids::SUBJECTS;
     use std::collections::HashSet;
 
     #[test]

@@ -1,8 +1,8 @@
 //! Memory of the native runner, by the peak of a process that does nothing else.
 
-use super::BenchError;
-use super::fluids::MDPD;
-use super::start::{SEED, random};
+use crate::ExperimentError;
+use crate::fluids::MDPD;
+use crate::start::{Filling, SEED, random};
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation};
 use serde::{Deserialize, Serialize};
@@ -40,8 +40,8 @@ const SMALL: usize = 1000;
 ///
 /// # Errors
 /// The system does not say how much memory a process has.
-pub fn child(particles: usize) -> Result<Child, BenchError> {
-    let state = random(&MDPD, particles)?;
+pub fn child(particles: usize) -> Result<Child, ExperimentError> {
+    let state = random(&MDPD, Filling::of_size(particles)?, SEED)?;
     let mut simulation = Simulation::new(&MDPD.model()?, 1.0, state, SEED)?;
     simulation.set_settings(Settings::default())?;
     simulation.set_reordering(true);
@@ -50,24 +50,24 @@ pub fn child(particles: usize) -> Result<Child, BenchError> {
     simulation.prepare(dt, Want::FORCES)?;
     simulation.advance(5, dt, Integrator::VelocityVerlet)?;
     let status = Path::new("/proc/self/status");
-    let text = std::fs::read_to_string(status).map_err(BenchError::io(status))?;
+    let text = std::fs::read_to_string(status).map_err(ExperimentError::io(status))?;
     let kilobytes: Option<u64> = text
         .lines()
         .find_map(|line| line.strip_prefix("VmHWM:"))
         .and_then(|rest| rest.split_whitespace().next()?.parse().ok());
-    let peak_bytes =
-        1024 * kilobytes.ok_or_else(|| BenchError::Memory(format!("no VmHWM in {}", status.display())))?;
+    let peak_bytes = 1024
+        * kilobytes.ok_or_else(|| ExperimentError::Memory(format!("no VmHWM in {}", status.display())))?;
     Ok(Child { particles, peak_bytes, engine_bytes: simulation.engine().memory() as u64 })
 }
 
-fn in_child(program: &Path, particles: usize) -> Result<Child, BenchError> {
+fn in_child(program: &Path, particles: usize) -> Result<Child, ExperimentError> {
     let output = Command::new(program)
         .args(["bench", "--measure-memory", &particles.to_string()])
         .output()
-        .map_err(BenchError::io(program))?;
+        .map_err(ExperimentError::io(program))?;
     let said = String::from_utf8_lossy(&output.stdout);
     serde_json::from_str(&said).map_err(|_| {
-        BenchError::Memory(format!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr)))
+        ExperimentError::Memory(format!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr)))
     })
 }
 
@@ -75,7 +75,7 @@ fn in_child(program: &Path, particles: usize) -> Result<Child, BenchError> {
 ///
 /// # Errors
 /// The child fails.
-pub fn measure(program: &Path, sizes: &[usize]) -> Result<Vec<Memory>, BenchError> {
+pub fn measure(program: &Path, sizes: &[usize]) -> Result<Vec<Memory>, ExperimentError> {
     let small = in_child(program, SMALL)?;
     sizes
         .iter()

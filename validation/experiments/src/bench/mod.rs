@@ -7,32 +7,32 @@
 mod clock;
 pub mod contender;
 pub mod deck;
-mod error;
-pub mod fluids;
 pub mod length;
-pub mod log;
 pub mod memory;
 pub mod native;
 pub mod outcome;
 pub mod page;
+mod pairs;
 mod spread;
-pub mod start;
 mod turns;
 
-pub use error::BenchError;
 pub use outcome::Outcome;
 pub use spread::Spread;
 
+use crate::ExperimentError;
+use crate::fluids::{MDPD, SUBJECTS, Subject};
+use crate::lammps::host::PluginHost;
+use crate::lammps::log::Loop;
+use crate::machine::machine;
+use crate::start::{self, Start};
 use contender::{Choice, Contender, Field, Suffix};
 use deck::Place;
-use fluids::{MDPD, SUBJECTS, Subject};
 use length::{FEWEST, Length};
 use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
 use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
-use start::Start;
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -111,11 +111,11 @@ type Cases = BTreeMap<(&'static str, usize), Case>;
 ///
 /// # Errors
 /// Something could not be run or written.
-pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, BenchError> {
+pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let load = load();
-    std::fs::create_dir_all(&options.out).map_err(BenchError::io(&options.out))?;
+    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
     // LAMMPS runs in folders of its own: paths must not depend on ours.
-    let out = options.out.canonicalize().map_err(BenchError::io(&options.out))?;
+    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
     let spinner = progress.spinner("LAMMPS and the plugin");
     let (place, version) = place(options, &out, progress)?;
     spinner.finish();
@@ -140,7 +140,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
         format: 3,
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine {
-            processor: crate::crosscheck::machine(),
+            processor: machine(),
             cores: std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
             instructions: Instructions::ALL
                 .into_iter()
@@ -171,34 +171,28 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     Ok(outcome)
 }
 
-fn write(out: &Path, outcome: &Outcome) -> Result<(), BenchError> {
+fn write(out: &Path, outcome: &Outcome) -> Result<(), ExperimentError> {
     let json = serde_json::to_string_pretty(outcome)
-        .map_err(|e| BenchError::io(out.join("bench.json"))(e.into()))?;
+        .map_err(|e| ExperimentError::io(out.join("bench.json"))(e.into()))?;
     write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
     write_atomically(out.join("report.html"), page::report(outcome)?.as_bytes())?;
     Ok(())
 }
 
 /// LAMMPS with the plugin, and its version in words.
-fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, String), BenchError> {
+fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, String), ExperimentError> {
     let note = |line: &str| progress.note(line);
     let host = match &options.lammps {
         Some(place) => Host::at(place)?,
         None => psidpd_lammps_host::plugin::install_to_build(&note)?,
     };
     let version = host.version()?;
-    let plugin = psidpd_lammps_host::plugin::build(&host, &note)?;
-    psidpd_lammps_host::plugin::check(&host, &plugin)?;
-    // A LAMMPS without plugins has its own program with the styles in it.
-    let (host, load) = match psidpd_lammps_host::plugin::launcher(&plugin) {
-        Some(launcher) => (host.with_program(&launcher), None),
-        None => (host, Some(plugin)),
-    };
-    Ok((Place { host, plugin: load, work: out.join("runs") }, version.name))
+    let lammps = PluginHost::open(host, &note)?;
+    Ok((Place { lammps, work: out.join("runs") }, version.name))
 }
 
 /// Who can be timed here, and the styles that LAMMPS lacks.
-fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), BenchError> {
+fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), ExperimentError> {
     let styles = deck::pair_styles(place)?;
     let has = |name: &str| styles.contains(name);
     let suffixes: Vec<Suffix> =
@@ -211,7 +205,7 @@ fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), Ben
         suffixes,
         words: options.words.clone(),
         threads: options.threads.clone(),
-        two_ranks: place.host.mpirun.is_some(),
+        two_ranks: place.lammps.host.mpirun.is_some(),
     };
     Ok((choice, missing))
 }
@@ -222,16 +216,16 @@ fn entries(
     place: &Place,
     out: &Path,
     progress: &Progress,
-) -> Result<(Cases, Vec<Entry>), BenchError> {
+) -> Result<(Cases, Vec<Entry>), ExperimentError> {
     let smallest = options.sizes.iter().min().copied();
     let (mut cases, mut entries) = (Cases::new(), Vec::new());
     for &size in &options.sizes {
         for subject in SUBJECTS {
             let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
-            let start = start::equilibrated(&subject, size, &out.join("starts"))?;
+            let start = start::kept(&subject, size, &out.join("starts"))?;
             spinner.finish();
-            let cutoff = subject.model()?.at(1.0).map_err(BenchError::File)?.cutoff();
-            let pairs = start::pairs_per_particle(&start.state, cutoff);
+            let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
+            let pairs = pairs::pairs_per_particle(&start.state, cutoff);
             cases.insert((subject.name, size), Case { start, pairs });
             deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
             let field = Field::of(size, Some(size) == smallest, options.every_code, options.few_above);
@@ -270,7 +264,7 @@ fn calibrate(
     place: &Place,
     entries: &mut [Entry],
     progress: &Progress,
-) -> Result<(), BenchError> {
+) -> Result<(), ExperimentError> {
     if options.steps.is_some() {
         return Ok(());
     }
@@ -299,7 +293,7 @@ fn calibrate(
     Ok(())
 }
 
-fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, BenchError> {
+fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, ExperimentError> {
     // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
     let large = entry.size > options.few_above;
     entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
@@ -307,7 +301,8 @@ fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> R
     // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
     let skins = if entry.contender.needs_no_ghosts() { [0.0; SKINS.len()] } else { SKINS };
     for skin in skins {
-        let seconds = once(entry, cases, place, skin)?.0 / (entry.length.steps as f64 * entry.particles());
+        let seconds =
+            once(entry, cases, place, skin)?.seconds / (entry.length.steps as f64 * entry.particles());
         if seconds < pace.seconds {
             pace = Pace { skin, seconds };
         }
@@ -322,7 +317,7 @@ fn time(
     place: &Place,
     entries: &mut [Entry],
     progress: &Progress,
-) -> Result<(), BenchError> {
+) -> Result<(), ExperimentError> {
     let runs: Vec<_> = entries.iter().map(|e| (e.subject.name, e.size)).collect();
     let mut order = turns::turns(&runs);
     // By the time that runs are expected to take: one in a large box takes as long as many in a small one.
@@ -342,27 +337,21 @@ fn time(
     Ok(())
 }
 
-/// Seconds, seconds of the parts, ghosts and list builds.
-type Once = (f64, BTreeMap<String, f64>, Option<(f64, u64)>);
-
-fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Once, BenchError> {
+fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Loop, ExperimentError> {
     let start = &cases[&(entry.subject.name, entry.size)].start;
-    if entry.contender.in_lammps() {
-        let account = deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length)?;
-        Ok((account.seconds, account.parts, Some((account.ghosts, account.builds))))
-    } else {
-        let measured = native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length)?;
-        Ok((measured.seconds, measured.parts, None))
+    match entry.contender.in_lammps() {
+        true => deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length),
+        false => native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length),
     }
 }
 
-fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), BenchError> {
-    let (seconds, parts, lammps) = once(entry, cases, place, entry.skin)?;
-    entry.seconds.push(seconds);
-    entry.parts.push(parts);
-    if let Some((ghosts, builds)) = lammps {
-        entry.ghosts = Some(ghosts);
-        entry.builds = Some(entry.builds.unwrap_or(0) + builds);
+fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), ExperimentError> {
+    let made = once(entry, cases, place, entry.skin)?;
+    entry.seconds.push(made.seconds);
+    entry.parts.push(made.parts);
+    if entry.contender.in_lammps() {
+        entry.ghosts = Some(made.ghosts);
+        entry.builds = Some(entry.builds.unwrap_or(0) + made.builds);
     }
     Ok(())
 }
@@ -458,12 +447,12 @@ fn bytes_per_ghost(slope_width: usize) -> f64 {
     (6 + slope_width + 3) as f64 * 8.0
 }
 
-fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), BenchError> {
+fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), ExperimentError> {
     let mut widths = BTreeMap::new();
     let mut facts = Vec::new();
     for subject in &SUBJECTS {
         let fluid = subject.model()?.at(1.0)?;
-        let plan = Plan::new(&fluid).map_err(|e| BenchError::Run(e.into()))?;
+        let plan = Plan::new(&fluid).map_err(|e| ExperimentError::Run(e.into()))?;
         widths.insert(subject.name, plan.slope_width());
         facts.push(FluidFacts {
             name: subject.name,
@@ -476,7 +465,7 @@ fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), BenchErro
     Ok((facts, widths))
 }
 
-fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, BenchError> {
+fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, ExperimentError> {
     let smallest = options.sizes.iter().min().copied().unwrap_or_default();
     let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
     let mut equal = BTreeMap::new();

@@ -1,29 +1,21 @@
 //! Timed runs of the native runner, and the test that threads change no bit.
 
-use super::BenchError;
-use super::fluids::Subject;
 use super::length::Length;
-use super::start::SEED;
+use crate::ExperimentError;
+use crate::fluids::Subject;
+use crate::lammps::log::Loop;
+use crate::start::SEED;
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation, State};
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-/// A timed loop.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
-    /// Wall time in seconds.
-    pub seconds: f64,
-    /// Seconds of each part of the steps; empty for the reference.
-    pub parts: BTreeMap<String, f64>,
-}
-
 fn simulation(
     subject: &Subject,
     state: &State,
     settings: Option<Settings>,
-) -> Result<Simulation, BenchError> {
+) -> Result<Simulation, ExperimentError> {
     let mut simulation = Simulation::new(&subject.model()?, 1.0, state.clone(), SEED)?;
     match settings {
         Some(settings) => {
@@ -36,17 +28,17 @@ fn simulation(
     Ok(simulation)
 }
 
-fn advance(simulation: &mut Simulation, subject: &Subject, steps: u64) -> Result<(), BenchError> {
+fn advance(simulation: &mut Simulation, subject: &Subject, steps: u64) -> Result<(), ExperimentError> {
     Ok(simulation.advance(steps, subject.dt, Integrator::VelocityVerlet)?)
 }
 
-/// Times steps with these settings, or of the reference if there are none.
+/// Times steps with these settings, or of the reference if there are none, which tells no parts.
 pub fn run(
     subject: &Subject,
     state: &State,
     settings: Option<Settings>,
     length: Length,
-) -> Result<Measured, BenchError> {
+) -> Result<Loop, ExperimentError> {
     let mut simulation = simulation(subject, state, settings)?;
     advance(&mut simulation, subject, length.warm_up)?;
     let before = simulation.engine().times();
@@ -67,7 +59,7 @@ pub fn run(
         parts.extend(named.map(|(name, t)| (name.to_owned(), t)));
         parts.insert("integrate".to_owned(), rest);
     }
-    Ok(Measured { seconds, parts })
+    Ok(Loop { seconds, steps: length.steps, particles: state.len(), parts, ..Loop::default() })
 }
 
 /// Whether trajectories of some steps on each number of threads are the same, bit for bit.
@@ -76,7 +68,7 @@ pub fn equal_on_threads(
     state: &State,
     settings: Settings,
     threads: &[NonZeroUsize],
-) -> Result<bool, BenchError> {
+) -> Result<bool, ExperimentError> {
     let mut first: Option<State> = None;
     for &threads in threads {
         let mut simulation = simulation(subject, state, Some(Settings { threads, ..settings }))?;
@@ -93,15 +85,15 @@ pub fn equal_on_threads(
 
 #[cfg(test)]
 mod tests {
-    use super::super::fluids::{FORMULA, SUBJECTS};
-    use super::super::start::equilibrated;
     use super::*;
+    use crate::fluids::{FORMULA, SUBJECTS};
+    use crate::start::kept;
     use psidpd_core::engine::Precision;
 
     #[test]
     fn parts_add_up_to_the_whole() {
         let folder = tempfile::tempdir().unwrap();
-        let start = equilibrated(&FORMULA, 400, folder.path()).unwrap();
+        let start = kept(&FORMULA, 400, folder.path()).unwrap();
         let length = Length { warm_up: 1, steps: 3 };
         let measured = run(&FORMULA, &start.state, Some(Settings::default()), length).unwrap();
         let sum: f64 = measured.parts.values().sum();
@@ -116,7 +108,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap());
         for subject in &SUBJECTS {
-            let start = equilibrated(subject, 400, folder.path()).unwrap();
+            let start = kept(subject, 400, folder.path()).unwrap();
             for (_, precision) in Precision::ALL {
                 let settings = Settings { precision, ..Settings::default() };
                 assert!(equal_on_threads(subject, &start.state, settings, &threads).unwrap());

@@ -1,8 +1,8 @@
 //! Results as tables and plots.
 
-use super::BenchError;
 use super::outcome::{Asked, Machine, Outcome, Run};
 use super::spread::Spread;
+use crate::ExperimentError;
 use psidpd_core::engine::Instructions;
 use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table};
 
@@ -192,7 +192,7 @@ fn plot(outcome: &Outcome, fluid: &'static str, title: &str) -> Plot {
 ///
 /// # Errors
 /// A plot or the page cannot be drawn.
-pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
+pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
     let rounds = outcome.options.rounds;
     let mut speed = vec![Item::Prose(format!(
         "Medians of {rounds} interleaved rounds, with the least and the greatest in brackets. Ratios are taken within a \

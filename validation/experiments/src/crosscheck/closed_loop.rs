@@ -5,10 +5,12 @@
 //! potential does no work. With the Lucy density and the linear force it does, because `w′` is not
 //! proportional to the force (Warren eq. 10).
 
+use super::Context;
 use super::codes::{Code, Setup};
-use super::fluids::SET6;
-use super::{Context, ValidateError};
-use psidpd_core::engine::{PeriodicBox, Want};
+use crate::ExperimentError;
+use crate::fluids::SET6;
+use crate::start::periodic;
+use psidpd_core::engine::Want;
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
 use std::f64::consts::TAU;
@@ -30,14 +32,12 @@ pub struct Work {
     pub scale: f64,
 }
 
-fn state_at(angle: f64) -> Result<State, ValidateError> {
+fn state_at(angle: f64) -> Result<State, ExperimentError> {
     let third = [CENTRE[0] + RADIUS * angle.cos(), CENTRE[1] + RADIUS * angle.sin(), CENTRE[2]];
-    let domain = PeriodicBox::orthogonal([0.0; 3], [10.0; 3], [true; 3])
-        .map_err(|e| psidpd_dynamics::run::RunError::State(e.to_string()))?;
-    Ok(State::at_rest(domain, vec![1.0], vec![REST[0], REST[1], third]))
+    Ok(State::at_rest(periodic([10.0; 3])?, vec![1.0], vec![REST[0], REST[1], third]))
 }
 
-fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ValidateError>) -> Result<Work, ValidateError> {
+fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ExperimentError>) -> Result<Work, ExperimentError> {
     let mut sum = Work { work: 0.0, scale: 0.0 };
     for k in 0..POINTS {
         let angle = TAU * k as f64 / POINTS as f64;
@@ -50,7 +50,7 @@ fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ValidateError>) -> Resu
 }
 
 /// The work in the native engine.
-pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ValidateError> {
+pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ExperimentError> {
     let model = SET6.model(law, 0.0)?;
     around(|angle| {
         let mut simulation = context.simulation(&model, 1.0, &state_at(angle)?, 1)?;
@@ -60,7 +60,7 @@ pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ValidateError> {
 }
 
 /// The work in LAMMPS.
-pub fn lammps(context: &Context, code: Code, law: ForceLaw) -> Result<Work, ValidateError> {
+pub fn lammps(context: &Context, code: Code, law: ForceLaw) -> Result<Work, ExperimentError> {
     let setup = Setup { code, set: &SET6, law, gamma: 0.0, ..Setup::new(code, &SET6, law) };
     let instance = super::forces::open(context, &setup, &state_at(0.0)?, &format!("loop-{}", code.slug()))?;
     around(|angle| {

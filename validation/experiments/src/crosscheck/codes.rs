@@ -1,11 +1,13 @@
 //! The codes, and how each is told about the fluid.
 
-use super::fluids::{A, RC, RD, WarrenSet};
-use super::{Context, ValidateError};
+use super::Context;
+use crate::ExperimentError;
+use crate::fluids::{RC, WarrenSet};
+use crate::lammps::deck::Deck;
+use crate::lammps::style::{GRID, PairStyle};
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
 use psidpd_lammps_host::export::eam::{self, Grid};
-use std::fmt::Write;
 use std::path::Path;
 
 /// Who computes.
@@ -74,8 +76,6 @@ pub struct Setup<'a> {
     pub spacing: f64,
 }
 
-/// Spacing of tables for runs: small enough to sit in a cache.
-const COARSE: f64 = 5e-5;
 /// Spacing of tables for comparing forces. A spline is exact but near the kink of w′ at r_d, where its
 /// error is proportional to the spacing.
 pub const FINE: f64 = 1e-6;
@@ -83,7 +83,7 @@ pub const FINE: f64 = 1e-6;
 impl<'a> Setup<'a> {
     /// No drag, no noise, `newton on`.
     pub fn new(code: Code, set: &'a WarrenSet, law: ForceLaw) -> Setup<'a> {
-        Setup { code, set, law, gamma: 0.0, seed: 1, newton: true, spacing: COARSE }
+        Setup { code, set, law, gamma: 0.0, seed: 1, newton: true, spacing: GRID.spacing }
     }
 
     /// Writes data, model or tables into `folder` and returns the commands up to the pair style. Paths
@@ -94,81 +94,46 @@ impl<'a> Setup<'a> {
         state: &State,
         folder: &Path,
         absolute: bool,
-    ) -> Result<String, ValidateError> {
-        std::fs::create_dir_all(folder).map_err(ValidateError::io(folder))?;
+    ) -> Result<String, ExperimentError> {
+        std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
         let place = |name: &str| {
             if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
         };
-        let data = state.to_data("psidpd");
-        let atom_style = match self.code {
-            Code::BuiltIn => {
-                data.write_mdpd(&folder.join("start.data"))?;
-                "mdpd"
-            }
-            _ => {
-                data.write(&folder.join("start.data"))?;
-                "atomic"
-            }
-        };
-        let mut deck = preamble(atom_style, self.newton, &place("start.data"));
-        let (b, gamma, seed) = (self.set.b, self.gamma, self.seed);
-        if matches!(self.code, Code::Psi | Code::PsiMixed | Code::MdpdPsi) {
-            // Writing to a String cannot fail.
-            let _ = writeln!(deck, "plugin load \"{}\"", context.plugin.display());
-        }
-        let pair = match self.code {
-            Code::Native | Code::NativeMixed => String::new(),
+        let gamma = self.gamma;
+        let pair = self.set.pair(gamma);
+        let species = "F".to_owned();
+        let style = match self.code {
+            Code::Native | Code::NativeMixed => return Ok(String::new()),
             Code::Psi | Code::PsiMixed => {
                 let precision = if self.code == Code::Psi { "double" } else { "mixed" };
                 let text = self.set.model_text(self.law, gamma)?;
                 let path = folder.join("model.toml");
-                std::fs::write(&path, text).map_err(ValidateError::io(&path))?;
-                format!(
-                    "pair_style dpd/psi 1.0 {seed} precision {precision}\npair_coeff * * \"{}\" F\n",
-                    place("model.toml")
-                )
-            }
-            Code::MdpdPsi => {
-                let law = if self.law == ForceLaw::LucyLammps { " law lucy" } else { "" };
-                format!(
-                    "pair_style mdpd/psi 1.0 {RC} {seed}{law}\npair_coeff 1 1 {A} {b} {gamma} {RC} {RD}\n"
-                )
-            }
-            Code::BuiltIn => format!(
-                "pair_style hybrid/overlay mdpd/rhosum mdpd 1.0 {RC} {seed}\n\
-                 pair_coeff 1 1 mdpd/rhosum {RD}\npair_coeff 1 1 mdpd {A} {b} {gamma} {RC} {RD}\n"
-            ),
-            Code::Eam => {
-                write_tables(self.set, self.spacing, &folder.join("fluid.eam.alloy"))?;
-                let table = place("fluid.eam.alloy");
-                if gamma > 0.0 {
-                    format!(
-                        "pair_style hybrid/overlay eam/alloy dpd/tstat 1.0 1.0 {RC} {seed}\n\
-                         pair_coeff * * eam/alloy \"{table}\" F\npair_coeff 1 1 dpd/tstat {gamma}\n"
-                    )
-                } else {
-                    format!("pair_style eam/alloy\npair_coeff * * \"{table}\" F\n")
+                std::fs::write(&path, text).map_err(ExperimentError::io(&path))?;
+                PairStyle::Psi {
+                    model: place("model.toml"),
+                    species,
+                    words: format!("precision {precision}"),
                 }
             }
+            Code::MdpdPsi => PairStyle::MdpdPsi { pair, law: self.law },
+            Code::BuiltIn => PairStyle::Mdpd(pair),
+            Code::Eam => {
+                // ψ as embedding function, w as density and φ as pair potential: LAMMPS's own route to the same
+                // conservative forces.
+                let fluid = self.set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
+                let grid = Grid { spacing: self.spacing, ..GRID };
+                eam::write(&fluid, &[1.0], grid, &folder.join("fluid.eam.alloy"))?;
+                let thermostat = (gamma > 0.0).then_some([gamma, RC]);
+                PairStyle::Eam { tables: place("fluid.eam.alloy"), species, thermostat }
+            }
         };
-        deck.push_str(&pair);
-        Ok(deck)
+        let (data, path) = (state.to_data("psidpd"), folder.join("start.data"));
+        if self.code == Code::BuiltIn {
+            data.write_mdpd(&path)?
+        } else {
+            data.write(&path)?
+        }
+        let (plugin, newton) = (context.lammps.plugin.as_deref(), self.newton);
+        Ok(Deck { plugin, newton, ..Deck::new(&style, self.seed, place("start.data")) }.text())
     }
-}
-
-/// The commands up to the pair style.
-pub(super) fn preamble(atom_style: &str, newton: bool, data: &str) -> String {
-    let newton = if newton { "on" } else { "off" };
-    format!(
-        "units lj\natom_style {atom_style}\natom_modify map array\nnewton {newton}\ncomm_modify vel yes\n\
-         read_data \"{data}\"\nneighbor 0.3 bin\nneigh_modify delay 0 every 1 check yes\n"
-    )
-}
-
-/// ψ as embedding function, w as density and φ as pair potential of `eam/alloy`: LAMMPS's own route to
-/// the same conservative forces.
-fn write_tables(set: &WarrenSet, spacing: f64, path: &Path) -> Result<(), ValidateError> {
-    let fluid = set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
-    let grid = Grid { spacing, largest_density: 60.0, densities: 6001 };
-    Ok(eam::write(&fluid, &[1.0], grid, path)?)
 }

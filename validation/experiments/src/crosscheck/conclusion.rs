@@ -1,6 +1,6 @@
 //! What the page of a validation begins with: its conclusion, and what is compared.
 
-use super::fluids::{A, GAMMA, RC, RD, SET5, SET6};
+use crate::fluids::{A, GAMMA, RC, RD, SET5, SET6};
 use psidpd_report::{Item, Results, Section, Table};
 use serde_json::Value;
 
@@ -57,7 +57,7 @@ pub fn section(results: &Results) -> Section {
                 "{}: liquid density {} (Warren {} ± {}), tension {} (Warren {} ± {})",
                 set.name,
                 found(slug, "liquid-density")?,
-                set.liquid,
+                set.fluid.density,
                 set.liquid_error,
                 found(slug, "surface-tension")?,
                 set.tension.0,
@@ -89,7 +89,7 @@ pub fn what_is_compared() -> Section {
             RD.to_string(),
             GAMMA.to_string(),
             "1".into(),
-            format!("{} ± {}", set.liquid, set.liquid_error),
+            format!("{} ± {}", set.fluid.density, set.liquid_error),
             format!("{} ± {}", set.tension.0, set.tension.1),
             format!("{} ± {}", set.width.0, set.width.1),
         ]);

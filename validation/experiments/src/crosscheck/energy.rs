@@ -2,11 +2,12 @@
 
 use super::closed_loop;
 use super::codes::{Code, Setup};
-use super::fluids::SET6;
-use super::jobs::{self, Job};
-use super::start::{Filling, equilibrated};
 use super::trace::{Length, Trace, run as run_code};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::fluids::SET6;
+use crate::jobs::{self, Job};
+use crate::start::{Filling, equilibrated};
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::drift;
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
@@ -21,14 +22,14 @@ const LARGEST_DRIFT: f64 = 1e-4;
 const HEATING: f64 = 0.1;
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let edge = if context.full { 12.0 } else { 5.2 };
-    let filling = Filling { lengths: [edge; 3], thickness: edge, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 1500, SEED)?;
+    let filling = Filling::cube(edge);
+    let state = equilibrated(&SET6.fluid, filling, 1500, SEED)?;
     let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
     let codes = [Code::Native, Code::NativeMixed, Code::Psi, Code::PsiMixed, Code::BuiltIn, Code::Eam];
     let state = &state;
-    let jobs: Vec<Job<Result<Trace, ValidateError>>> = codes
+    let jobs: Vec<Job<Result<Trace, ExperimentError>>> = codes
         .iter()
         .map(|&code| {
             let bar = context.progress.bar(&format!("NVE: {}", code.label()), length.steps);
@@ -121,7 +122,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
                 "{} particles of set 6 at density {}, no drag, no noise, Δt = {}. The built-in's law is its own; its \
                  energy is not shown in the second figure because what it tallies is not the potential of its forces.",
                 state.len(),
-                SET6.liquid,
+                SET6.fluid.density,
                 length.dt
             )),
             Item::Table(table),
@@ -147,7 +148,7 @@ fn ends(series: &[f64]) -> [f64; 2] {
     [mean(&series[..count]), mean(&series[series.len() - count..])]
 }
 
-fn add_loop(context: &Context, part: &mut Part) -> Result<(), ValidateError> {
+fn add_loop(context: &Context, part: &mut Part) -> Result<(), ExperimentError> {
     use ForceLaw::{Conservative, LucyLammps};
     let rows = [
         ("native", "conservative", closed_loop::native(context, Conservative)?),

@@ -2,11 +2,12 @@
 //! bars, in every code.
 
 use super::codes::{Code, Setup};
-use super::fluids::{GAMMA, SET5, SET6, WarrenSet};
-use super::jobs::{self, Job};
-use super::start::{Filling, equilibrated};
 use super::trace::{Length, Trace, run as run_code};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::fluids::{GAMMA, SET5, SET6, WarrenSet};
+use crate::jobs::{self, Job};
+use crate::start::{Filling, equilibrated};
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width, tension_series};
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
@@ -66,7 +67,7 @@ fn name(code: Code, law: ForceLaw) -> String {
 }
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let sets = [SET5, SET6];
     // A wide and thin slab: the error of the tension goes with the root of thickness over area.
     let (edge, height, thickness, steps) =
@@ -74,13 +75,13 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 25 };
     let mut starts = Vec::new();
     for set in &sets {
-        let filling = Filling { lengths: [edge, edge, height], thickness, density: set.liquid };
-        starts.push(equilibrated(set, filling, 1000, SEED)?);
+        let filling = Filling { lengths: [edge, edge, height], thickness };
+        starts.push(equilibrated(&set.fluid, filling, 1000, SEED)?);
     }
     let count: usize = sets.iter().map(|set| runs(set, context.full).len()).sum();
     let made = context.progress.overall("equilibrium", steps * count as u64);
     let made = &made;
-    let mut jobs: Vec<Job<Result<Trace, ValidateError>>> = Vec::new();
+    let mut jobs: Vec<Job<Result<Trace, ExperimentError>>> = Vec::new();
     for (k, set) in sets.iter().enumerate() {
         for (n, &(code, law, _)) in runs(set, context.full).iter().enumerate() {
             let state = &starts[k];
@@ -153,10 +154,10 @@ fn compared(code: Code, other: Option<usize>) -> impl Iterator<Item = Quantity> 
         .filter(move |(what, ..)| other.is_some() && !(code == Code::BuiltIn && *what == "energy"))
 }
 
-fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ValidateError> {
+fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ExperimentError> {
     let of = |what: &str, series: &[f64]| {
         let kept = &series[series.len() / 5..];
-        estimate(kept).map_err(|source| ValidateError::Statistics { what: what.to_owned(), source })
+        estimate(kept).map_err(|source| ExperimentError::Statistics { what: what.to_owned(), source })
     };
     let bins = (height / 0.1).round() as usize;
     let mut profile = ProfileAccumulator::new(height, bins, edge * edge)?;
@@ -177,7 +178,7 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ValidateEr
         pressure: of("pressure", &trace.scalar_pressure())?,
         energy: of("energy", &per_particle)?,
         liquid: estimate(&liquid)
-            .map_err(|source| ValidateError::Statistics { what: "liquid density".into(), source })?,
+            .map_err(|source| ExperimentError::Statistics { what: "liquid density".into(), source })?,
         tension: of("surface tension", &tension_series(height, xx, yy, zz)?)?,
         conservative_tension,
         width: interface_width(&shape),
@@ -197,7 +198,7 @@ fn report_set(
     set: &WarrenSet,
     measured: &[Measured],
     comparisons: usize,
-) -> Result<(), ValidateError> {
+) -> Result<(), ExperimentError> {
     let slug = set.name.replace(' ', "");
     let mut table = Table::new([
         "code",
@@ -212,7 +213,7 @@ fn report_set(
         title: format!("Density profile, {}", set.name),
         x_label: "z, from the middle of the slab".into(),
         y_label: "number density".into(),
-        levels: vec![(set.liquid, format!("Warren: {}", set.liquid))],
+        levels: vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))],
         ..Plot::default()
     };
     for ((code, law, _), m) in RUNS.iter().zip(measured) {
@@ -236,7 +237,7 @@ fn report_set(
         String::new(),
         String::new(),
         String::new(),
-        format!("{} ± {}", set.liquid, set.liquid_error),
+        format!("{} ± {}", set.fluid.density, set.liquid_error),
         format!("{} ± {}", set.tension.0, set.tension.1),
         format!("{} ± {}", set.width.0, set.width.1),
     ]);
@@ -331,7 +332,7 @@ fn against_published(set: &WarrenSet, native: &Measured) -> [Check; 2] {
     };
     let tension = native.conservative_tension.as_ref().unwrap_or(&native.tension);
     [
-        published("density", &native.liquid, (set.liquid, set.liquid_error)),
+        published("density", &native.liquid, (set.fluid.density, set.liquid_error)),
         published("tension", tension, set.tension),
     ]
 }
@@ -354,8 +355,8 @@ mod tests {
     #[test]
     fn physics_tells_of_faults() {
         let (edge, height, thickness, steps) = (5.0, 12.0, 5.2, 2000);
-        let filling = Filling { lengths: [edge, edge, height], thickness, density: SET6.liquid };
-        let state = equilibrated(&SET6, filling, 600, SEED).unwrap();
+        let filling = Filling { lengths: [edge, edge, height], thickness };
+        let state = equilibrated(&SET6.fluid, filling, 600, SEED).unwrap();
         let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 10 };
         let setup = Setup {
             gamma: GAMMA,

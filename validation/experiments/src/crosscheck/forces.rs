@@ -1,9 +1,10 @@
 //! One configuration, liquid and interface, in every code: forces, energy, virial.
 
 use super::codes::{Code, FINE, Setup};
-use super::fluids::{RC, RD, SET6};
-use super::start::{Filling, equilibrated};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::fluids::{GAMMA, RC, RD, SET6};
+use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
@@ -57,12 +58,12 @@ fn native(
     model: &Model,
     state: &State,
     step: Option<Step>,
-) -> Result<Point, ValidateError> {
+) -> Result<Point, ExperimentError> {
     point_of(context.simulation(model, 1.0, state, SEED)?, step)
 }
 
 /// What the native runner says.
-pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ValidateError> {
+pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ExperimentError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
         forces: by_tag(simulation.tags(), simulation.forces()),
@@ -72,7 +73,7 @@ pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result
 }
 
 /// The sums over pairs as they are written down, which share no code with those that runs are made with.
-fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, ValidateError> {
+fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, ExperimentError> {
     let fluid = model.at(1.0)?;
     let domain = &state.domain;
     let mut x = state.x.clone();
@@ -91,7 +92,7 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Vali
 
 /// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these,
 /// were it wrong.
-fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ValidateError> {
+fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ExperimentError> {
     let native = |model: &Model, step| {
         let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
         fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
@@ -101,7 +102,7 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
     for (id, law, gamma, step) in [
         ("conservative", ForceLaw::Conservative, 0.0, None),
         ("lucy", ForceLaw::LucyLammps, 0.0, None),
-        ("thermostat", ForceLaw::Conservative, super::fluids::GAMMA, step),
+        ("thermostat", ForceLaw::Conservative, GAMMA, step),
     ] {
         let model = SET6.model(law, gamma)?;
         let found = native(&model, step)?.against(&plain(&model, state, step)?);
@@ -133,15 +134,15 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
 }
 
 /// dU/d ln A as the faces normal to z are stretched to A at constant volume.
-fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64, ValidateError> {
-    let energy = |change: f64| -> Result<f64, ValidateError> {
+fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64, ExperimentError> {
+    let energy = |change: f64| -> Result<f64, ExperimentError> {
         let scale = [(1.0 + change).sqrt(), (1.0 + change).sqrt(), 1.0 / (1.0 + change)];
         let lengths = state.domain.lengths();
         let lengths = std::array::from_fn(|c| scale[c] * lengths[c]);
         let origin = state.domain.origin();
         let mut stretched = state.clone();
         stretched.domain = PeriodicBox::orthogonal(origin, lengths, state.domain.periodic())
-            .map_err(|e| ValidateError::Run(psidpd_dynamics::run::RunError::State(e.to_string())))?;
+            .map_err(|e| ExperimentError::Run(psidpd_dynamics::run::RunError::State(e.to_string())))?;
         for x in &mut stretched.x {
             *x = stretched.domain.point(state.domain.fraction(*x));
         }
@@ -155,7 +156,7 @@ fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64,
     Ok((energy(H)? - energy(-H)?) / (2.0 * H))
 }
 
-fn native_mixed(context: &Context, model: &Model, state: &State) -> Result<Point, ValidateError> {
+fn native_mixed(context: &Context, model: &Model, state: &State) -> Result<Point, ExperimentError> {
     let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
     simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
     context.fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
@@ -171,13 +172,13 @@ fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// An instance of LAMMPS with the fluid set up and the virial of the pair forces as `c_virial`.
-pub fn open(context: &Context, setup: &Setup, state: &State, name: &str) -> Result<Lammps, ValidateError> {
+pub fn open(context: &Context, setup: &Setup, state: &State, name: &str) -> Result<Lammps, ExperimentError> {
     open_deck(context, &setup.prepare(context, state, &context.work.join(name), true)?)
 }
 
 /// The same with any commands up to the pair style.
-pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, ValidateError> {
-    let lammps = Lammps::open(context.host, &[])?;
+pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, ExperimentError> {
+    let lammps = Lammps::open(&context.lammps.host, &[])?;
     lammps.commands(deck)?;
     lammps.commands(
         "compute virial all pressure NULL virial\nthermo_style custom step pe press c_virial[1]\n\
@@ -187,7 +188,7 @@ pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, Validat
 }
 
 /// What LAMMPS says.
-pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ValidateError> {
+pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentError> {
     lammps.command("run 0 post no")?;
     let forces = lammps.gather("f", 3)?.as_chunks::<3>().0.to_vec();
     let pressure = lammps.compute_vector("virial")?;
@@ -199,10 +200,10 @@ pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ValidateError
 }
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let lengths = if context.full { [15.0, 15.0, 20.0] } else { [10.0, 10.0, 15.0] };
-    let filling = Filling { lengths, thickness: 0.5 * lengths[2], density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 500, SEED)?;
+    let filling = Filling { lengths, thickness: 0.5 * lengths[2] };
+    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let volume = state.domain.volume(3);
     let mut part = Part { section: heading(state.len()), ..Part::default() };
     let mut table = Table::new(["code", "law", "against", "force", "energy", "virial"]);
@@ -241,7 +242,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
                 format!("forces.{id}"),
                 json!({"force": difference.force, "energy": difference.energy, "virial": difference.virial}),
             ));
-            Ok::<(), ValidateError>(())
+            Ok::<(), ExperimentError>(())
         };
     let setup = |code, law, gamma, newton| Setup {
         gamma,
@@ -252,8 +253,8 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     };
 
     // These sums go over every pair and its images.
-    let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5, density: SET6.liquid };
-    against_plain(&mut part, &equilibrated(&SET6, small, 500, SEED)?, context.fault)?;
+    let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
+    against_plain(&mut part, &equilibrated(&SET6.fluid, small, 500, SEED)?, context.fault)?;
     use ForceLaw::{Conservative, LucyLammps};
     let truth = native(context, &SET6.model(Conservative, 0.0)?, &state, None)?;
     let tight = [1e-12; 3];
@@ -289,10 +290,10 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     ));
 
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
-    let noisy = native(context, &SET6.model(Conservative, super::fluids::GAMMA)?, &state, Some(step))?;
+    let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
     compare(
         &mut part,
-        setup(Code::Psi, Conservative, super::fluids::GAMMA, true),
+        setup(Code::Psi, Conservative, GAMMA, true),
         "psi-noise",
         &noisy,
         tight,
@@ -345,16 +346,16 @@ fn heading(particles: usize) -> Section {
 }
 
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.
-fn gradient(context: &Context) -> Result<Check, ValidateError> {
-    let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 300, SEED)?;
+fn gradient(context: &Context) -> Result<Check, ExperimentError> {
+    let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5 };
+    let state = equilibrated(&SET6.fluid, filling, 300, SEED)?;
     let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
     let lammps = open(context, &setup, &state, "forces-gradient")?;
     let truth = point(&lammps, state.domain.volume(3))?;
     let rms = (truth.forces.iter().flatten().map(|c| c * c).sum::<f64>() / truth.forces.len() as f64).sqrt();
     let x0 = lammps.gather("x", 3)?;
     const H: f64 = 1e-3;
-    let energy = |index: usize, shift: f64| -> Result<f64, ValidateError> {
+    let energy = |index: usize, shift: f64| -> Result<f64, ExperimentError> {
         let mut x = x0.clone();
         x[index] += shift;
         lammps.scatter("x", 3, &x)?;
@@ -402,8 +403,8 @@ mod tests {
     /// An engine one of whose terms is 5 % wrong fails the checks of `psidpd validate`.
     #[test]
     fn every_fault_of_the_engine_fails_a_check() {
-        let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0, density: SET6.liquid };
-        let state = equilibrated(&SET6, filling, 100, SEED).unwrap();
+        let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0 };
+        let state = equilibrated(&SET6.fluid, filling, 100, SEED).unwrap();
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let mut part = Part::default();
             against_plain(&mut part, &state, fault).unwrap();
@@ -424,14 +425,14 @@ mod tests {
     /// A term that is 5 % wrong, in the forces or in the virial, is far beyond every limit; so is what is no number.
     #[test]
     fn wrong_terms_and_numbers_that_are_none_show() {
-        let filling = Filling { lengths: [4.0; 3], thickness: 4.0, density: SET6.liquid };
-        let state = equilibrated(&SET6, filling, 20, SEED).unwrap();
+        let filling = Filling::cube(4.0);
+        let state = equilibrated(&SET6.fluid, filling, 20, SEED).unwrap();
         let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
-        let model = SET6.model(ForceLaw::Conservative, super::super::fluids::GAMMA).unwrap();
+        let model = SET6.model(ForceLaw::Conservative, GAMMA).unwrap();
         let right = point_of(Simulation::new(&model, 1.0, state.clone(), SEED).unwrap(), step).unwrap();
         let whole = right.against(&plain(&model, &state, step).unwrap());
         assert!(whole.force < 1e-11 && whole.energy < 1e-11 && whole.virial < 1e-11, "{whole:?}");
-        let text = SET6.model_text(ForceLaw::Conservative, super::super::fluids::GAMMA).unwrap();
+        let text = SET6.model_text(ForceLaw::Conservative, GAMMA).unwrap();
         let wrong = |from: &str, to: &str| {
             assert!(text.contains(from), "{text}");
             let model = Model::parse("wrong.toml", &text.replace(from, to)).unwrap();

@@ -1,8 +1,10 @@
 //! Two species in a tilted box, as tables of LAMMPS's `eam/alloy`, which finds pairs and images by itself.
 
-use super::codes::preamble;
 use super::forces::{open_deck, point, point_of};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::lammps::deck::Deck;
+use crate::lammps::style::PairStyle;
 use chacha20::ChaCha8Rng;
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
@@ -30,17 +32,18 @@ const COUNT: usize = 1000;
 const LARGEST: f64 = 1e-5;
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let model = Model::parse("mixture", MODEL)?;
     let state = random_state()?;
     let folder = context.work.join("mixture");
-    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
     let [data, tables] = ["start.data", "fluid.eam.alloy"].map(|name| folder.join(name));
     state.to_data("psidpd").write(&data)?;
     let grid = Grid { spacing: 1e-5, largest_density: 60.0, densities: 20_001 };
     eam::write(&model.at(1.0)?, &state.mass, grid, &tables)?;
-    let deck = preamble("atomic", true, &data.display().to_string())
-        + &format!("pair_style eam/alloy\npair_coeff * * \"{}\" A B\n", tables.display());
+    let style =
+        PairStyle::Eam { tables: tables.display().to_string(), species: "A B".to_owned(), thermostat: None };
+    let deck = Deck::new(&style, SEED, data.display().to_string()).text();
     let theirs = point(&open_deck(context, &deck)?, state.domain.volume(3))?;
     let found = point_of(context.simulation(&model, 1.0, &state, SEED)?, None)?.against(&theirs);
     let mut part = Part::default();
@@ -73,12 +76,12 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     Ok(part)
 }
 
-fn random_state() -> Result<State, ValidateError> {
+fn random_state() -> Result<State, ExperimentError> {
     let [lx, ly, lz] = LENGTHS;
     let [xy, xz, yz] = TILT;
     let edges = Matrix3::new(lx, xy, xz, 0.0, ly, yz, 0.0, 0.0, lz);
     let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, [true; 3])
-        .map_err(|e| ValidateError::Run(RunError::State(e.to_string())))?;
+        .map_err(|e| ExperimentError::Run(RunError::State(e.to_string())))?;
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let x = (0..COUNT).map(|_| domain.point(std::array::from_fn(|_| random.random::<f64>()))).collect();
     let species = (0..COUNT).map(|k| (k % 2) as i32).collect();

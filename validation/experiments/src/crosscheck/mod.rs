@@ -13,35 +13,31 @@ pub mod codes;
 mod conclusion;
 pub mod energy;
 pub mod equilibrium;
-mod error;
-pub mod fluids;
 pub mod forces;
-pub mod jobs;
 pub mod mixture;
 pub mod observables;
-pub mod start;
 pub mod thermostat;
 pub mod trace;
 pub mod trajectory;
 mod validate;
 
-pub use error::ValidateError;
+use crate::ExperimentError;
+use crate::lammps::host::PluginHost;
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Simulation, State};
-use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
-use std::path::{Path, PathBuf};
-pub(crate) use validate::machine;
+use std::path::PathBuf;
 pub use validate::{Options, check_table, validate};
+
+/// What LAMMPS writes beside the results of a run.
+const LOG: &str = "log.lammps";
 
 /// What every part of the validation works with.
 #[derive(Debug)]
 pub struct Context<'a> {
-    /// The LAMMPS.
-    pub host: &'a Host,
-    /// The plugin built for it.
-    pub plugin: &'a Path,
+    /// LAMMPS with the plugin.
+    pub lammps: &'a PluginHost,
     /// A folder for decks and data.
     pub work: PathBuf,
     /// Whether long runs are wanted.
@@ -60,7 +56,7 @@ impl Context<'_> {
         kt: f64,
         state: &State,
         seed: u64,
-    ) -> Result<Simulation, ValidateError> {
+    ) -> Result<Simulation, ExperimentError> {
         let mut simulation = Simulation::new(model, kt, state.clone(), seed)?;
         self.fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
         Ok(simulation)
@@ -88,10 +84,11 @@ mod tests {
     fn independent_checks_tell_of_faults() {
         let folder = tempfile::tempdir().unwrap();
         let host = psidpd_lammps_host::install(&|line| eprintln!("{line}")).unwrap();
+        let lammps = PluginHost { host, plugin: None };
         let progress = Progress::new();
         let failed = |fault: Option<Fault>| -> Vec<String> {
-            let (work, plugin) = (folder.path().to_owned(), Path::new(""));
-            let context = Context { host: &host, plugin, work, full: false, progress: &progress, fault };
+            let work = folder.path().to_owned();
+            let context = Context { lammps: &lammps, work, full: false, progress: &progress, fault };
             let mut parts = vec![thermostat::run(&context).unwrap(), mixture::run(&context).unwrap()];
             // Configurations of LAMMPS alone.
             parts.extend(fault.is_none().then(|| observables::run(&context).unwrap()));

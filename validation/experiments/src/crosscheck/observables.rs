@@ -1,16 +1,17 @@
 //! Distances and displacements: LAMMPS's `compute rdf` and `compute msd` beside `rdf` and `msd` of the same configurations.
 
-use super::codes::preamble;
-use super::{Context, Part, ValidateError};
-use psidpd_core::engine::Pool;
+use super::LOG;
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::lammps::deck::Deck;
+use crate::lammps::frames;
+use crate::lammps::style::PairStyle;
+use crate::models;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
-use psidpd_formats::dump;
-use psidpd_observe::frame::View;
 use psidpd_observe::{Observation, Observers};
 use psidpd_report::{Check, Item, Section, Table};
 use serde_json::json;
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -29,9 +30,9 @@ const BINS: usize = 40;
 const LARGEST: f64 = 1e-9;
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let folder = context.work.join("observables");
-    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
     let scene = scene(&folder)?;
     let state = scene.initial_state();
     let [g, msd] = by_lammps(context, &state, &folder)?;
@@ -79,10 +80,9 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// The fluid, its start, and the observables.
-fn scene(folder: &Path) -> Result<Scene, ValidateError> {
+fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     let model = folder.join("model.toml");
-    std::fs::write(&model, include_str!("../../../models/standard-dpd.toml"))
-        .map_err(ValidateError::io(&model))?;
+    std::fs::write(&model, models::STANDARD).map_err(ExperimentError::io(&model))?;
     let text = format!(
         "title = \"distances and displacements\"\nmodel = \"model.toml\"\nkT = 1.0\nseed = {SEED}\nbox = [5.0, 6.0, 7.0]\n\
          density = 3.0\ndt = {DT}\nsteps = {steps}\n[observe]\nevery = {EVERY}\n\
@@ -93,31 +93,29 @@ fn scene(folder: &Path) -> Result<Scene, ValidateError> {
 }
 
 /// A table that LAMMPS wrote: without comments, and words that are no numbers.
-fn rows(path: &PathBuf) -> Result<Vec<Vec<f64>>, ValidateError> {
-    let text = std::fs::read_to_string(path).map_err(ValidateError::io(path))?;
+fn rows(path: &PathBuf) -> Result<Vec<Vec<f64>>, ExperimentError> {
+    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
     let row = |line: &str| line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
     Ok(text.lines().filter(|l| !l.starts_with('#')).map(row).collect())
 }
 
 /// g of every shell, and the mean-square displacement of every configuration after the first.
-fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64>; 2], ValidateError> {
+fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64>; 2], ExperimentError> {
     state.to_data_by_tag("psidpd").write(&folder.join("start.data"))?;
     let last = EVERY * (FRAMES + 1);
     let deck = format!(
-        "{}pair_style dpd 1.0 1.0 {SEED}\npair_coeff 1 1 25.0 4.5\ncomm_modify cutoff {:?}\nfix move all nve\n\
+        "{}comm_modify cutoff {:?}\nfix move all nve\n\
          timestep {DT}\nthermo 1000\nrun 200\nreset_timestep {EVERY}\ncompute g all rdf {BINS} cutoff {RANGE}\n\
          fix g all ave/time {EVERY} {} {last} c_g[2] mode vector file rdf.txt format \" %.16g\"\ncompute m all msd\n\
          fix m all ave/time {EVERY} 1 {EVERY} c_m[4] file msd.txt format \" %.16g\"\n\
          dump frames all custom {EVERY} frames.txt id x y z ix iy iz\n\
          dump_modify frames sort id format float %.17g\nrun {}\n",
-        preamble("atomic", true, "start.data"),
+        Deck::new(&PairStyle::Dpd { a: 25.0, gamma: 4.5, rc: 1.0 }, SEED, "start.data".into()).text(),
         RANGE + 0.5,
         FRAMES + 1,
         EVERY * FRAMES,
     );
-    let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
-    context.host.run_script(1, folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
+    context.lammps.run(1, folder, &deck, LOG, Duration::from_secs(300))?;
     let [g, msd] = ["rdf.txt", "msd.txt"].map(|name| folder.join(name));
     // A line with the step and the number of shells, and for each shell its number and g.
     let shells = rows(&g)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
@@ -127,40 +125,9 @@ fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64
 }
 
 /// What the observables make of the configurations of a dump.
-fn by_us(scene: &Scene, state: &State, path: &Path) -> Result<Vec<Observation>, ValidateError> {
-    let missing =
-        || ValidateError::Output { path: path.into(), problem: "it has no columns of positions".into() };
+fn by_us(scene: &Scene, state: &State, path: &Path) -> Result<Vec<Observation>, ExperimentError> {
     let stage = scene.stages.last().map_or("", |stage| stage.name.as_str());
     let mut observers = Observers::new(&scene.observe, [stage]);
-    let pool = Pool::new(NonZeroUsize::MIN);
-    for (k, frame) in dump::read(path)?.iter().enumerate() {
-        let x = frame.vectors(["x", "y", "z"]).ok_or_else(missing)?;
-        let images = frame.vectors(["ix", "iy", "iz"]).ok_or_else(missing)?;
-        let images: Vec<[i32; 3]> = images.iter().map(|i| i.map(|c| c as i32)).collect();
-        let tags: Vec<i32> = frame.get("id").ok_or_else(missing)?.iter().map(|id| *id as i32).collect();
-        let (v, species) = (vec![[0.0; 3]; x.len()], vec![0; x.len()]);
-        let view = View {
-            pool: &pool,
-            step: (k as u64 + 1) * EVERY,
-            time: k as f64 * EVERY as f64 * DT,
-            kt: scene.kt,
-            model: &scene.model,
-            dimensions: 3,
-            domain: &state.domain,
-            masses: &state.mass,
-            x: &x,
-            v: &v,
-            images: &images,
-            species: &species,
-            tags: &tags,
-            frozen: &[],
-            temperature: 0.0,
-            kinetic_energy: 0.0,
-            pressure: [0.0; 6],
-            conservative_pressure: [0.0; 6],
-            flux: None,
-        };
-        observers.sample(view, stage);
-    }
+    frames::show(path, (scene, stage, scene.kt), state, (EVERY, DT), &mut observers)?;
     Ok(observers.finish())
 }

@@ -1,13 +1,15 @@
 //! Pair force, drag and noise against LAMMPS's own `dpd`, which shares no code with psidpd.
 
-use super::codes::preamble;
-use super::fluids::SET6;
 use super::forces::{open_deck, point, point_of};
-use super::start::{Filling, equilibrated};
-use super::{Context, Part, ValidateError};
-use psidpd_core::engine::{PeriodicBox, Step, Want};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::fluids::SET6;
+use crate::lammps::deck::Deck;
+use crate::lammps::style::PairStyle;
+use crate::start::{Filling, equilibrated, periodic};
+use psidpd_core::engine::{Step, Want};
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::{RunError, State};
+use psidpd_dynamics::run::State;
 use psidpd_observe::{Measured, threshold};
 use psidpd_report::quantity::with_error;
 use psidpd_report::{Check, Item, Section, Table};
@@ -37,7 +39,7 @@ const FALSE_ALARM: f64 = 1e-3;
 const VAGUE: f64 = 0.02;
 
 /// A fluid of LAMMPS's `dpd`.
-fn model(strength: f64, gamma: f64) -> Result<Model, ValidateError> {
+fn model(strength: f64, gamma: f64) -> Result<Model, ExperimentError> {
     let pair = format!(
         "[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = {strength:?}\nrange = 1.0\n"
     );
@@ -56,21 +58,21 @@ fn deck(
     state: &State,
     [strength, gamma, kt]: [f64; 3],
     name: &str,
-) -> Result<String, ValidateError> {
+) -> Result<String, ExperimentError> {
     let folder = context.work.join(name);
-    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
     let data = folder.join("start.data");
     state.to_data("psidpd").write(&data)?;
-    let style = format!("pair_style dpd {kt:?} 1.0 {SEED}\npair_coeff 1 1 {strength:?} {gamma:?}\n");
-    Ok(preamble("atomic", true, &data.display().to_string()) + &style)
+    let style = PairStyle::Dpd { a: strength, gamma, rc: 1.0 };
+    Ok(Deck { kt, ..Deck::new(&style, SEED, data.display().to_string()) }.text())
 }
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut part = Part::default();
     let mut forces = Table::new(["", "force", "energy", "virial"]);
-    let filling = Filling { lengths: [6.0; 3], thickness: 6.0, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 100, SEED)?;
+    let filling = Filling::cube(6.0);
+    let state = equilibrated(&SET6.fluid, filling, 100, SEED)?;
     let volume = state.domain.volume(3);
     for (id, strength, gamma) in [("pair force", 25.0, 0.0), ("drag", 0.0, 18.0), ("both", 25.0, 4.5)] {
         let kt = if gamma > 0.0 { COLD } else { 1.0 };
@@ -120,7 +122,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// The variances of the noise of both codes.
-fn noise(context: &Context, part: &mut Part) -> Result<Table, ValidateError> {
+fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
     let state = pairs()?;
     let mut table = Table::new(["γ", "kT", "Δt", "r", "native", "LAMMPS dpd"]);
     let comparisons = 2 * SETTINGS.len() * DISTANCES.len();
@@ -191,13 +193,11 @@ fn independent_mean(values: &[f64]) -> Measured {
 }
 
 /// Pairs along x at rest, with tags in turn.
-fn pairs() -> Result<State, ValidateError> {
+fn pairs() -> Result<State, ExperimentError> {
     let edge = PAIRS as f64 * APART;
-    let domain = PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3])
-        .map_err(|e| ValidateError::Run(RunError::State(e.to_string())))?;
     let x = (0..PAIRS.pow(3)).flat_map(|k| {
         let [x, y, z] = [k % PAIRS, k / PAIRS % PAIRS, k / PAIRS / PAIRS].map(|i| (i as f64 + 0.5) * APART);
         [[x, y, z], [x + DISTANCES[k % DISTANCES.len()], y, z]]
     });
-    Ok(State::at_rest(domain, vec![1.0], x.collect()))
+    Ok(State::at_rest(periodic([edge; 3])?, vec![1.0], x.collect()))
 }

@@ -1,7 +1,9 @@
 //! One run of any code, as series of what is compared.
 
+use super::Context;
+use super::LOG;
 use super::codes::{Code, Setup};
-use super::{Context, ValidateError};
+use crate::ExperimentError;
 use psidpd_core::engine::{Fault, Precision, Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation, State};
 use psidpd_formats::dump;
@@ -75,7 +77,7 @@ pub fn run(
     length: Length,
     name: &str,
     advance: &(dyn Fn(u64) + Sync),
-) -> Result<Trace, ValidateError> {
+) -> Result<Trace, ExperimentError> {
     match setup.code {
         Code::Native | Code::NativeMixed => native(setup, state, length, context.fault, advance),
         _ => lammps(context, setup, state, length, &context.work.join(name), advance),
@@ -89,7 +91,7 @@ pub(super) fn native(
     length: Length,
     fault: Option<Fault>,
     advance: &(dyn Fn(u64) + Sync),
-) -> Result<Trace, ValidateError> {
+) -> Result<Trace, ExperimentError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
     let mut simulation = Simulation::new(&model, 1.0, state.clone(), setup.seed)?;
     if setup.code == Code::NativeMixed {
@@ -136,7 +138,7 @@ fn lammps(
     length: Length,
     folder: &Path,
     advance: &(dyn Fn(u64) + Sync),
-) -> Result<Trace, ValidateError> {
+) -> Result<Trace, ExperimentError> {
     let mut deck = setup.prepare(context, state, folder, false)?;
     deck.push_str(&format!(
         "fix move all nve\ntimestep {}\nthermo_modify norm no\nvariable kinetic equal ke\n\
@@ -154,8 +156,6 @@ fn lammps(
         ));
     }
     deck.push_str(&format!("thermo {}\nrun {}\n", length.steps, length.steps));
-    let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
     let limit = Duration::from_secs(if context.full { 6 * 3600 } else { 1200 });
     let over = AtomicBool::new(false);
     let series = folder.join("series.txt");
@@ -168,7 +168,7 @@ fn lammps(
                 }
             }
         });
-        let done = context.host.run_script(1, folder, &script, &["-log", "log.lammps"], limit);
+        let done = context.lammps.run(1, folder, &deck, LOG, limit);
         over.store(true, Ordering::Relaxed);
         done
     })?;
@@ -177,7 +177,7 @@ fn lammps(
     if length.frame > 0 {
         let path = folder.join("frames.txt");
         for frame in dump::read(&path)? {
-            let z = frame.get("z").ok_or_else(|| ValidateError::Output {
+            let z = frame.get("z").ok_or_else(|| ExperimentError::Output {
                 path: path.clone(),
                 problem: "a frame has no column z".into(),
             })?;
@@ -199,12 +199,12 @@ fn last_step(path: &Path) -> Option<u64> {
 }
 
 /// The file of `fix ave/time`: comments, then step and nine numbers.
-fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ValidateError> {
-    let text = std::fs::read_to_string(path).map_err(ValidateError::io(path))?;
+fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ExperimentError> {
+    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
     for line in text.lines().filter(|l| !l.starts_with('#')) {
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
         let Ok(mut sample) = <[f64; 10]>::try_from(numbers) else {
-            return Err(ValidateError::Output {
+            return Err(ExperimentError::Output {
                 path: path.into(),
                 problem: format!("unexpected line: {line}"),
             });
@@ -214,7 +214,7 @@ fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), Val
     }
     let expected = (length.steps / length.sample) as usize + usize::from(!length.averaged);
     if trace.time.len() != expected {
-        return Err(ValidateError::Output {
+        return Err(ExperimentError::Output {
             path: path.into(),
             problem: format!("{} samples, expected {expected}", trace.time.len()),
         });

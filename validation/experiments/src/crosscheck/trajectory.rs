@@ -1,9 +1,11 @@
 //! The same trajectory in both hosts: noise on, same seed, same integrator, on one rank and on two.
 
+use super::LOG;
 use super::codes::{Code, Setup};
-use super::fluids::{GAMMA, SET6};
-use super::start::{Filling, equilibrated};
-use super::{Context, Part, ValidateError};
+use super::{Context, Part};
+use crate::ExperimentError;
+use crate::fluids::{GAMMA, SET6};
+use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::Want;
 use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
@@ -22,9 +24,9 @@ const DT: f64 = 0.01;
 const LARGEST: f64 = 1e-10;
 
 /// Runs the comparison.
-pub fn run(context: &Context) -> Result<Part, ValidateError> {
-    let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0, density: SET6.liquid };
-    let state = equilibrated(&SET6, filling, 500, SEED)?;
+pub fn run(context: &Context) -> Result<Part, ExperimentError> {
+    let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0 };
+    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let ours = native(context, &state)?;
     let mut part = Part::default();
     let mut table = Table::new(["code", "ranks", "newton", "largest distance from native"]);
@@ -75,7 +77,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// Positions by tag.
-fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ValidateError> {
+fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ExperimentError> {
     let model = SET6.model(ForceLaw::Conservative, GAMMA)?;
     let mut simulation = context.simulation(&model, 1.0, state, SEED)?;
     simulation.prepare(DT, Want::FORCES)?;
@@ -93,7 +95,7 @@ fn lammps(
     code: Code,
     ranks: usize,
     newton: bool,
-) -> Result<Vec<[f64; 3]>, ValidateError> {
+) -> Result<Vec<[f64; 3]>, ExperimentError> {
     let folder = context.work.join(format!("trajectory-{}-{ranks}-{newton}", code.slug()));
     let setup = Setup { gamma: GAMMA, seed: SEED, newton, ..Setup::new(code, &SET6, ForceLaw::Conservative) };
     let mut deck = setup.prepare(context, state, &folder, false)?;
@@ -101,13 +103,11 @@ fn lammps(
         "fix move all nve\ntimestep {DT}\nthermo {STEPS}\nrun {STEPS}\n\
          write_dump all custom final.txt id x y z modify sort id format float %.17g\n"
     ));
-    let script = folder.join("in.lammps");
-    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
-    context.host.run_script(ranks, &folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
+    context.lammps.run(ranks, &folder, &deck, LOG, Duration::from_secs(300))?;
     let path = folder.join("final.txt");
     let frames = dump::read(&path)?;
     frames.first().and_then(|f| f.vectors(["x", "y", "z"])).filter(|x| x.len() == state.len()).ok_or_else(
-        || ValidateError::Output {
+        || ExperimentError::Output {
             path,
             problem: format!("expected one frame of {} particles", state.len()),
         },

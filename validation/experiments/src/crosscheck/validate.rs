@@ -1,7 +1,9 @@
 use super::{
-    Context, Part, ValidateError, conclusion, energy, equilibrium, forces, mixture, observables, thermostat,
-    trajectory,
+    Context, Part, conclusion, energy, equilibrium, forces, mixture, observables, thermostat, trajectory,
 };
+use crate::ExperimentError;
+use crate::lammps::host::PluginHost;
+use crate::machine::machine;
 use psidpd_core::engine::Fault;
 use psidpd_formats::files::write_atomically;
 use psidpd_report::{Item, Progress, Report, Results, Section, Table};
@@ -34,22 +36,20 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Something could not be run or written; checks that fail are in the results.
-pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, ValidateError> {
+pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let start = Instant::now();
-    std::fs::create_dir_all(&options.out).map_err(ValidateError::io(&options.out))?;
+    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
     // LAMMPS runs in folders of its own: paths must not depend on ours.
-    let out = options.out.canonicalize().map_err(ValidateError::io(&options.out))?;
+    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
     let spinner = progress.spinner("LAMMPS");
     let host = psidpd_lammps_host::plugin::install_to_build(&|line| progress.note(line))?;
     let version = host.version()?;
     spinner.finish();
     let spinner = progress.spinner("plugin");
-    let plugin = psidpd_lammps_host::plugin::build(&host, &|line| progress.note(line))?;
-    psidpd_lammps_host::plugin::check(&host, &plugin)?;
+    let lammps = PluginHost::open(host, &|line| progress.note(line))?;
     spinner.finish();
     let context = Context {
-        host: &host,
-        plugin: &plugin,
+        lammps: &lammps,
         work: out.join("runs"),
         full: options.full,
         progress,
@@ -74,7 +74,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Valid
         observables::SEED,
     ];
     let mut sections = Vec::new();
-    type Run = fn(&Context) -> Result<Part, ValidateError>;
+    type Run = fn(&Context) -> Result<Part, ExperimentError>;
     let parts: [(&str, Run); 7] = [
         ("forces", forces::run),
         ("thermostat", thermostat::run),
@@ -118,7 +118,7 @@ pub fn check_table(results: &Results) -> Table {
     table
 }
 
-fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<PathBuf, ValidateError> {
+fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<PathBuf, ExperimentError> {
     write_atomically(out.join("results.json"), results.to_json()?.as_bytes())?;
     sections.insert(0, conclusion::what_is_compared());
     sections.insert(0, conclusion::section(results));
@@ -139,17 +139,4 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
     let path = out.join("report.html");
     write_atomically(&path, report.render().as_bytes())?;
     Ok(path)
-}
-
-/// The processor, where the system says.
-pub fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let model = std::fs::read_to_string("/proc/cpuinfo")
-        .ok()
-        .and_then(|text| {
-            let line = text.lines().find(|l| l.starts_with("model name"))?;
-            Some(line.split(':').nth(1)?.trim().to_owned())
-        })
-        .unwrap_or_else(|| std::env::consts::ARCH.to_owned());
-    format!("{model}, {cores} core(s)")
 }

@@ -1,7 +1,8 @@
 //! Forces of configurations in which digits are lost, against the reference.
 
 use super::case::{Case, Must, Run};
-use super::fluids::{DPD, SET6, data};
+use super::data_file::data;
+use crate::models::{SET6, STANDARD};
 
 const GROUP: &str = "forces";
 
@@ -38,7 +39,7 @@ pub fn cases() -> Vec<Case> {
         })
         .collect();
     vec![
-        case("differences that cancel: close pairs, pair force", DPD, &close, 5.0),
+        case("differences that cancel: close pairs, pair force", STANDARD, &close, 5.0),
         case("differences that cancel: close pairs, many-body force", SET6, &close, 5.0),
         case("pairs at the range and beside it", SET6, &ranges, 12.0),
     ]

@@ -1,7 +1,7 @@
 //! Long runs: momentum, and energy without thermostat.
 
 use super::case::{Case, Must, Run};
-use super::fluids::SET6;
+use crate::models::SET6;
 
 const GROUP: &str = "long runs";
 

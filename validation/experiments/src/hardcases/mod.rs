@@ -3,7 +3,7 @@
 //! A file for each group of cases; [`case`] says what a case is and judges, [`native`] and [`plugin`] carry it out.
 
 mod case;
-mod fluids;
+mod data_file;
 mod forces;
 mod long;
 mod native;
@@ -13,50 +13,15 @@ mod singular;
 mod starts;
 mod steps;
 
-use crate::crosscheck::jobs::{self, Job};
+use crate::ExperimentError;
+use crate::jobs::{self, Job};
 use case::{Case, Must};
 use plugin::Plugin;
-use psidpd_core::document::FileError;
 use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
-use psidpd_dynamics::run::RunError;
-use psidpd_lammps_host::LammpsError;
 use psidpd_report::{Progress, Table};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
-
-/// Why cases could not be carried out.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum HardCasesError {
-    /// A run failed for another reason than its physics.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// A model does not hold.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// LAMMPS is missing, or its files cannot be read.
-    #[error(transparent)]
-    Lammps(#[from] LammpsError),
-    #[error(transparent)]
-    Format(#[from] psidpd_formats::FormatError),
-    /// A file or folder cannot be written or read.
-    #[error("{path}: {source}")]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-}
-
-impl HardCasesError {
-    /// For `map_err` of file operations on `path`.
-    fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> HardCasesError {
-        let path = path.into();
-        move |source| HardCasesError::Io { path, source }
-    }
-}
+use std::path::Path;
 
 /// How much is tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,12 +91,12 @@ pub fn run(
     only: Option<&str>,
     fault: Option<Fault>,
     progress: &Progress,
-) -> Result<Vec<Verdict>, HardCasesError> {
-    let folder = tempfile::tempdir().map_err(HardCasesError::io(std::env::temp_dir()))?;
+) -> Result<Vec<Verdict>, ExperimentError> {
+    let folder = tempfile::tempdir().map_err(ExperimentError::io(std::env::temp_dir()))?;
     let plugin = lammps.then(|| Plugin::open(&|line| progress.note(line))).transpose()?;
     let mut cases = cases(extent);
     cases.retain(|case| only.is_none_or(|words| case.name.contains(words) || case.group.contains(words)));
-    let mut jobs: Vec<Job<Result<Verdict, HardCasesError>>> = Vec::new();
+    let mut jobs: Vec<Job<Result<Verdict, ExperimentError>>> = Vec::new();
     for (k, case) in cases.iter().enumerate() {
         let mut settings = settings(extent);
         if let Must::Agrees(_) = case.must {
@@ -152,18 +117,7 @@ pub fn run(
         }
     }
     let bar = progress.bar("hard cases", jobs.len() as u64);
-    let jobs = jobs.into_iter().map(|job| {
-        let bar = bar.clone();
-        let counted: Job<Result<Verdict, HardCasesError>> = Box::new(move || {
-            let result = job();
-            bar.advance(1);
-            result
-        });
-        counted
-    });
-    let found = jobs::run(jobs.collect()).into_iter().collect();
-    bar.finish();
-    found
+    jobs::counted(jobs, &bar).into_iter().collect()
 }
 
 /// Where a case is carried out.
@@ -180,8 +134,8 @@ fn one(
     precision: Precision,
     place: &Path,
     host: Host,
-) -> Result<Verdict, HardCasesError> {
-    std::fs::create_dir_all(place).map_err(HardCasesError::io(place))?;
+) -> Result<Verdict, ExperimentError> {
+    std::fs::create_dir_all(place).map_err(ExperimentError::io(place))?;
     let (host, must, found) = match host {
         Host::Plugin(plugin, must) => ("plugin", must, plugin.carry_out(case, precision, place)?),
         Host::Native(fault) => {

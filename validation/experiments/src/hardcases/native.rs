@@ -1,7 +1,7 @@
 //! Cases in the native runner.
 
-use super::HardCasesError;
 use super::case::{Case, Found, Must, Run};
+use crate::ExperimentError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{Fault, Precision, Settings, Want};
 use psidpd_core::truth;
@@ -26,10 +26,10 @@ pub fn scene(
     integrator: Integrator,
     precision: Precision,
     folder: &Path,
-) -> Result<Result<Scene, FileError>, HardCasesError> {
+) -> Result<Result<Scene, FileError>, ExperimentError> {
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(HardCasesError::io(&path))
+        std::fs::write(&path, text).map_err(ExperimentError::io(&path))
     };
     write("model.toml", &run.model)?;
     if let Some(data) = &run.data {
@@ -60,7 +60,7 @@ pub fn carry_out(
     precision: Precision,
     folder: &Path,
     fault: Option<Fault>,
-) -> Result<Found, HardCasesError> {
+) -> Result<Found, ExperimentError> {
     let scene = match scene(&case.run, integrator, precision, folder)? {
         Ok(scene) => scene,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
@@ -73,7 +73,7 @@ pub fn carry_out(
 }
 
 /// Runs a scene as `psidpd run` does.
-fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, HardCasesError> {
+fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, ExperimentError> {
     let mut runner = match Runner::begin(scene, out, Begin::Overwrite) {
         Ok(runner) => runner,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
@@ -96,9 +96,9 @@ fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, HardCase
         }
     };
     let path = out.join("observables.json");
-    let text = std::fs::read_to_string(&path).map_err(HardCasesError::io(&path))?;
+    let text = std::fs::read_to_string(&path).map_err(ExperimentError::io(&path))?;
     let observed: Vec<Observation> =
-        serde_json::from_str(&text).map_err(|e| HardCasesError::io(&path)(e.into()))?;
+        serde_json::from_str(&text).map_err(|e| ExperimentError::io(&path)(e.into()))?;
     let kt = scene.kt;
     let of = |column: &str| {
         let m = observed.iter().find(|o| o.name == "temperature").and_then(|o| o.scalar(column))?;
@@ -131,7 +131,7 @@ fn momentum_of(state: &State) -> f64 {
 }
 
 /// The forces at the start against those of the reference.
-fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, HardCasesError> {
+fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, ExperimentError> {
     let mut run = simulation(scene, scene.initial_state(), fault)?;
     run.set_thermostat(false);
     run.prepare(scene.stages[0].dt, Want::FORCES)?;
@@ -154,7 +154,7 @@ fn simulation(scene: &Scene, state: State, fault: Option<Fault>) -> Result<Simul
 }
 
 /// Energy and momentum after the first stage with thermostat and the second without.
-fn conserved(scene: &Scene, integrator: Integrator, fault: Option<Fault>) -> Result<Found, HardCasesError> {
+fn conserved(scene: &Scene, integrator: Integrator, fault: Option<Fault>) -> Result<Found, ExperimentError> {
     let stopped = |error: RunError| Ok(Found::Stopped(error.to_string()));
     let mut run = simulation(scene, scene.initial_state(), fault)?;
     let [settle, measure] = [0, 1].map(|k| &scene.stages[k]);

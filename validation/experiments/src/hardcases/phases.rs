@@ -1,7 +1,7 @@
 //! Fluids where they cease to be simple.
 
 use super::case::{Case, Must, Run};
-use super::fluids::{LINEAR, SET6, VAN_DER_WAALS};
+use crate::models::{LINEAR, SET6, VAN_DER_WAALS};
 
 const GROUP: &str = "phases";
 

@@ -1,7 +1,7 @@
 //! Formulas that are singular, and species that are not there.
 
 use super::case::{Case, Must, Run};
-use super::fluids::{HUGGINS, VAN_DER_WAALS};
+use crate::models::{HUGGINS, VAN_DER_WAALS};
 
 const GROUP: &str = "singular formulas";
 

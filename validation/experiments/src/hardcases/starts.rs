@@ -1,7 +1,8 @@
 //! Starts that are unusual, and boxes.
 
 use super::case::{Case, Must, Run};
-use super::fluids::{DPD, SET6, data};
+use super::data_file::data;
+use crate::models::{SET6, STANDARD};
 
 const GROUP: &str = "starts and boxes";
 
@@ -21,7 +22,7 @@ pub fn cases() -> Vec<Case> {
         ..run
     };
     // Temperatures of few particles need many samples.
-    let dpd = Run { model: DPD.into(), dt: 0.02, steps: [200, 2000], ..set6("") };
+    let dpd = Run { model: STANDARD.into(), dt: 0.02, steps: [200, 2000], ..set6("") };
     // Every site of a lattice twice: 216 particles on 108 places.
     let mut twice = Vec::new();
     for k in 0..216usize {

@@ -1,9 +1,16 @@
 //! Steps that are long for the forces, the drag or the masses.
 
 use super::case::{Case, Must, Run};
-use super::fluids::{IDEAL, IDEAL_TWO, SET6, SPLINE};
+use crate::models::{SET6, SPLINE};
 
 const GROUP: &str = "time steps and masses";
+
+/// A gas that has a thermostat alone.
+const IDEAL: &str = "title = \"ideal gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+
+/// The same with two species.
+const IDEAL_TWO: &str =
+    "title = \"ideal gas\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must, exact| Case { group: GROUP, name, run, must, exact };

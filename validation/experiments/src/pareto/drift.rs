@@ -1,9 +1,9 @@
 //! Energy without thermostat: how far it drifts, by scheme of the conservative forces, Δt and precision.
 
-use super::ParetoError;
 use super::origin::Origin;
 use super::sample::Effort;
 use super::setting::Physics;
+use crate::ExperimentError;
 use psidpd_core::engine::{Precision, Want};
 use psidpd_dynamics::integrator::Integrator;
 use serde::Serialize;
@@ -58,7 +58,7 @@ pub fn schemes() -> Vec<Physics> {
 ///
 /// # Errors
 /// It cannot begin.
-pub fn drift(origin: &Origin, physics: &Physics, effort: Effort) -> Result<EnergyDrift, ParetoError> {
+pub fn drift(origin: &Origin, physics: &Physics, effort: Effort) -> Result<EnergyDrift, ExperimentError> {
     let dt = origin.dt(physics);
     let every = physics.interval();
     let mut run = origin.simulation(physics, NonZeroUsize::MIN, false, Want::FORCES)?;

@@ -4,7 +4,6 @@
 //! in turn for their cost; [`quantity`] holds results against the reference, [`front`] and `recommend` choose.
 
 mod drift;
-mod error;
 mod front;
 mod lammps;
 mod origin;
@@ -19,7 +18,6 @@ mod time;
 mod tolerance;
 
 use drift::EnergyDrift;
-pub use error::ParetoError;
 use outcome::{Cost, Outcome, Point, Recommended, Reference};
 use quantity::Deviation;
 pub use sample::Effort;
@@ -28,10 +26,12 @@ use setting::Host;
 pub use time::Pace;
 pub use tolerance::Tolerance;
 
-use crate::crosscheck::jobs::{self, Job};
-use crate::crosscheck::machine;
+use crate::ExperimentError;
+use crate::jobs::{self, Job};
+use crate::machine::machine;
 use lammps::Lammps;
 use origin::Origin;
+use own_style::is_another_law;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::scene::Scene;
@@ -81,9 +81,9 @@ const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 ///
 /// # Errors
 /// The scene cannot be run with its own step, or something cannot be written.
-pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outcome, ParetoError> {
-    std::fs::create_dir_all(&options.out).map_err(ParetoError::io(&options.out))?;
-    let out = options.out.canonicalize().map_err(ParetoError::io(&options.out))?;
+pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
+    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
+    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
     let seconds = 60.0 * options.minutes;
     let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let spinner = progress.spinner("start");
@@ -141,7 +141,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
         asked => (asked.to_vec(), Vec::new()),
     };
     if let Some(tolerance) = front::unmeasured(&points, &tolerances) {
-        return Err(ParetoError::Unmeasured(tolerance.name.clone()));
+        return Err(ExperimentError::Unmeasured(tolerance.name.clone()));
     }
     front::mark(&mut points, &tolerances);
     let (reference, reference_of_dynamics) = references.tell(&origin, known);
@@ -171,7 +171,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     };
     outcome.recommended = recommend(&origin, &outcome);
     let json = serde_json::to_string_pretty(&outcome)
-        .map_err(|e| ParetoError::io(out.join("pareto.json"))(e.into()))?;
+        .map_err(|e| ExperimentError::io(out.join("pareto.json"))(e.into()))?;
     write_atomically(out.join("pareto.json"), (json + "\n").as_bytes())?;
     write_atomically(out.join("pareto.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
@@ -187,7 +187,7 @@ fn what(origin: &Origin, physics: &Physics) -> String {
 }
 
 /// Whether velocities have a distribution that is known, and what pressures are held against.
-fn known(origin: &Origin) -> Result<Known, ParetoError> {
+fn known(origin: &Origin) -> Result<Known, ExperimentError> {
     let (scene, stage) = (origin.scene, origin.stage);
     let flows = stage.body_forces && !scene.body_forces.is_empty();
     let conservative = scene.model.at(stage.kt)?.is_conservative();
@@ -209,11 +209,11 @@ struct References {
 
 impl References {
     /// Their quantities: those of configurations from Monte Carlo, if there is one.
-    fn quantities(&self, origin: &Origin) -> Result<Quantities, ParetoError> {
+    fn quantities(&self, origin: &Origin) -> Result<Quantities, ExperimentError> {
         let made = |sampled: &Sampled, physics: &Physics| match sampled {
             Sampled::Made { quantities, .. } => Ok(quantities.as_ref().clone()),
             Sampled::Unstable(why) => {
-                Err(ParetoError::Reference { what: what(origin, physics), why: why.clone() })
+                Err(ExperimentError::Reference { what: what(origin, physics), why: why.clone() })
             }
         };
         let small = made(&self.small_steps, &Physics::small_steps());
@@ -239,24 +239,18 @@ fn sample_all(
     physics: &[Physics],
     effort: Effort,
     progress: &Progress,
-) -> Result<(References, Vec<Sampled>), ParetoError> {
+) -> Result<(References, Vec<Sampled>), ExperimentError> {
     let bar = progress.bar("errors", physics.len() as u64 + 2);
     let references = [Physics::reference(), Physics::small_steps()];
-    let mut jobs: Vec<Job<Result<Sampled, ParetoError>>> = Vec::new();
+    let mut jobs: Vec<Job<Result<Sampled, ExperimentError>>> = Vec::new();
     for (k, physics) in references.iter().chain(physics).enumerate() {
         let effort = if k < references.len() { effort.times(REFERENCE) } else { effort };
-        let bar = bar.clone();
-        jobs.push(Box::new(move || {
-            let sampled = sample::sample(origin, physics, effort);
-            bar.advance(1);
-            sampled
-        }));
+        jobs.push(Box::new(move || sample::sample(origin, physics, effort)));
     }
-    let mut found = jobs::run(jobs).into_iter();
+    let mut found = jobs::counted(jobs, &bar).into_iter();
     // A model without energy, or a flow, has no Monte Carlo.
     let configurations = found.next().map_or(Err(String::new()), |found| found.map_err(|e| e.to_string()));
     let mut rest: Vec<Sampled> = found.collect::<Result<_, _>>()?;
-    bar.finish();
     let sampled = rest.split_off(1);
     Ok((References { configurations, small_steps: rest.swap_remove(0) }, sampled))
 }
@@ -268,25 +262,17 @@ fn drifts(
     options: &Options,
     seconds: f64,
     progress: &Progress,
-) -> Result<Vec<EnergyDrift>, ParetoError> {
+) -> Result<Vec<EnergyDrift>, ExperimentError> {
     if !known.temperature || options.choice == Choice::Few {
         return Ok(Vec::new());
     }
     let schemes = drift::schemes();
     let effort = Effort::Seconds(seconds / schemes.len() as f64);
     let bar = progress.bar("energy", schemes.len() as u64);
-    let mut jobs: Vec<Job<Result<EnergyDrift, ParetoError>>> = Vec::new();
-    for scheme in &schemes {
-        let bar = bar.clone();
-        jobs.push(Box::new(move || {
-            let found = drift::drift(origin, scheme, effort);
-            bar.advance(1);
-            found
-        }));
-    }
-    let found = jobs::run(jobs).into_iter().collect();
-    bar.finish();
-    found
+    let job = |scheme| -> Job<Result<EnergyDrift, ExperimentError>> {
+        Box::new(move || drift::drift(origin, scheme, effort))
+    };
+    jobs::counted(schemes.iter().map(job).collect(), &bar).into_iter().collect()
 }
 
 fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Deviation>) -> Point {
@@ -367,8 +353,8 @@ fn own_points(
     known: Known,
     native: &Quantities,
     progress: &Progress,
-) -> Result<Option<Own>, ParetoError> {
-    let Some(own) = lammps.own else { return Ok(None) };
+) -> Result<Option<Own>, ExperimentError> {
+    let Some(own) = &lammps.own else { return Ok(None) };
     let physics = OWN.map(|multiple| Physics {
         integrator: Integrator::VelocityVerlet,
         multiple,
@@ -381,19 +367,13 @@ fn own_points(
         _ => Effort::Seconds(WORKERS * seconds / OWN.len() as f64),
     };
     let bar = progress.bar("LAMMPS's own style", OWN.len() as u64);
-    let mut jobs: Vec<Job<Result<Sampled, ParetoError>>> = Vec::new();
+    let mut jobs: Vec<Job<Result<Sampled, ExperimentError>>> = Vec::new();
     for (k, physics) in physics.iter().enumerate() {
-        let bar = bar.clone();
-        jobs.push(Box::new(move || {
-            let found = lammps.sample(origin, physics, effort, step, &format!("own-{k}"));
-            bar.advance(1);
-            found
-        }));
+        jobs.push(Box::new(move || lammps.sample(origin, physics, effort, step, &format!("own-{k}"))));
     }
-    let sampled: Vec<Sampled> = jobs::run(jobs).into_iter().collect::<Result<_, _>>()?;
-    bar.finish();
+    let sampled: Vec<Sampled> = jobs::counted(jobs, &bar).into_iter().collect::<Result<_, _>>()?;
     let mut known = known;
-    let (reference, first) = match (&sampled[0], own.is_another_law()) {
+    let (reference, first) = match (&sampled[0], is_another_law(own)) {
         (Sampled::Made { quantities, .. }, true) => {
             known.temperature = false;
             (quantities.as_ref().clone(), 1)
@@ -409,7 +389,7 @@ fn own_points(
         };
         points.push(point(origin, setting(*physics), sampled, errors));
     }
-    let itself = own.is_another_law().then(|| reference_of(origin, &physics[0], &sampled[0], known));
+    let itself = is_another_law(own).then(|| reference_of(origin, &physics[0], &sampled[0], known));
     Ok(Some((itself, points)))
 }
 

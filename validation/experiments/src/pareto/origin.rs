@@ -1,7 +1,7 @@
 //! The state that every run starts from, and its conditions.
 
-use super::ParetoError;
 use super::setting::{INTERVAL, Physics};
+use crate::ExperimentError;
 use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::run::{RunError, Simulation};
@@ -30,10 +30,14 @@ impl<'a> Origin<'a> {
     ///
     /// # Errors
     /// There is no such stage, or the scene's own steps cannot be made.
-    pub fn of(scene: &'a Scene, limit: Duration, threads: NonZeroUsize) -> Result<Origin<'a>, ParetoError> {
+    pub fn of(
+        scene: &'a Scene,
+        limit: Duration,
+        threads: NonZeroUsize,
+    ) -> Result<Origin<'a>, ExperimentError> {
         let measured =
             scene.stages.iter().rposition(|s| s.thermostat && s.integrator.has_time() && s.level.is_none());
-        let measured = measured.ok_or(ParetoError::NoStage)?;
+        let measured = measured.ok_or(ExperimentError::NoStage)?;
         let stage = &scene.stages[measured];
         let settings = Settings { precision: Precision::Mixed, threads, ..Settings::default() };
         let mut run = scene.simulation(scene.initial_state())?;
@@ -43,7 +47,7 @@ impl<'a> Origin<'a> {
         let settle = (SETTLE * INTERVAL).min(stage.steps);
         let stages = scene.stages[..measured].iter().map(|s| (s, s.steps)).chain([(stage, settle)]);
         for (stage, mut steps) in stages {
-            let failed = |source| ParetoError::Stopped {
+            let failed = |source| ExperimentError::Stopped {
                 what: format!("the start, stage \"{}\"", stage.name),
                 source: Box::new(source),
             };

@@ -1,108 +1,58 @@
 //! LAMMPS's own pair style for a fluid, where it has one.
 
-use super::ParetoError;
 use super::origin::Origin;
+use crate::ExperimentError;
+use crate::lammps::style::PairStyle;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
-use std::fmt::Write;
 
-/// A style with its coefficients.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OwnStyle {
-    /// `mdpd/rhosum` and `mdpd`: another law with the same coefficients.
-    Mdpd {
-        /// As of the plugin's style.
-        pair: WarrenPair,
-    },
-    /// `dpd`: the same law.
-    Dpd {
-        /// Repulsion.
-        a: f64,
-        /// Friction.
-        gamma: f64,
-        /// Range.
-        rc: f64,
-    },
+/// The style for the fluid of a scene, found by the model's parameters and held against its forces.
+///
+/// # Errors
+/// The model does not hold at the temperature.
+pub fn own_style(origin: &Origin) -> Result<Option<PairStyle>, ExperimentError> {
+    let scene = origin.scene;
+    let fluid = scene.model.at(origin.stage.kt)?;
+    let [Some(thermostat)] = fluid.thermostats[..] else { return Ok(None) };
+    let plain = scene.frozen.is_empty()
+        && scene.body_forces.is_empty()
+        && scene.domain.periodic() == [true; 3]
+        && fluid.dimensions == 3
+        && thermostat.exponent == 1.0;
+    let Ok(text) = toml::from_str::<toml::Table>(scene.model.source().text()) else { return Ok(None) };
+    let number = |name: &str| {
+        let value = text.get("parameters")?.get(name)?;
+        value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
+    };
+    let (gamma, rc) = (thermostat.gamma, thermostat.range);
+    if !plain {
+        return Ok(None);
+    }
+    if let (Some(a), Some(b), Some(rd)) = (number("A"), number("B"), number("rd")) {
+        let pair = WarrenPair { a, b, gamma, rc, rd };
+        let Ok(model) = warren_ab(&["F".to_owned()], &[Some(pair)], 3, ForceLaw::Conservative) else {
+            return Ok(None);
+        };
+        return Ok(same(origin, fluid, &model)?.then_some(PairStyle::Mdpd(pair)));
+    }
+    if let Some(a) = number("a") {
+        let text = format!(
+            "title = \"dpd\"\nspecies = [\"W\"]\n[[pair]]\nbetween = [\"W\", \"W\"]\nform = \"soft\"\n\
+             strength = {a:?}\nrange = {rc:?}\n[[thermostat]]\ngamma = {gamma:?}\nrange = {rc:?}\n"
+        );
+        let model = Model::parse("dpd", &text)?;
+        return Ok(same(origin, fluid, &model)?.then_some(PairStyle::Dpd { a, gamma, rc }));
+    }
+    Ok(None)
 }
 
-impl OwnStyle {
-    /// The style for the fluid of a scene, found by the model's parameters and held against its forces.
-    ///
-    /// # Errors
-    /// The model does not hold at the temperature.
-    pub fn of(origin: &Origin) -> Result<Option<OwnStyle>, ParetoError> {
-        let scene = origin.scene;
-        let fluid = scene.model.at(origin.stage.kt)?;
-        let [Some(thermostat)] = fluid.thermostats[..] else { return Ok(None) };
-        let plain = scene.frozen.is_empty()
-            && scene.body_forces.is_empty()
-            && scene.domain.periodic() == [true; 3]
-            && fluid.dimensions == 3
-            && thermostat.exponent == 1.0;
-        let Ok(text) = toml::from_str::<toml::Table>(scene.model.source().text()) else { return Ok(None) };
-        let number = |name: &str| {
-            let value = text.get("parameters")?.get(name)?;
-            value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
-        };
-        let (gamma, rc) = (thermostat.gamma, thermostat.range);
-        if !plain {
-            return Ok(None);
-        }
-        if let (Some(a), Some(b), Some(rd)) = (number("A"), number("B"), number("rd")) {
-            let pair = WarrenPair { a, b, gamma, rc, rd };
-            let Ok(model) = warren_ab(&["F".to_owned()], &[Some(pair)], 3, ForceLaw::Conservative) else {
-                return Ok(None);
-            };
-            return Ok(same(origin, fluid, &model)?.then_some(OwnStyle::Mdpd { pair }));
-        }
-        if let Some(a) = number("a") {
-            let text = format!(
-                "title = \"dpd\"\nspecies = [\"W\"]\n[[pair]]\nbetween = [\"W\", \"W\"]\nform = \"soft\"\n\
-                 strength = {a:?}\nrange = {rc:?}\n[[thermostat]]\ngamma = {gamma:?}\nrange = {rc:?}\n"
-            );
-            let model = Model::parse("dpd", &text)?;
-            return Ok(same(origin, fluid, &model)?.then_some(OwnStyle::Dpd { a, gamma, rc }));
-        }
-        Ok(None)
-    }
-
-    /// Whether LAMMPS computes another law than the model.
-    pub fn is_another_law(self) -> bool {
-        matches!(self, OwnStyle::Mdpd { .. })
-    }
-
-    /// Whether the data file must be of another atom style.
-    pub fn needs_its_own_data(self) -> bool {
-        matches!(self, OwnStyle::Mdpd { .. })
-    }
-
-    /// A deck for the plugin with this style instead.
-    pub fn put_into(self, script: &str, origin: &Origin) -> String {
-        let (kt, seed) = (origin.stage.kt, origin.scene.seed);
-        let mut changed = String::new();
-        for line in script.lines() {
-            // Writing to a String cannot fail.
-            let _ = match (self, line.split_whitespace().next()) {
-                (OwnStyle::Mdpd { .. }, Some("atom_style")) => writeln!(changed, "atom_style mdpd"),
-                (OwnStyle::Mdpd { pair }, Some("pair_style")) => writeln!(
-                    changed,
-                    "pair_style hybrid/overlay mdpd/rhosum mdpd {kt:?} {:?} {seed}\n\
-                     pair_coeff 1 1 mdpd/rhosum {:?}\npair_coeff 1 1 mdpd {:?} {:?} {:?} {:?} {:?}",
-                    pair.rc, pair.rd, pair.a, pair.b, pair.gamma, pair.rc, pair.rd
-                ),
-                (OwnStyle::Dpd { a, gamma, rc }, Some("pair_style")) => {
-                    writeln!(changed, "pair_style dpd {kt:?} {rc:?} {seed}\npair_coeff 1 1 {a:?} {gamma:?}")
-                }
-                (_, Some("pair_coeff")) => Ok(()),
-                _ => writeln!(changed, "{line}"),
-            };
-        }
-        changed
-    }
+/// Whether LAMMPS computes another law than the model.
+pub fn is_another_law(own: &PairStyle) -> bool {
+    matches!(own, PairStyle::Mdpd(_))
 }
 
 /// Whether forces at the start are the same.
-fn same(origin: &Origin, fluid: Fluid, other: &Model) -> Result<bool, ParetoError> {
+fn same(origin: &Origin, fluid: Fluid, other: &Model) -> Result<bool, ExperimentError> {
     let state = &origin.state;
     let kt = origin.stage.kt;
     let evaluate = |fluid: Fluid| {

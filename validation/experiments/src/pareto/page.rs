@@ -1,9 +1,9 @@
 //! Results as tables, plots and a page.
 
-use super::ParetoError;
 use super::outcome::{Outcome, Point, Reference};
 use super::quantity::{Class, Deviation};
 use super::setting::Host;
+use crate::ExperimentError;
 use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table};
 
 /// An error in percent with its own; what is not resolved as what it is likely to be below.
@@ -230,7 +230,7 @@ pub fn explanation(outcome: &Outcome) -> String {
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn report(outcome: &Outcome) -> Result<String, ParetoError> {
+pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
     for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {

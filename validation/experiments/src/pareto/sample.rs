@@ -1,9 +1,9 @@
 //! A run of one setting, for what it measures.
 
-use super::ParetoError;
 use super::origin::Origin;
 use super::quantity::{Class, Quantities};
 use super::setting::{Host, Physics};
+use crate::ExperimentError;
 use psidpd_core::document::Document;
 use psidpd_core::engine::Want;
 use psidpd_dynamics::run::{RunError, Simulation};
@@ -69,7 +69,7 @@ pub const FAR_OFF: f64 = 5.0;
 ///
 /// # Errors
 /// The model has none of these: never.
-pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Result<Observe, ParetoError> {
+pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Result<Observe, ExperimentError> {
     let (scene, stage) = (origin.scene, origin.stage);
     // Pressure and forces of LAMMPS's own law are not those of the model.
     let with_forces = host == Host::Native;
@@ -121,7 +121,7 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
 ///
 /// # Errors
 /// It cannot begin.
-pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ParetoError> {
+pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ExperimentError> {
     let (dt, every) = (origin.dt(physics), physics.interval());
     let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;
     let stage = origin.stage;

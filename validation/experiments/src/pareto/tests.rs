@@ -2,7 +2,7 @@ use super::*;
 use std::path::Path;
 
 fn tiny(folder: &Path) -> Scene {
-    let model = include_str!("../../../models/warren2003-set6.toml");
+    let model = crate::models::SET6;
     std::fs::write(folder.join("m.toml"), model).unwrap();
     let text = "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = 4.0\ndensity = 6.05\nequilibrate = 200\nsteps = 500\ndt = 0.01\n";
     Scene::parse("tiny", text, folder).unwrap()
@@ -110,7 +110,7 @@ fn what_is_not_measured_has_no_tolerance() {
     let mut options = options(folder.path(), &["sigma=1%"]);
     options.fixed = Some((Effort::Samples(4), Pace { rounds: 1, seconds: 0.001 }));
     assert!(
-        matches!(run(&scene, &options, &Progress::new()), Err(ParetoError::Unmeasured(name)) if name == "sigma")
+        matches!(run(&scene, &options, &Progress::new()), Err(ExperimentError::Unmeasured(name)) if name == "sigma")
     );
 }
 
@@ -138,4 +138,26 @@ fn lammps_lines_are_those_that_lammps_can_run() {
             }
         }
     }
+}
+
+/// A script for LAMMPS's own style is that of the plugin but for the style, and has more commands before its last run alone.
+#[test]
+fn a_script_can_have_another_style_and_more_output() {
+    use psidpd_lammps_host::export::lammps::{Script, script_of};
+    let folder = tempfile::tempdir().unwrap();
+    let scene = tiny(folder.path());
+    let usual = script_of(&scene, Script::default()).unwrap();
+    let [own, more] = ["pair_style mdpd\n", "thermo 7\n"];
+    let script =
+        Script { plugin: false, style: Some(("mdpd", own)), before_last_run: more, final_data: false };
+    let changed = script_of(&scene, script).unwrap();
+    let gone: Vec<&str> = usual.lines().filter(|line| !changed.lines().any(|l| l == *line)).collect();
+    let [atoms, comment, load, style, pairs, data] = gone[..] else { panic!("{gone:?}") };
+    assert!(comment.starts_with('#') && atoms == "atom_style    atomic" && load.starts_with("plugin  "));
+    assert!(style.starts_with("pair_style    dpd/psi") && pairs.starts_with("pair_coeff"));
+    assert!(data.starts_with("write_data"));
+    assert!(changed.contains("\natom_style    mdpd\n") && changed.matches(own).count() == 1);
+    // The scene has two stages.
+    assert_eq!(changed.matches("run           ").count(), 2);
+    assert!(changed.ends_with("thermo 7\nrun           500\n") && changed.matches(more).count() == 1);
 }

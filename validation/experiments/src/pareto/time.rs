@@ -1,9 +1,9 @@
 //! What settings cost: all of them in turn, round after round, so that what slows the machine for a while slows all.
 
-use super::ParetoError;
 use super::lammps::Lammps;
 use super::origin::Origin;
 use super::setting::{Host, Setting};
+use crate::ExperimentError;
 use psidpd_core::engine::Want;
 use psidpd_report::Progress;
 use std::time::Instant;
@@ -32,7 +32,7 @@ pub fn time(
     lammps: Option<&Lammps>,
     pace: Pace,
     progress: &Progress,
-) -> Result<Vec<Vec<f64>>, ParetoError> {
+) -> Result<Vec<Vec<f64>>, ExperimentError> {
     let mut steps = vec![CYCLE; settings.len()];
     let mut found = vec![Vec::new(); settings.len()];
     let bar = progress.bar("cost", ((pace.rounds + 1) * settings.len()) as u64);
@@ -63,12 +63,12 @@ pub fn time(
 }
 
 /// Seconds for a step.
-fn native(origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ParetoError> {
+fn native(origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ExperimentError> {
     let physics = &setting.physics;
     let dt = origin.dt(physics);
     let mut run = origin.simulation(physics, setting.threads, true, Want::FORCES)?;
     let what = || format!("timing {} at dt = {dt}", physics.integrator);
-    let failed = |source| ParetoError::Stopped { what: what(), source: Box::new(source) };
+    let failed = |source| ExperimentError::Stopped { what: what(), source: Box::new(source) };
     run.advance(CYCLE, dt, physics.integrator).map_err(failed)?;
     let begin = Instant::now();
     run.advance(steps, dt, physics.integrator).map_err(failed)?;

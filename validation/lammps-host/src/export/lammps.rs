@@ -72,15 +72,45 @@ pub enum DeckError {
     Output { path: PathBuf, source: std::io::Error },
 }
 
+/// What a script has beside what its scene says: by default it is the script of the plugin for the whole scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Script<'a> {
+    /// Whether it loads the plugin.
+    pub plugin: bool,
+    /// Another pair style than the plugin's: the atom style that it needs, and its commands.
+    pub style: Option<(&'a str, &'a str)>,
+    /// Commands before the last `run`.
+    pub before_last_run: &'a str,
+    /// Whether the last state is written.
+    pub final_data: bool,
+}
+
+impl Default for Script<'_> {
+    fn default() -> Self {
+        Script { plugin: true, style: None, before_last_run: "", final_data: true }
+    }
+}
+
 /// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`DeckError`].
 pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
-    check(scene)?;
-    std::fs::create_dir_all(out).map_err(output(out))?;
-    let mut files = vec![PathBuf::from(SCRIPT), PathBuf::from(START), PathBuf::from(MODEL)];
+    let script = script_of(scene, Script::default())?;
+    psidpd_formats::memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
+    let mut files = vec![PathBuf::from(SCRIPT)];
+    files.extend(write_inputs(scene, &scene.initial_state(), out)?);
+    save(&out.join(SCRIPT), &script)?;
+    Ok(files)
+}
 
+/// Writes what the script of a scene reads, with `state` as its start, and returns the names of the files.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
+    std::fs::create_dir_all(out).map_err(output(out))?;
+    let mut files = vec![PathBuf::from(START), PathBuf::from(MODEL)];
     let (text, tables) = copy_of_model(scene)?;
     for (from, to) in tables {
         let path = out.join(&to);
@@ -106,9 +136,7 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
 
-    psidpd_formats::memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
-    write_start(scene, &scene.initial_state(), &out.join(START))?;
-    save(&out.join(SCRIPT), &script(scene))?;
+    write_start(scene, state, &out.join(START))?;
     Ok(files)
 }
 
@@ -229,7 +257,7 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckErr
 }
 
 /// Writes a state as the initial state of a deck; fails if the file cannot be written.
-pub fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
+fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
     let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
     if scene.model.dimensions() == 2 {
@@ -243,23 +271,19 @@ pub fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), Deck
     data.write(path).map_err(|e| DeckError::Run(e.into()))
 }
 
-/// The script that [`write()`] writes, alone.
+/// A script of the scene.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS.
-pub fn script_of(scene: &Scene) -> Result<String, DeckError> {
+pub fn script_of(scene: &Scene, script: Script) -> Result<String, DeckError> {
     check(scene)?;
-    Ok(script(scene))
-}
-
-fn script(scene: &Scene) -> String {
     let mut s = String::new();
     // Writing to a String cannot fail.
-    let _ = write_script(scene, &mut s);
-    s
+    let _ = write_script(scene, script, &mut s);
+    Ok(s)
 }
 
-fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
+fn write_script(scene: &Scene, script: Script, s: &mut String) -> std::fmt::Result {
     let physics = Physics::of(scene);
     writeln!(s, "# {}", one_line(&scene.title))?;
     writeln!(s, "# lmp -in {SCRIPT} -var plugin PATH/psidpdplugin.so\n")?;
@@ -267,12 +291,14 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "units         lj")?;
     writeln!(s, "dimension     {}", scene.model.dimensions())?;
     writeln!(s, "boundary      {}", physics.boundary())?;
-    writeln!(s, "atom_style    atomic")?;
+    writeln!(s, "atom_style    {}", script.style.map_or("atomic", |(atoms, _)| atoms))?;
     writeln!(s, "newton        on")?;
     writeln!(s, "comm_modify   vel yes")?;
     writeln!(s, "read_data     {START}\n")?;
-    writeln!(s, "# to be left out where LAMMPS has the styles already")?;
-    writeln!(s, "plugin        load ${{plugin}}\n")?;
+    if script.plugin {
+        writeln!(s, "# to be left out where LAMMPS has the styles already")?;
+        writeln!(s, "plugin        load ${{plugin}}\n")?;
+    }
     physics.write_surroundings(s)?;
     writeln!(s)?;
     writeln!(s, "thermo_style  custom step time temp pe ke press pxx pyy pzz pxy pxz pyz")?;
@@ -288,7 +314,7 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
         writeln!(s, "dump_modify   frames sort id format float %.17g")?;
     }
     let mut before: Option<&Stage> = None;
-    for stage in &scene.stages {
+    for (k, stage) in scene.stages.iter().enumerate() {
         writeln!(s, "\n# {}", one_line(&stage.label()))?;
         if let Integrator::GrootWarren { .. } = stage.integrator {
             writeln!(s, "# groot-warren with lambda = 0.5 is velocity Verlet")?;
@@ -298,9 +324,13 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
             if !stage.thermostat {
                 writeln!(s, "# thermostat = false: a copy of the model without drag and noise")?;
             }
-            let precision = scene.precision.map_or(String::new(), |p| format!(" precision {p}"));
-            writeln!(s, "pair_style    dpd/psi {:?} {}{precision}", stage.kt, scene.seed)?;
-            writeln!(s, "pair_coeff    * * {model} {}", scene.model.species().join(" "))?;
+            if let Some((_, commands)) = script.style {
+                s.push_str(commands);
+            } else {
+                let precision = scene.precision.map_or(String::new(), |p| format!(" precision {p}"));
+                writeln!(s, "pair_style    dpd/psi {:?} {}{precision}", stage.kt, scene.seed)?;
+                writeln!(s, "pair_coeff    * * {model} {}", scene.model.species().join(" "))?;
+            }
         }
         if before.is_none_or(|b| motion(&b.integrator) != motion(&stage.integrator)) {
             if before.is_some() {
@@ -314,10 +344,16 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
             _ => {}
         }
         writeln!(s, "timestep      {:?}", stage.dt)?;
+        if k + 1 == scene.stages.len() {
+            s.push_str(script.before_last_run);
+        }
         writeln!(s, "run           {}", stage.steps)?;
         before = Some(stage);
     }
-    writeln!(s, "\nwrite_data    final.data nocoeff")
+    if script.final_data {
+        writeln!(s, "\nwrite_data    final.data nocoeff")?;
+    }
+    Ok(())
 }
 
 /// The style and the arguments of the fix that integrates.

@@ -1,7 +1,7 @@
 //! Section 11.3: Lowe's thermostat beside drag and noise.
 
-use super::STANDARD;
 use crate::bulk::Observed;
+use crate::models::STANDARD;
 use crate::papers::case::{Outcome, exact};
 use crate::papers::context::{Context, PaperError};
 

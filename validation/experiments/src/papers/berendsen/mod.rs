@@ -6,9 +6,9 @@ mod lowe_andersen;
 
 use super::Case;
 use super::context::Fluid;
+use crate::models::STANDARD;
 
 const PAPER: &str = "H. J. C. Berendsen, Simulating the Physical World, Cambridge (2007), chapter 11";
-const STANDARD: &str = include_str!("../../../../models/standard-dpd.toml");
 const IMMISCIBLE: &str = include_str!("../../../../models/drop-collision.toml");
 
 const fn case(id: &'static str, what: &'static str, run: super::Run) -> Case {

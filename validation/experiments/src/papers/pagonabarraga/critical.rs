@@ -1,6 +1,6 @@
 //! Figures 1 and 2: the van der Waals fluid in mean field.
 
-use super::VAN_DER_WAALS;
+use crate::models::VAN_DER_WAALS;
 use crate::papers::case::{Outcome, exact, line};
 use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
 use psidpd_core::model::Model;

@@ -1,7 +1,8 @@
 //! Figures 3 to 5: the Groot–Warren fluid by ψ, with two kernels.
 
-use super::{LINEAR, QUADRATIC, STANDARD};
+use super::QUADRATIC;
 use crate::bulk::Observed;
+use crate::models::{LINEAR, STANDARD};
 use crate::papers::case::{Outcome, bare, difference, line, profile};
 use crate::papers::context::{Context, Fluid, PaperError, with_parameters};
 use psidpd_observe::Measured;

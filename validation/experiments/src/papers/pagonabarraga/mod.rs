@@ -11,11 +11,8 @@ mod van_der_waals;
 use super::Case;
 
 const PAPER: &str = "I. Pagonabarraga, D. Frenkel, J. Chem. Phys. 115, 5015 (2001)";
-const VAN_DER_WAALS: &str = include_str!("../../../../models/van-der-waals-2d.toml");
 const SLAB: &str = include_str!("../../../../models/van-der-waals-2d-slab.toml");
-const STANDARD: &str = include_str!("../../../../models/standard-dpd.toml");
 const QUADRATIC: &str = include_str!("../../../../models/groot-warren-quadratic.toml");
-const LINEAR: &str = include_str!("../../../../models/groot-warren-linear.toml");
 const BINARY: &str = include_str!("../../../../models/binary-2d.toml");
 
 const fn case(id: &'static str, what: &'static str, run: super::Run) -> Case {

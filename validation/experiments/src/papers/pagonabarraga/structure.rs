@@ -1,7 +1,8 @@
 //! Eq. (31): the length l₀ on which structure develops, and the structure factor.
 
+use super::QUADRATIC;
 use super::groot_warren::groot_warren;
-use super::{LINEAR, QUADRATIC};
+use crate::models::LINEAR;
 use crate::papers::case::{Outcome, bare, difference, exact, profile};
 use crate::papers::context::{Context, PaperError, mean_field};
 use psidpd_observe::Measured;

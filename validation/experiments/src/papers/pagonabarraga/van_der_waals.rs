@@ -1,6 +1,6 @@
 //! Figure 6: the homogeneous van der Waals fluid.
 
-use super::VAN_DER_WAALS;
+use crate::models::VAN_DER_WAALS;
 use crate::papers::case::{Outcome, line};
 use crate::papers::context::{Context, Fluid, PaperError};
 

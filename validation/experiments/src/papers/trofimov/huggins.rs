@@ -1,8 +1,9 @@
 //! Section V: two compressible Huggins fluids, mixing (Table III) and demixing (Figures 9 and 10).
 
-use super::{DEMIXING, HUGGINS, fluid};
+use super::{DEMIXING, fluid};
 use crate::bulk::Observed;
 use crate::calibrate::Point;
+use crate::models::HUGGINS;
 use crate::papers::case::{Outcome, bare, exact, layers, profile};
 use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
 use psidpd_observe::Measured;

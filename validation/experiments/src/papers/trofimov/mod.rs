@@ -16,7 +16,6 @@ const K3: &str = include_str!("../../../../models/power-law-k3.toml");
 const K3_CORRECTED: &str = include_str!("../../../../models/power-law-k3-corrected.toml");
 const K4: &str = include_str!("../../../../models/power-law-k4.toml");
 const LENNARD_JONES: &str = include_str!("../../../../models/lennard-jones-corrected.toml");
-const HUGGINS: &str = include_str!("../../../../models/huggins.toml");
 const DEMIXING: &str = include_str!("../../../../models/huggins-demixing.toml");
 
 const fn case(id: &'static str, what: &'static str, run: super::Run) -> Case {

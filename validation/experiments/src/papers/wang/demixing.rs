@@ -1,6 +1,7 @@
 //! Figures 3 and 4, and which potential has a thermodynamic limit.
 
-use super::{DROP, STRONG, WEAK};
+use super::{STRONG, WEAK};
+use crate::models::SPLINE;
 use crate::papers::case::{Outcome, bare, exact, profile};
 use crate::papers::context::{Change, Context, PaperError};
 use psidpd_core::model::Model;
@@ -51,7 +52,7 @@ pub fn limit(_: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     for (first, stable) in [(17.0, 0.0), (19.0, 1.0)] {
         // a A = 9.5 · A.
-        let text = DROP.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
+        let text = SPLINE.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
         let fluid = Model::parse("model.toml", &text)?.at(0.5)?;
         let uniform = thermodynamic_limit(&fluid)?.is_err_and(|collapse| collapse.is_uniform());
         // The paper shows a drop at rest for the one it prints as 17.0, which the uniform fluid cannot be.
@@ -73,7 +74,7 @@ mod tests {
     #[test]
     fn integrals_are_those_of_the_splines() {
         for first in [17.0, 19.0] {
-            let text = DROP.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
+            let text = SPLINE.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
             let fluid = Model::parse("model.toml", &text).unwrap().at(0.5).unwrap();
             let found = psidpd_core::theory::MeanField::new(&fluid).unwrap().pair_integrals()[0];
             let integral = std::f64::consts::PI / 8.0 * (first * 0.8f64.powi(3) - 9.5);

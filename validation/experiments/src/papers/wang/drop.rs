@@ -1,7 +1,7 @@
 //! Figures 6 to 11: drops in their vapour. (5 is a picture of one; 7 and 9 are taken from other papers.)
 
-use super::DROP;
 use crate::bulk::Observed;
+use crate::models::SPLINE;
 use crate::papers::case::{Outcome, bare, profile, ratio};
 use crate::papers::context::{Change, Context, PaperError};
 use psidpd_observe::Measured;
@@ -32,7 +32,7 @@ fn drop(context: &Context, which: usize) -> Result<Observed, PaperError> {
         (&["output", "dump"], 0.into()),
         (&["observe", "every"], 20.into()),
     ];
-    context.shipped(&format!("drop-{count}"), DROP, scene, changes)
+    context.shipped(&format!("drop-{count}"), SPLINE, scene, changes)
 }
 
 pub fn fig6(context: &Context) -> Result<Outcome, PaperError> {

@@ -8,7 +8,6 @@ use super::Case;
 
 const PAPER: &str = "X. Wang, S. Chen, Acta Phys. Sin. (2010)";
 const EOS: &str = include_str!("../../../../models/spline-eos.toml");
-const DROP: &str = include_str!("../../../../models/spline-attractive.toml");
 const WEAK: &str = include_str!("../../../../models/spline-demixing-b08.toml");
 const STRONG: &str = include_str!("../../../../models/spline-demixing-b10.toml");
 

@@ -1,7 +1,7 @@
 //! Table 2, Figures 3 to 5: the interface between liquid and vapour.
 
-use super::{SET5, SET6};
 use crate::bulk::Observed;
+use crate::models::{SET5, SET6};
 use crate::papers::case::{Outcome, bare, difference, profile};
 use crate::papers::context::{Context, Fluid, PaperError};
 use psidpd_observe::Measured;

@@ -7,9 +7,6 @@ mod state;
 use super::Case;
 
 const PAPER: &str = "P. B. Warren, Phys. Rev. E 68, 066702 (2003)";
-const SET5: &str = include_str!("../../../../models/warren2003-set5.toml");
-const SET6: &str = include_str!("../../../../models/warren2003-set6.toml");
-const STANDARD: &str = include_str!("../../../../models/standard-dpd.toml");
 /// α of p = ρkT + αAρ², with its error.
 const ALPHA: [f64; 2] = [0.101, 0.001];
 

@@ -1,7 +1,7 @@
 //! Figure 6 and Table 3: drops that hang from a support.
 
-use super::{SET5, SET6};
 use crate::bulk::Observed;
+use crate::models::{SET5, SET6};
 use crate::papers::case::{Outcome, bare, profile};
 use crate::papers::context::{Change, Context, PaperError};
 

@@ -1,6 +1,7 @@
 //! Table 1, Figures 1 and 2: the equation of state.
 
-use super::{ALPHA, SET5, SET6, STANDARD};
+use super::ALPHA;
+use crate::models::{SET5, SET6, STANDARD};
 use crate::papers::case::{Outcome, line};
 use crate::papers::context::{Context, Fluid, PaperError, with_parameters};
 use psidpd_observe::Measured;

@@ -1,7 +1,8 @@
-//! The fluids that are timed.
+//! The fluids that codes are compared and timed in.
 
-use super::BenchError;
-use psidpd_core::model::Model;
+use crate::ExperimentError;
+use crate::models;
+use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab, warren_ab_text};
 
 /// A fluid with everything the codes need to be told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +31,7 @@ pub const SIZES: [usize; 3] = [6_050, 48_400, 387_200];
 pub const MDPD: Subject = Subject {
     name: "mdpd",
     title: "MDPD: Warren's set 6",
-    text: include_str!("../../../models/warren2003-set6.toml"),
+    text: models::SET6,
     species: &["F"],
     density: MDPD_DENSITY,
     dt: 0.01,
@@ -40,7 +41,7 @@ pub const MDPD: Subject = Subject {
 pub const DPD: Subject = Subject {
     name: "dpd",
     title: "DPD: the standard soft fluid",
-    text: include_str!("../../../models/standard-dpd.toml"),
+    text: models::STANDARD,
     species: &["W"],
     density: 3.0,
     dt: 0.04,
@@ -50,13 +51,13 @@ pub const DPD: Subject = Subject {
 pub const FORMULA: Subject = Subject {
     name: "formula",
     title: "MDPD in general: formulas, two species, two densities",
-    text: include_str!("two-species.toml"),
+    text: include_str!("bench/two-species.toml"),
     species: &["A", "B"],
     density: MDPD_DENSITY,
     dt: 0.01,
 };
 
-/// All.
+/// All that are timed.
 pub const SUBJECTS: [Subject; 3] = [MDPD, DPD, FORMULA];
 
 impl Subject {
@@ -64,7 +65,7 @@ impl Subject {
     ///
     /// # Errors
     /// The text is none: never, since a test reads it.
-    pub fn model(&self) -> Result<Model, BenchError> {
+    pub fn model(&self) -> Result<Model, ExperimentError> {
         Ok(Model::parse(self.name, self.text)?)
     }
 
@@ -77,6 +78,75 @@ impl Subject {
     /// How many particles of this fluid the cube of a size holds.
     pub fn particles(&self, size: usize) -> usize {
         (size as f64 * self.density / MDPD_DENSITY).round() as usize
+    }
+}
+
+/// One of Warren's parameter sets, with what he measured at kT = 1 (Phys. Rev. E 68, 066702, Table 2).
+#[derive(Debug, Clone, Copy)]
+pub struct WarrenSet {
+    /// Its name in the paper.
+    pub name: &'static str,
+    /// The fluid as it is shipped, at the density of the liquid beside its vapour.
+    pub fluid: Subject,
+    /// `B`; `A` is −40, `r_c` 1 and `r_d` 0.75 in both.
+    pub b: f64,
+    /// Error of the density of the liquid.
+    pub liquid_error: f64,
+    /// Surface tension and its error.
+    pub tension: (f64, f64),
+    /// Width of the interface and its error.
+    pub width: (f64, f64),
+}
+
+/// Set 5: the lighter liquid.
+pub const SET5: WarrenSet = WarrenSet {
+    name: "set 5",
+    fluid: Subject {
+        name: "set 5",
+        title: "MDPD: Warren's set 5",
+        text: models::SET5,
+        density: 5.08,
+        ..MDPD
+    },
+    b: 40.0,
+    liquid_error: 0.01,
+    tension: (4.95, 0.03),
+    width: (0.78, 0.05),
+};
+
+/// Set 6: the denser liquid.
+pub const SET6: WarrenSet = WarrenSet {
+    name: "set 6",
+    fluid: MDPD,
+    b: 25.0,
+    liquid_error: 0.01,
+    tension: (7.45, 0.04),
+    width: (0.66, 0.03),
+};
+
+/// `r_c`.
+pub const RC: f64 = 1.0;
+/// `r_d`.
+pub const RD: f64 = 0.75;
+/// `A`.
+pub const A: f64 = -40.0;
+/// γ of the runs with a thermostat: σ = 6 at kT = 1.
+pub const GAMMA: f64 = 18.0;
+
+impl WarrenSet {
+    /// Its coefficients with friction `gamma`.
+    pub fn pair(&self, gamma: f64) -> WarrenPair {
+        WarrenPair { a: A, b: self.b, gamma, rc: RC, rd: RD }
+    }
+
+    /// The model with friction `gamma` and one of the two force laws.
+    pub fn model(&self, law: ForceLaw, gamma: f64) -> Result<Model, ExperimentError> {
+        Ok(warren_ab(&["F".to_owned()], &[Some(self.pair(gamma))], 3, law)?)
+    }
+
+    /// The text of the same model file.
+    pub fn model_text(&self, law: ForceLaw, gamma: f64) -> Result<String, ExperimentError> {
+        Ok(warren_ab_text(&["F".to_owned()], &[Some(self.pair(gamma))], 3, law)?)
     }
 }
 

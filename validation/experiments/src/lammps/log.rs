@@ -52,6 +52,15 @@ pub fn parse(text: &str) -> Result<Loop, &'static str> {
     if account.parts.len() < PARTS.len() { Err("no timing of the parts") } else { Ok(account) }
 }
 
+/// The rows of numbers of the last table that LAMMPS printed, of so many columns.
+pub fn rows(text: &str, columns: usize) -> Vec<Vec<f64>> {
+    let lines: Vec<&str> = text.lines().collect();
+    let header = lines.iter().rposition(|line| line.split_whitespace().next() == Some("Step"));
+    let table = header.map_or(&[][..], |k| &lines[k + 1..]);
+    let read = |line: &&str| line.split_whitespace().map(|w| w.parse().ok()).collect::<Option<Vec<f64>>>();
+    table.iter().map_while(read).filter(|row| row.len() == columns).collect()
+}
+
 const PARTS: [&str; 6] = ["Pair", "Neigh", "Comm", "Output", "Modify", "Other"];
 
 #[cfg(test)]
@@ -104,5 +113,12 @@ Total wall time: 0:00:01
         let short = TEXT.split("MPI task").next().unwrap();
         assert_eq!(parse(short), Err("no timing of the parts"));
         assert_eq!(parse(&TEXT.replace("= 23", "= many")), Err("no number of list builds"));
+    }
+
+    #[test]
+    fn the_last_table_is_read() {
+        let text = "Step Temp Press\n 0 9 9\nLoop time\n   Step  Temp  Press \n 10 1.5 2\n 20 1 3.5\n 30 2 4\nLoop time of\n";
+        assert_eq!(rows(text, 3), [[10.0, 1.5, 2.0], [20.0, 1.0, 3.5], [30.0, 2.0, 4.0]]);
+        assert!(rows("nothing", 3).is_empty());
     }
 }

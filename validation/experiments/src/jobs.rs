@@ -1,5 +1,6 @@
 //! Several runs at once, one to a core.
 
+use psidpd_report::Bar;
 use std::sync::Mutex;
 
 /// A run.
@@ -28,6 +29,20 @@ pub fn run<T: Send>(jobs: Vec<Job<'_, T>>) -> Vec<T> {
     let mut done = done.into_inner().unwrap_or_else(|e| e.into_inner());
     done.sort_by_key(|(index, _)| *index);
     done.into_iter().map(|(_, result)| result).collect()
+}
+
+/// The same with a bar of the jobs that are done.
+pub fn counted<'a, T: Send + 'a>(jobs: Vec<Job<'a, T>>, bar: &'a Bar) -> Vec<T> {
+    let count = |job: Job<'a, T>| -> Job<'a, T> {
+        Box::new(move || {
+            let result = job();
+            bar.advance(1);
+            result
+        })
+    };
+    let results = run(jobs.into_iter().map(count).collect());
+    bar.finish();
+    results
 }
 
 #[cfg(test)]

@@ -1,0 +1,55 @@
+//! LAMMPS with psidpd's pair styles, as a program.
+
+use crate::ExperimentError;
+use psidpd_lammps_host::{Host, LammpsError, plugin};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The name of scripts.
+const SCRIPT: &str = "in.lammps";
+
+/// LAMMPS with the plugin.
+#[derive(Debug, Clone)]
+pub struct PluginHost {
+    /// LAMMPS.
+    pub host: Host,
+    /// The plugin to load; `None` where the program has the styles in it.
+    pub plugin: Option<PathBuf>,
+}
+
+impl PluginHost {
+    /// Builds the plugin for `host`, if need be.
+    ///
+    /// # Errors
+    /// It cannot be built.
+    pub fn open(host: Host, note: &dyn Fn(&str)) -> Result<PluginHost, LammpsError> {
+        let plugin = plugin::build(&host, note)?;
+        plugin::check(&host, &plugin)?;
+        // A LAMMPS without plugins has its own program with the styles in it.
+        Ok(match plugin::launcher(&plugin) {
+            Some(launcher) => PluginHost { host: host.with_program(&launcher), plugin: None },
+            None => PluginHost { host, plugin: Some(plugin) },
+        })
+    }
+
+    /// Runs a script on `ranks` ranks in `folder`, at most for `limit`, and gives what LAMMPS prints. Its variable `plugin` is the
+    /// plugin's path.
+    ///
+    /// # Errors
+    /// LAMMPS stops, or the script cannot be written.
+    pub fn run(
+        &self,
+        ranks: usize,
+        folder: &Path,
+        script: &str,
+        log: &str,
+        limit: Duration,
+    ) -> Result<String, ExperimentError> {
+        std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
+        let path = folder.join(SCRIPT);
+        std::fs::write(&path, script).map_err(ExperimentError::io(&path))?;
+        let plugin = self.plugin.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
+        let arguments = ["-log", log, "-var", "plugin", plugin.as_str()];
+        Ok(self.host.run_script(ranks, folder, &path, &arguments, limit)?.stdout)
+    }
+}
