@@ -4,7 +4,7 @@
 //! - [`style`]: one pair style's engine, in safe Rust;
 //! - [`thermostat`]: drag and noise for the fix;
 //! - [`units`]: one unit of a model in those of LAMMPS; `converted`: conversion of positions,
-//! velocities and forces;
+//!   velocities and forces;
 //! - [`bridge`]: the interface to C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `table`: the table of styles that the entry reads.

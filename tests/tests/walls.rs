@@ -34,7 +34,7 @@ const CORE: &[&[&str]] = &[
     // The move of a single particle.
     &["engine::local_energy"],
     // Sums over a list of pairs.
-    &["engine::reference"],
+    &["engine::pair_sums"],
     // The engine as hosts use it.
     &["engine::facade"],
     &["engine"],

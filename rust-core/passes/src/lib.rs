@@ -7,7 +7,7 @@
 //! Modules from the lowest level upwards; a file imports from its own module and from those above it in this list:
 //!
 //! - [`domain`], [`noise`], [`settings`], [`instruction_set`], [`tally`]: definitions that the whole
-//! engine shares.
+//!   engine shares.
 //! - [`simd`]: vectors of each instruction set.
 //! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
 //! - [`cells`]: the particles in the order of cells.

@@ -1,7 +1,6 @@
 //! Error messages for people: what is wrong, where (with the line of the file), and what to do.
 
 use super::Lost;
-use super::run::Unwritten;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
 use psidpd_dynamics::checkpoint::Caller;
@@ -10,10 +9,19 @@ use psidpd_experiments::ExperimentError;
 use psidpd_experiments::calibrate::CalibrateError;
 use psidpd_experiments::from_eos::FromEosError;
 use psidpd_experiments::sweep::SweepError;
+use psidpd_formats::files::WriteError;
 use std::path::PathBuf;
 
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;
+
+/// The error of a finished run whose results cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("the run in {} is finished, but {cause}", folder.display())]
+pub struct Unwritten {
+    pub folder: PathBuf,
+    pub cause: WriteError,
+}
 
 /// The error of a verb.
 #[derive(Debug)]

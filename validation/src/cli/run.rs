@@ -1,3 +1,4 @@
+use super::diagnostic::Unwritten;
 use super::inputs::Files;
 use super::say::{self, whoever_listens as say};
 use super::{Failure, Settings, Verdict, write_json};
@@ -6,7 +7,6 @@ use psidpd_core::engine::{Pool, Precision, processors};
 use psidpd_dynamics::run::FILES;
 use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::calibration;
-use psidpd_formats::files::WriteError;
 use psidpd_report::{Headline, Progress, headline, write_run_report};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
@@ -78,14 +78,6 @@ impl Arguments {
 pub fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
     let count = text.parse().map_err(|e| format!("{e}"))?;
     Pool::count(count).map_err(|e| e.to_string())
-}
-
-/// The error of a finished run whose results cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[error("the run in {} is finished, but {cause}", folder.display())]
-pub struct Unwritten {
-    folder: PathBuf,
-    cause: WriteError,
 }
 
 /// The content of the file of `--json`.

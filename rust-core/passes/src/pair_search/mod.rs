@@ -1,7 +1,7 @@
 //! Finds the pairs within the search cutoff, up to thirty-two i-particles of a column at a time:
 //!
 //! 1. [`cell_ranges`] computes in which cells of the five stencil columns each i-particle searches
-//! partners;
+//!    partners;
 //! 2. [`j_clusters`]: four or eight neighbouring i-particles form an i-cluster; the cell ranges of a cluster are cut into
 //!    j-clusters of sixteen particles;
 //! 3. [`distance_filter`]: each j-cluster is compared with its i-cluster in 16-bit fixed point, and the bits that remain
