@@ -582,8 +582,7 @@ psidpd_status psidpd_engine_map_kinds(struct psidpd_engine *engine,
  * # Safety
  * `engine` is NULL or an engine that has not been freed.
  */
-psidpd_status psidpd_engine_sum_all_densities(struct psidpd_engine *engine,
-                                              int32_t all);
+psidpd_status psidpd_engine_sum_all_densities(struct psidpd_engine *engine, int32_t all);
 
 /**
  * First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
