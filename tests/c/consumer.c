@@ -332,7 +332,7 @@ static void check_paths(const psidpd_model *model)
     OK(psidpd_engine_second(engine, &request, f[1], NULL));
     for (k = 0; k < 3 * MANY; k++) CHECK(fabs(f[1][k] - f[0][k]) < 1e-8 * (1.0 + fabs(f[0][k])));
     i[0] = MANY;
-    FAILS(psidpd_engine_first_of_pairs(engine, &pairs, 1, &request), PSIDPD_STATUS_INVALID_ARGUMENT, "not there");
+    FAILS(psidpd_engine_first_of_pairs(engine, &pairs, 1, &request), PSIDPD_STATUS_INVALID_ARGUMENT, "does not exist");
 
     /* What cannot be. */
     request.want = 1u << 9;
