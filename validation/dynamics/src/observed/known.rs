@@ -103,6 +103,14 @@ fn the_tangential_pressure_is_the_mean_of_the_other_directions() {
         let volume: f64 = lengths.iter().product();
         assert!((mean("tangential") - 2.0 * 0.09 / others / volume).abs() < 1e-14, "{others}");
         assert!((mean("normal") - 3.0 * 0.16 / volume).abs() < 1e-14, "{others}");
+        // From the middle of one bin to the middle of the next the integral grows by half of each bin; a bin is 0.5 high.
+        let (integral, difference) =
+            (&out[0].get("integral").unwrap().values, &out[0].get("difference").unwrap().values);
+        assert!(difference.iter().any(|p| *p != 0.0));
+        for k in 1..10 {
+            let expected = 0.25 * (difference[k - 1] + difference[k]);
+            assert!((integral[k] - integral[k - 1] - expected).abs() < 1e-14, "{others}: {integral:?}");
+        }
     }
 }
 
@@ -128,6 +136,13 @@ fn correlations_of_few_particles_count_pairs_and_not_squares() {
     assert!(value(&shown.finish()[0], "s").abs() < 1e-12);
     shown.sample(|view| View { x: &[[0.0; 3], [4.0, 0.0, 0.0]], ..view });
     assert!((value(&shown.finish()[0], "s") - 1.0).abs() < 1e-12);
+    // Two particles of A and one of B at one point: S = N, S_AA = N_A, S_BB = N_B and S_AB = √(N_A N_B).
+    let mut shown = Shown::new(IDEAL_MIXTURE, 1.0, &[4.0, 3.0, 3.0], &[[0.0; 3]; 3], &observe);
+    shown.sample(|view| View { species: &[0, 0, 1], ..view });
+    let out = shown.finish();
+    for (column, expected) in [("s", 3.0), ("s_A_A", 2.0), ("s_A_B", 2f64.sqrt()), ("s_B_B", 1.0)] {
+        assert!((value(&out[0], column) - expected).abs() < 1e-12, "{column}: {out:?}");
+    }
 }
 
 /// A particle that went round the box along its second edge is displaced by that edge, tilt included.
@@ -210,10 +225,11 @@ fn the_density_of_a_slab_is_that_of_its_middle() {
     assert!(fit.liquid - middle > 4.0 * liquid.error, "{fit:?} {middle} {liquid:?}");
 }
 
-/// The configurational pressure of a pair of soft spheres is NkT/V + r F/(3V), whatever their velocities.
+/// The configurational pressure of a pair of soft spheres is NkT/V + r F/(3V), whatever their velocities. A frozen particle out
+/// of their range does not count in N.
 #[test]
 fn the_pressure_of_configurations_leaves_velocities_out() {
-    let x = [[1.0, 2.0, 2.0], [1.8, 2.0, 2.0]];
+    let x = [[1.0, 2.0, 2.0], [1.8, 2.0, 2.0], [1.0, 2.0, 4.5]];
     let mut shown = Shown::new(SOFT, 1.5, &[4.0, 4.0, 5.0], &x, "pressure = true");
     let flux = Flux::default();
     // `½ Σ m v² = 7` adds 14/V to the trace, and the virial is r F = 0.8 · 25 · 0.2.
@@ -224,8 +240,61 @@ fn the_pressure_of_configurations_leaves_velocities_out() {
         kinetic_energy: 7.0,
         pressure: [9.0; 6],
         conservative_pressure: conservative,
+        frozen: &[false, false, true],
         ..view
     });
     let found = value(&shown.finish()[0], "configurational");
     assert!((found - (2.0 * 1.5 + 4.0 / 3.0) / 80.0).abs() < 1e-12, "{found}");
+}
+
+/// Particles of masses 1 and 3 with velocities (2, 0, 0) and (−1, 1, 0) have the momentum (−1, 3, 0) and Σ m v² = 10. The flow
+/// has 10/4 of that sum, and the rest is dNkT. A frozen particle counts in neither, whatever its velocity.
+#[test]
+fn flow_and_temperature_know_masses_and_frozen_particles() {
+    let v = [[2.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [7.0, 7.0, 7.0]];
+    let show = |observe: &str| {
+        let mut shown = Shown::new(IDEAL_MIXTURE, 1.0, &[4.0; 3], &[[1.0; 3]; 3], observe);
+        for _ in 0..3 {
+            shown.sample(|view| View {
+                v: &v,
+                species: &[0, 1, 1],
+                masses: &[1.0, 3.0],
+                frozen: &[false, false, true],
+                ..view
+            });
+        }
+        shown.finish().remove(0)
+    };
+    let flow = show("velocity_profile = { bins = 1 }");
+    for (column, expected) in [("velocity_x", -0.25), ("velocity_y", 0.75), ("velocity_z", 0.0)] {
+        assert!((value(&flow, column) - expected).abs() < 1e-14, "{flow:?}");
+    }
+    let temperature = show("temperature_profile = { bins = 1 }");
+    assert!((value(&temperature, "temperature") - 7.5 / 6.0).abs() < 1e-14, "{temperature:?}");
+}
+
+/// The trace of the pressure tensor times the volume, summed over all shells around a drop, is r·F of the one force there is.
+#[test]
+fn the_pressures_around_a_drop_have_the_trace_of_the_force() {
+    let flux = Flux {
+        drag: vec![Line { from: [3.0, 3.5, 3.0], d: [0.5, 0.0, 0.0], f: [2.0, 0.0, 0.0] }],
+        ..Flux::default()
+    };
+    let cases: [(&str, &[f64], f64); 2] = [(FLAT, &[6.0; 2], 1.0), (IDEAL, &[6.0; 3], 2.0)];
+    for (model, lengths, others) in cases {
+        let volume = |r: f64| if others == 1.0 { PI * r * r } else { 4.0 / 3.0 * PI * r.powi(3) };
+        let observe = "drop = { distance = 0.5, range = 3.0, bins = 30 }";
+        let z = if others == 1.0 { 0.0 } else { 3.0 };
+        let mut shown = Shown::new(model, 1.0, lengths, &[[3.0, 3.0, z]], observe);
+        shown.sample(|view| View { flux: Some(&flux), ..view });
+        let profile = &shown.finish()[1];
+        let (normal, tangential) = (profile.get("normal").unwrap(), profile.get("tangential").unwrap());
+        let trace: f64 = (0..30)
+            .map(|k| {
+                let shell = volume(0.1 * (k + 1) as f64) - volume(0.1 * k as f64);
+                shell * (normal.values[k] + others * tangential.values[k])
+            })
+            .sum();
+        assert!((trace - 1.0).abs() < 1e-10, "{others}: {trace}");
+    }
 }
