@@ -134,3 +134,24 @@ impl State {
 pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -> Result<(), FormatError> {
     DataFile { names: species.to_vec(), ..state.to_data_by_tag(title) }.write(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::IDEAL;
+
+    /// LAMMPS's edges are (lx, 0, 0), (xy, ly, 0) and (xz, yz, lz).
+    #[test]
+    fn the_edges_of_a_tilted_box_are_those_of_lammps() {
+        let text = "t\n\n1 atoms\n1 atom types\n\n1 5 xlo xhi\n0 6 ylo yhi\n0 7 zlo zhi\n1.5 -0.5 2 xy xz yz\n\nAtoms # atomic\n\n\
+                    1 1 2 3 4\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.data");
+        std::fs::write(&path, text).unwrap();
+        let model = Model::parse("m", IDEAL).unwrap();
+        let state = State::from_data(&DataFile::read(&path).unwrap(), &model).unwrap();
+        let edges = [0, 1, 2].map(|k| state.domain.edge(k));
+        assert_eq!(edges, [[4.0, 0.0, 0.0], [1.5, 6.0, 0.0], [-0.5, 2.0, 7.0]]);
+        assert_eq!((state.domain.origin(), state.x[0]), ([1.0, 0.0, 0.0], [2.0, 3.0, 4.0]));
+    }
+}
