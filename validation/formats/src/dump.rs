@@ -324,6 +324,27 @@ mod tests {
         DumpReader::new(text.as_bytes()).collect()
     }
 
+    /// A box of 4, 5 and 6 from (1, 2, 3): the bounds of LAMMPS hold all of its corners, of which xy and xz move those along x,
+    /// alone and together.
+    #[test]
+    fn bounds_of_tilted_boxes_hold_all_corners() {
+        for [xy, xz, yz] in [[1.5, 0.5, 2.0], [-1.5, -0.5, -2.0], [1.5, -0.5, 2.0], [-0.5, 1.5, 2.0f64]] {
+            let along_x = [0.0, xy, xz, xy + xz];
+            let least = |all: &[f64]| all.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = |all: &[f64]| all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let text = format!(
+                "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n0\nITEM: BOX BOUNDS xy xz yz pp pp pp\n{} {} {xy}\n{} {} {xz}\n\
+                 3 9 {yz}\nITEM: ATOMS id x y z\n",
+                1.0 + least(&along_x),
+                5.0 + most(&along_x),
+                2.0 + least(&[0.0, yz]),
+                7.0 + most(&[0.0, yz])
+            );
+            let frame = read_all(&text).unwrap().remove(0);
+            assert_eq!((frame.boxlo, frame.boxhi), ([1.0, 2.0, 3.0], [5.0, 7.0, 9.0]), "{text}");
+        }
+    }
+
     #[test]
     fn frames_of_any_columns() {
         let mut frames = read_all(TWO).unwrap();
