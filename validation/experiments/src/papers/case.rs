@@ -239,6 +239,23 @@ mod tests {
         assert!(of(1.99, 2.0).passes() && !of(2.01, 2.0).passes());
     }
 
+    /// Relative errors of a quotient add up by squares: (6 ± 0.3)/(3 ± 0.2) is 2 ± √(0.1² + (2/15)²) = 2 ± 1/6.
+    #[test]
+    fn both_errors_are_in_that_of_a_quotient() {
+        let found = ratio(Measured { value: 6.0, error: 0.3 }, Measured { value: 3.0, error: 0.2 });
+        assert!(found.value == 2.0 && (found.error - 1.0 / 6.0).abs() < 1e-15, "{found:?}");
+    }
+
+    /// Sixteen bins, of which four in the middle of each layer are averaged; bins that move together have the error of one.
+    #[test]
+    fn layers_have_the_error_of_a_bin() {
+        let at = |k: usize| Measured { value: if (4..12).contains(&k) { 3.0 } else { 1.0 }, error: 0.1 };
+        let profile: Vec<(f64, Measured)> = (0..16).map(|k| (k as f64, at(k))).collect();
+        let [other, this] = layers(&profile);
+        assert_eq!((other.value, this.value), (1.0, 3.0));
+        assert!((other.error - 0.1).abs() < 1e-15 && (this.error - 0.1).abs() < 1e-15, "{other:?} {this:?}");
+    }
+
     #[test]
     fn what_is_our_own_says_so() {
         let mut outcome = Outcome::default();
