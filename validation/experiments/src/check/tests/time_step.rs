@@ -36,6 +36,25 @@ fn an_ideal_gas_has_the_step_of_its_drag() {
     }
 }
 
+/// A gas at four times the temperature, with twice the drag and half the step, is the same gas in other units of time: its steps err
+/// as much, and a liquid of it would be as much too thin.
+#[test]
+fn units_of_energy_change_no_estimate() {
+    let of = |kt: f64, dt: f64, gamma: f64| {
+        let gas = format!("title = \"gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = {gamma}\nrange = 1\n");
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = {kt:?}\nseed = 7\nbox = 6.0\ndensity = 20.0\nsteps = 5\ndt = {dt}\n"
+        );
+        estimates(&scene(&gas, &text).unwrap()).unwrap().remove(0)
+    };
+    let (cold, hot) = (of(1.0, 0.01, 0.1), of(4.0, 0.005, 0.2));
+    assert!(
+        is_near(hot.drag, 2.0 * cold.drag, 1e-3) && is_near(hot.carried, cold.carried, 1e-3),
+        "{cold:?} {hot:?}"
+    );
+    assert!(is_near(hot.thinner.unwrap(), cold.thinner.unwrap(), 1e-3), "{cold:?} {hot:?}");
+}
+
 /// Standard DPD and Warren's set 6, whose ω and κ are 6.3 and 2.2, 18.3 and 22.5 in equilibrium; the sample of the first, not quite
 /// settled, has 6.1 and 2.3. Of velocity Verlet's errors the carried pressure, of a root in Δt, decides; of the
 /// fourth-order step both are 0.006 (ωΔt)⁴.
