@@ -50,7 +50,6 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::settings::{Precision, Settings};
 use round::Round;
-use sequential::{Order, lowe_andersen, ornstein_uhlenbeck, shardlow};
 
 /// The rule that changes velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -205,10 +204,9 @@ impl PairThermostat {
         match update {
             Update::Midpoint => self.implicit(pool, v, true),
             Update::ImplicitDrag => self.implicit(pool, v, false),
-            Update::OrnsteinUhlenbeck => self.in_turn(pool, v, ornstein_uhlenbeck, Order::Forward, false),
-            Update::Shardlow { reversed: false } => self.in_turn(pool, v, shardlow, Order::Forward, false),
-            Update::Shardlow { reversed: true } => self.in_turn(pool, v, shardlow, Order::Reversed, false),
-            Update::LoweAndersen => self.in_turn(pool, v, lowe_andersen, Order::Forward, true),
+            Update::OrnsteinUhlenbeck => self.ornstein_uhlenbeck(pool, v),
+            Update::Shardlow { reversed } => self.shardlow(pool, v, reversed),
+            Update::LoweAndersen => self.lowe_andersen(pool, v),
         }
     }
 

@@ -15,7 +15,7 @@ use psidpd_passes::noise::Law;
 
 /// The order in which the pairs come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
+enum Order {
     Forward,
     Reversed,
 }
@@ -85,8 +85,24 @@ struct Share<'a> {
 }
 
 impl PairThermostat {
+    /// Updates all pairs in turn by [`ornstein_uhlenbeck`].
+    pub(super) fn ornstein_uhlenbeck(&mut self, pool: &Pool, v: &mut [[f64; 3]]) -> [f64; 6] {
+        self.in_turn(pool, v, ornstein_uhlenbeck, Order::Forward, false)
+    }
+
+    /// Updates all pairs in turn by [`shardlow`].
+    pub(super) fn shardlow(&mut self, pool: &Pool, v: &mut [[f64; 3]], reversed: bool) -> [f64; 6] {
+        let order = if reversed { Order::Reversed } else { Order::Forward };
+        self.in_turn(pool, v, shardlow, order, false)
+    }
+
+    /// Updates all pairs in turn by [`lowe_andersen`].
+    pub(super) fn lowe_andersen(&mut self, pool: &Pool, v: &mut [[f64; 3]]) -> [f64; 6] {
+        self.in_turn(pool, v, lowe_andersen, Order::Forward, true)
+    }
+
     /// Applies a rule to all pairs in turn; `draws` where it asks for a chance.
-    pub(super) fn in_turn(
+    fn in_turn(
         &mut self,
         pool: &Pool,
         v: &mut [[f64; 3]],
