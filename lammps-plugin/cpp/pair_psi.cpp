@@ -19,7 +19,6 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
-#include <thread>
 
 using namespace LAMMPS_NS;
 using namespace psidpd;
@@ -217,9 +216,10 @@ void PairPsi::advise()
   if (lmp->suffix_enable)
     warn("there is no accelerated variant: the suffix has no effect on it; it has the keywords 'precision mixed' and "
          "'threads'");
-  const size_t here = std::thread::hardware_concurrency();
-  if (here > 0 && threads > here)
-    warn("threads " + std::to_string(threads) + " is more than the " + std::to_string(here) + " processors here");
+  const size_t used = (*style)->threads();
+  if (used < threads)
+    warn("threads " + std::to_string(threads) + " is more than the processors that this process may use: " +
+         std::to_string(used) + " run, with the same results");
 }
 
 std::string PairPsi::search()

@@ -142,6 +142,7 @@ mod ffi {
         fn noise_range(self: &Style) -> f64;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
+        fn threads(self: &Style) -> usize;
         /// Sets the pairs with reduced strength for all later evaluations, unless LAMMPS lists the pairs.
         fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
         /// Sets excluded pairs by two words for each atom and ghost, the members of `Mark`; an empty slice excludes none.

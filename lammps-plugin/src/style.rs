@@ -8,7 +8,7 @@ use crate::units::Scale;
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
     Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool, Precision, Reason,
-    Request, Settings, Step, Surroundings, Tally, Want,
+    Request, Settings, Step, Surroundings, Tally, Want, at_once,
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
@@ -110,14 +110,14 @@ impl Style {
         Ok(())
     }
 
-    /// Sets the precision, mixed or double, and the number of threads.
+    /// Sets the precision, mixed or double, and the number of threads, of which there are at most as many as processors.
     ///
     /// # Errors
     /// Fails for zero or too many threads, and as [`Style::set_temperature`].
     pub fn configure(&mut self, mixed: bool, threads: usize) -> Result<(), StyleError> {
         guard(|| {
             let precision = if mixed { Precision::Mixed } else { Precision::Double };
-            let threads = Pool::count(threads)?;
+            let threads = at_once(Pool::count(threads)?);
             if (precision, threads) == (self.settings.precision, self.settings.threads) {
                 return Ok(());
             }
@@ -127,6 +127,11 @@ impl Style {
             self.settings = Settings { precision, threads, ..self.settings };
             self.rebuild()
         })
+    }
+
+    /// The number of threads that run.
+    pub fn threads(&self) -> usize {
+        self.settings.threads.get()
     }
 
     pub fn model(&self) -> &Model {

@@ -5,7 +5,7 @@ use crate::errors::{RunStoppedError, exception, wrong};
 use crate::model::Model;
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use psidpd_core::engine::{self, Evaluated, PeriodicBox, Pool, Precision, Settings, check_reach};
+use psidpd_core::engine::{self, Evaluated, PeriodicBox, Pool, Precision, Settings, at_once, check_reach};
 use psidpd_core::model::Fluid;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -242,7 +242,7 @@ pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
 /// # Errors
 /// The function fails for zero threads and for more threads than are allowed.
 pub fn thread_count(threads: usize) -> PyResult<NonZeroUsize> {
-    Pool::count(threads).map_err(|e| wrong(e.to_string()))
+    Pool::count(threads).map(at_once).map_err(|e| wrong(e.to_string()))
 }
 
 fn directions(given: Option<Vec<bool>>, dimensions: usize) -> PyResult<[bool; 3]> {

@@ -104,6 +104,11 @@ fn more_than_a_machine_has_is_refused_with_a_number() {
     scene("1");
     let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "o", "--threads", "20000"]));
     assert!(code == Some(2) && text.contains("from 1 to 1024"), "{text}");
+    // Threads that would have to take turns on the processors are not made.
+    let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "few", "--threads", "1000"]));
+    let processors = std::thread::available_parallelism().unwrap().get();
+    assert!(code == Some(0) && text.contains("1000 threads are more than the processors"), "{text}");
+    assert!(text.contains(&format!(": {processors} run, with the same results")), "{text}");
     for (range, times) in [("20", "5.0 times"), ("1e6", "250000.0 times")] {
         scene(range);
         let begun = Instant::now();

@@ -52,7 +52,7 @@ pub use psidpd_passes::domain::{DomainError, PeriodicBox};
 pub use psidpd_passes::noise;
 pub use psidpd_passes::settings::{Instructions, Precision, Settings};
 pub use psidpd_passes::tally::{Tally, Want};
-pub use psidpd_threads::processors;
+pub use psidpd_threads::{at_once, processors};
 pub use reach::{ReachError, check_reach};
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, ThreadCount, Times, part};

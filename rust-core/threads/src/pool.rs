@@ -293,6 +293,12 @@ pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(usize::MAX, NonZeroUsize::get)
 }
 
+/// As many of `threads` as there are processors for: more would take turns, and results do not depend on their number.
+#[must_use]
+pub fn at_once(threads: NonZeroUsize) -> NonZeroUsize {
+    NonZeroUsize::new(processors()).map_or(threads, |processors| threads.min(processors))
+}
+
 /// The part of `count` things that thread `number` of `threads` does.
 #[inline]
 pub fn part(count: usize, number: usize, threads: usize) -> std::ops::Range<usize> {

@@ -1,5 +1,5 @@
 use super::inputs::Files;
-use super::run::thread_count;
+use super::run::threads_at_once;
 use super::say::{self, say};
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
@@ -55,7 +55,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads that share the work.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
     /// Where the model file with its correction goes.
     #[arg(long, value_name = "FILE")]

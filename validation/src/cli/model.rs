@@ -1,4 +1,4 @@
-use super::run::thread_count;
+use super::run::threads_at_once;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_experiments::bulk::Sampling;
@@ -47,7 +47,7 @@ pub struct FromEos {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads that share the work.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
     /// Where the model file goes.
     #[arg(long, value_name = "FILE")]

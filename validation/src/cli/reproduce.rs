@@ -1,4 +1,4 @@
-use super::run::thread_count;
+use super::run::threads_at_once;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::Fault;
@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
     out: PathBuf,
     /// Threads of each run.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
     /// Tests use this fault in the engine.
     #[arg(skip)]

@@ -3,7 +3,7 @@ use super::inputs::Files;
 use super::say::{self, whoever_listens as say};
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::document::printable;
-use psidpd_core::engine::{Pool, Precision, processors};
+use psidpd_core::engine::{Pool, Precision, at_once};
 use psidpd_dynamics::run::FILES;
 use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::calibration;
@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long)]
     overwrite: bool,
     /// Threads that share the work; what a run writes does not depend on their number.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
     /// In what the forces of pairs are computed; as the scene says if left out, or else mixed.
     #[arg(long, value_parser = precision, value_name = "mixed|double")]
@@ -74,7 +74,19 @@ impl Arguments {
     }
 }
 
-/// Parses a number of threads.
+/// Parses a number of threads, of which there are at most as many as processors, with a warning.
+pub fn threads_at_once(text: &str) -> Result<NonZeroUsize, String> {
+    let asked = thread_count(text)?;
+    let used = at_once(asked);
+    if used < asked {
+        warn(&format!(
+            "{asked} threads are more than the processors this process may use: {used} run, with the same results"
+        ));
+    }
+    Ok(used)
+}
+
+/// Parses a number of threads or of runs side by side.
 pub fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
     let count = text.parse().map_err(|e| format!("{e}"))?;
     Pool::count(count).map_err(|e| e.to_string())
@@ -103,12 +115,6 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         _ => Begin::New,
     };
     let mut runner = Runner::begin(&scene, out, begin)?;
-    if threads.get() > processors() {
-        warn(&format!(
-            "{threads} threads on {} processors: more threads than processors make a run slower",
-            processors()
-        ));
-    }
     runner.set_threads(*threads)?;
     // Before this line a signal ends the program at once, because nothing can be lost yet.
     let stop = watch_signals()?;

@@ -1,5 +1,5 @@
 use super::inputs::Files;
-use super::run::{quoted, thread_count, watch_signals};
+use super::run::{quoted, thread_count, threads_at_once, watch_signals};
 use super::say::{self, say};
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_experiments::sweep::{self, Axis, Options};
@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = thread_count)]
     jobs: Option<NonZeroUsize>,
     /// Threads of each run.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
     /// Start over where runs are, finished or not.
     #[arg(long)]

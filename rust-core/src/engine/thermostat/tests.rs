@@ -160,10 +160,9 @@ fn ready(model: &str, kt: f64, cloud: &Cloud, pool: &Pool) -> PairThermostat {
     thermostat
 }
 
-/// Drag, summed over all pairs.
-fn plain_drag(model: &str, cloud: &Cloud) -> Vec<[f64; 3]> {
+/// Visits every pair with drag once: `i`, `j`, the direction `(r_i − r_j)/r` and the strength `γ w²` of the drag.
+fn for_each_pair(model: &str, cloud: &Cloud, mut visit: impl FnMut(usize, usize, [f64; 3], f64)) {
     let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
-    let mut force = vec![[0.0; 3]; cloud.x.len()];
     for i in 0..cloud.x.len() {
         for j in 0..i {
             let pair = cloud.species[i] as usize * fluid.species.len() + cloud.species[j] as usize;
@@ -174,14 +173,26 @@ fn plain_drag(model: &str, cloud: &Cloud) -> Vec<[f64; 3]> {
                 continue;
             }
             let w = (1.0 - r / law.range).powf(law.exponent);
-            let along: f64 = (0..3).map(|c| d[c] / r * (cloud.v[i][c] - cloud.v[j][c])).sum();
-            for c in 0..3 {
-                let f = -law.gamma * w * w * along * d[c] / r;
-                force[i][c] += f;
-                force[j][c] -= f;
-            }
+            visit(i, j, d.map(|d| d / r), law.gamma * w * w);
         }
     }
+}
+
+/// The velocity of `i` relative to `j` along a direction.
+fn approach(cloud: &Cloud, i: usize, j: usize, e: [f64; 3]) -> f64 {
+    (0..3).map(|c| e[c] * (cloud.v[i][c] - cloud.v[j][c])).sum()
+}
+
+/// Drag, summed over all pairs.
+fn plain_drag(model: &str, cloud: &Cloud) -> Vec<[f64; 3]> {
+    let mut force = vec![[0.0; 3]; cloud.x.len()];
+    for_each_pair(model, cloud, |i, j, e, drag| {
+        let along = approach(cloud, i, j, e);
+        for c in 0..3 {
+            force[i][c] -= drag * along * e[c];
+            force[j][c] += drag * along * e[c];
+        }
+    });
     force
 }
 
@@ -194,6 +205,42 @@ fn every_pair_in_range_drags_once() {
         thermostat.add_forces(&pool, &cloud.v, true, false, &mut force);
         for (f, g) in force.iter().flatten().zip(plain_drag(model, &cloud).iter().flatten()) {
             assert!((f - g).abs() < rounding(&cloud) * (1.0 + g.abs()), "cloud {number}: {f} {g}");
+        }
+    }
+}
+
+/// kT is `Σ D μ u²/Σ D` over the pairs that drag, and the rate `2 Σ D/μ` over the degrees of freedom; the reduced mass `μ` of
+/// a pair with a frozen particle is the mass of the other one.
+#[test]
+fn the_temperature_of_pairs_knows_their_masses() {
+    for (number, (model, mut cloud)) in clouds().into_iter().enumerate() {
+        cloud.mass.iter_mut().for_each(|mass| *mass *= 3.0);
+        if number % 2 == 1 {
+            cloud.frozen = (0..cloud.x.len()).map(|k| k % 5 == 0).collect();
+        }
+        let thermostat = ready(model, 1.0, &cloud, &pool(2));
+        let (mut squares, mut drags, mut rates) = (0.0, 0.0, 0.0);
+        for_each_pair(model, &cloud, |i, j, e, drag| {
+            let inverse = 1.0 / cloud.mass_of(i) + 1.0 / cloud.mass_of(j);
+            if inverse > 0.0 {
+                squares += drag * approach(&cloud, i, j, e).powi(2) / inverse;
+                drags += drag;
+                rates += 2.0 * drag * inverse;
+            }
+        });
+        let dimensions = if model == FLAT { 2 } else { 3 };
+        let moving = (0..cloud.x.len()).filter(|k| cloud.mass_of(*k).is_finite()).count();
+        match thermostat.warmth(&cloud.v) {
+            None => assert_eq!(drags, 0.0, "cloud {number}"),
+            Some(Warmth { kt, rate }) => {
+                let expected = [squares / drags, rates / (dimensions * moving) as f64];
+                for (found, expected) in [kt, rate].into_iter().zip(expected) {
+                    assert!(
+                        (found / expected - 1.0).abs() < rounding(&cloud),
+                        "cloud {number}: {found} {expected}"
+                    );
+                }
+            }
         }
     }
 }

@@ -1,8 +1,10 @@
 //! A step equals its formulas to the last bit, particle by particle.
 
 use super::*;
+use crate::checkpoint::Thermo;
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_observe::flux::Flux;
 
 /// A fluid of two masses, whose number of particles is not a multiple of four.
 fn start(masses: [f64; 2], edges: Matrix3<f64>) -> (Model, State) {
@@ -91,6 +93,48 @@ fn steps_in_a_row_are_steps_one_by_one() {
         }
         assert!(single.state() == row.state() && single.forces() == row.forces());
     }
+}
+
+/// The pressure of an ideal gas of two masses is `Σ m v ⊗ v/V`: in the totals, and in the flux of a step with the velocities
+/// that moved the particles.
+#[test]
+fn momentum_is_carried_by_mass() {
+    let (model, state) = start([1.0, 2.5], Matrix3::new(4.0, 0.3, 0.0, 0.0, 4.0, -0.2, 0.0, 0.0, 4.0));
+    let mut run = Simulation::new(&model, 1.0, state, 7).unwrap();
+    let carried = |run: &Simulation, v: &[[f64; 3]]| {
+        [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|(a, b)| {
+            let term = |k: usize| run.masses()[run.species()[k] as usize] * v[k][a] * v[k][b];
+            (0..run.len()).map(term).sum::<f64>()
+        })
+    };
+    let same = |found: [f64; 6], expected: [f64; 6]| {
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-10 * (1.0 + expected.abs()), "{found} {expected}");
+        }
+    };
+    let dt = 1e-3;
+    run.record_flux(true);
+    run.prepare(dt, Want::TOTALS).unwrap();
+    let before: Vec<[f64; 3]> = run.velocities().to_vec();
+    let pulls = run.forces().to_vec();
+    run.step(dt, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
+    let moved: Vec<[f64; 3]> = (0..run.len())
+        .map(|k| {
+            let mass = run.masses()[run.species()[k] as usize];
+            std::array::from_fn(|c| before[k][c] + 0.5 * dt / mass * pulls[k][c])
+        })
+        .collect();
+    let flux = run.flux().unwrap();
+    same(Flux { ways: flux.ways.clone(), ..Flux::default() }.sum(), carried(&run, &moved));
+    let volume = run.domain().volume(3);
+    let ends = carried(&run, run.velocities()).map(|sum| sum / volume);
+    same(run.conservative_pressure_tensor(), ends);
+    let drag: [f64; 6] = std::array::from_fn(|c| run.pressure_tensor()[c] - ends[c]);
+    assert!(drag.iter().any(|c| *c != 0.0));
+    let totals = Thermo::of(&run, 0.0);
+    assert!((totals.pressure - (totals.tensor[0] + totals.tensor[1] + totals.tensor[2]) / 3.0).abs() < 1e-12);
+    assert!((totals.conservative_pressure - (ends[0] + ends[1] + ends[2]) / 3.0).abs() < 1e-10);
+    assert!((totals.kinetic - 0.5 * volume * (ends[0] + ends[1] + ends[2])).abs() < 1e-9);
 }
 
 /// Counts of boxes are limited to 2³¹: a particle farther away is refused, not counted wrong.
