@@ -20,14 +20,16 @@ pub enum Verb {
         #[arg(long, value_name = "WHERE")]
         lammps: Option<PathBuf>,
     },
-    /// Rewrite a script for the built-in `mdpd` to the pair style mdpd/psi, and say what was changed and what was left.
+    /// Rewrite a script for the built-in `mdpd`, and the files that it includes, to the pair style mdpd/psi.
+    ///
+    /// It says what was changed, what to look at, and what to rewrite by hand; the exit code is 1 where there is any of the last.
     Convert {
         /// The script.
         script: PathBuf,
         /// The force law: Warren's, or the built-in's own.
         #[arg(long, value_enum, default_value_t = Law::Conservative)]
         law: Law,
-        /// Where the new script is written; data files come beside it. Default: the script to standard output.
+        /// Where the new script is written; included files and data files come beside it. Default: the script to standard output.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
         /// Replace files that are there already.
@@ -94,12 +96,23 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             if out.is_none() {
                 say::bytes(new.script.as_bytes());
             }
-            for (what, notes) in [("changed", &new.changed), ("look at", &new.left)] {
+            for (what, notes) in
+                [("changed", &new.changed), ("look at", &new.left), ("by hand", &new.by_hand)]
+            {
                 for note in notes {
-                    eprintln!("{what:8} line {:4}: {}", note.line, printable(&note.text));
+                    let file =
+                        note.file.as_ref().map_or(String::new(), |file| format!(" of {}", printable(file)));
+                    eprintln!("{what:8} line {:4}{file}: {}", note.line, printable(&note.text));
                 }
             }
-            write_json(json, &json!({"files": files, "changed": new.changed, "left": new.left}))?;
+            let by_hand = &new.by_hand;
+            write_json(
+                json,
+                &json!({"files": files, "changed": new.changed, "left": new.left, "by_hand": by_hand}),
+            )?;
+            if !by_hand.is_empty() {
+                return Ok(Verdict::CheckFailed);
+            }
         }
     }
     Ok(Verdict::Good)

@@ -1,0 +1,89 @@
+//! Data files for `atom_style mdpd`.
+
+use super::Note;
+use psidpd_formats::text::{Problem, TextError};
+use std::fmt;
+
+/// A data file with a column for densities, under its old name, and where the script reads it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DataFile {
+    pub name: String,
+    pub column: Column,
+    pub note: Note,
+}
+
+/// The place of the density in an atom's line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Column {
+    /// `id type rho x y z`, of `atom_style mdpd`.
+    Third,
+    /// `id type x y z … rho …`, of a hybrid: the number of columns before it.
+    Behind(usize),
+}
+
+impl Column {
+    /// The column of `atom_style hybrid` with these styles, or `None` if a style before mdpd has unknown columns.
+    pub fn of_hybrid(styles: &[&str]) -> Option<Column> {
+        // A column that two styles have occurs once.
+        let mut before: Vec<&str> = vec!["id", "type", "x", "y", "z"];
+        for style in styles.iter().take_while(|style| **style != "mdpd") {
+            let columns: &[&str] = match *style {
+                "atomic" => &[],
+                "bond" | "angle" | "molecular" => &["molecule"],
+                "charge" => &["q"],
+                "full" => &["molecule", "q"],
+                "sphere" => &["diameter", "density"],
+                "dipole" => &["q", "mux", "muy", "muz"],
+                _ => return None,
+            };
+            before.extend(columns.iter().filter(|column| !before.contains(column)).collect::<Vec<_>>());
+        }
+        Some(Column::Behind(before.len()))
+    }
+
+    fn index(self) -> usize {
+        match self {
+            Column::Third => 2,
+            Column::Behind(count) => count,
+        }
+    }
+}
+
+impl fmt::Display for Column {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "column {}", self.index() + 1)
+    }
+}
+
+/// Takes the density out of the atoms of a data file, and its style's name out of the title of the section.
+///
+/// # Errors
+/// An atom has too few columns.
+pub fn data_file(old: &str, column: Column) -> Result<String, TextError> {
+    let mut new = String::new();
+    let mut atoms = false;
+    let least = 6.max(column.index() + 1);
+    for (k, line) in old.split_inclusive('\n').enumerate() {
+        let code = line.split('#').next().unwrap_or_default();
+        let words: Vec<&str> = code.split_whitespace().collect();
+        match words.first() {
+            // A section begins with a word, an atom line with a number.
+            Some(word) if word.starts_with(char::is_alphabetic) => {
+                atoms = words == ["Atoms"];
+                let style = line.split_once('#').map_or("", |(_, style)| style.trim());
+                new += if atoms && style == "mdpd" { "Atoms # atomic\n" } else { line };
+            }
+            Some(_) if atoms => {
+                if words.len() < least {
+                    let expected = format!("at least {least}, as the atom style has them");
+                    return Err(Problem::Columns { expected, found: words.len() }.at(k + 1));
+                }
+                let (before, after) = words.split_at(column.index());
+                new += &[before, &after[1..]].concat().join(" ");
+                new.push('\n');
+            }
+            _ => new += line,
+        }
+    }
+    Ok(new)
+}

@@ -1,0 +1,162 @@
+//! Tests.
+
+use super::data::{Column, data_file};
+use super::*;
+
+/// Converts a script that includes nothing.
+fn converted(old: &str, law: Law, plugin: &str) -> Converted {
+    script(old, law, plugin, &|_| None)
+}
+
+const OLD: &str = "# a slab\nunits lj\natom_style  mdpd\ncomm_modify vel yes\nread_data   slab.data\n\
+    set type 1 sph/rho 0.0\n\
+    pair_style  hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 9872598  # both\n\
+    pair_coeff  1 1 mdpd/rhosum  0.75\npair_coeff  1 1 mdpd &\n  -40 25 18.0 1.0 0.75\n\
+    fix mvv all mvv/dpd\nprint \"\"\"atom_style mdpd\nfix x all mvv/dpd\n\"\"\"\nrun 10\n";
+
+fn texts(notes: &[Note]) -> String {
+    notes.iter().map(|n| format!("{}: {}\n", n.line, n.text)).collect()
+}
+
+#[test]
+fn only_what_knows_of_the_built_in_is_changed() {
+    let new = converted(OLD, Law::Lucy, "psidpdplugin.so");
+    assert_eq!(
+        new.script,
+        "# a slab\nunits lj\natom_style  atomic\ncomm_modify vel yes\nread_data   slab.data.atomic\n\
+         plugin      load psidpdplugin.so\n\
+         pair_style  mdpd/psi 1.0 1.0 9872598 law lucy  # both\n\
+         pair_coeff  1 1 -40 25 18.0 1.0 0.75\n\
+         fix mvv all nve\nprint \"\"\"atom_style mdpd\nfix x all mvv/dpd\n\"\"\"\nrun 10\n"
+    );
+    assert_eq!(new.left, []);
+    assert_eq!(new.changed.iter().map(|n| n.line).collect::<Vec<_>>(), [3, 5, 6, 7, 8, 9, 11]);
+    assert_eq!(new.by_hand, []);
+    assert!(new.data.len() == 1 && new.data[0].name == "slab.data" && new.data[0].column == Column::Third);
+    let conservative = converted(OLD, Law::Conservative, "p.so");
+    assert!(conservative.script.contains("mdpd/psi 1.0 1.0 9872598  #"));
+    assert!(texts(&conservative.left).contains("another fluid"));
+}
+
+#[test]
+fn other_styles_stay_beside() {
+    let new = converted(
+        "atom_style hybrid mdpd bond\npair_style hybrid/overlay mdpd 1 1 $s mdpd/rhosum lj/cut 2.5\n\
+         pair_coeff * * mdpd/rhosum 0.8\npair_coeff * * mdpd -40 25 18 1 0.75\npair_coeff 1 1 lj/cut 1 1\n",
+        Law::Lucy,
+        "p.so",
+    );
+    assert_eq!(
+        new.script,
+        "atom_style hybrid bond\ncomm_modify vel yes\nplugin     load p.so\npair_style hybrid/overlay mdpd/psi 1 1 $s law lucy lj/cut 2.5\n\
+         pair_coeff * * mdpd/psi -40 25 18 1 0.75\npair_coeff 1 1 lj/cut 1 1\n"
+    );
+    let left = texts(&new.left);
+    for said in ["densities of the step before", "had the range 0.8, forces 0.75"] {
+        assert!(left.contains(said), "{said}: {left}");
+    }
+    assert!(texts(&new.changed).contains("2: the thermostat needs velocities of ghosts"));
+}
+
+#[test]
+fn what_is_left_is_said() {
+    let old = "units si\natom_style mdpd\nread_data $f\nread_restart r\ncompute n all property/atom rho\n\
+        pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n\
+        pair_coeff 1 2 mdpd -40 20 18 1 0.75\nfix 1 all mvv/dpd 0.65\npair_modify pair mdpd shift no\n";
+    let new = converted(old, Law::Conservative, "p.so");
+    assert!(texts(&new.left).contains("9: mvv/dpd had lambda = 0.65"));
+    let by_hand = texts(&new.by_hand);
+    for said in [
+        "1: the style works in units lj, real and metal",
+        "3: a variable has the data file: take the density out of its atoms, column 3",
+        "4: a restart file",
+        "5: there is no property rho",
+        "10: names the built-in style",
+        "6: B differs between types (25, 20)",
+    ] {
+        assert!(by_hand.contains(said), "{said}: {by_hand}");
+    }
+    let none = converted("units lj\npair_style dpd 1 1 5\n", Law::Lucy, "p.so");
+    assert_eq!(none.script, "units lj\npair_style dpd 1 1 5\n");
+    assert!(texts(&none.by_hand).contains("no pair style of the built-in"));
+    let half = converted("pair_style mdpd 1 1 5", Law::Lucy, "p.so");
+    assert_eq!(half.script, "pair_style mdpd 1 1 5");
+    assert!(texts(&half.by_hand).contains("belong together"));
+}
+
+#[test]
+fn the_column_of_densities_goes() {
+    let old = "title\n\n2 atoms\n1 atom types\n0 1 xlo xhi\n\nAtoms # mdpd\n\n1 1 0.0 0.1 0.2 0.3\n\
+        2 1 6.5 0.4 0.5 0.6 1 0 0 # last\n\nVelocities\n\n1 0 0 0\n";
+    assert_eq!(
+        data_file(old, Column::Third).unwrap(),
+        "title\n\n2 atoms\n1 atom types\n0 1 xlo xhi\n\nAtoms # atomic\n\n1 1 0.1 0.2 0.3\n\
+         2 1 0.4 0.5 0.6 1 0 0\n\nVelocities\n\n1 0 0 0\n"
+    );
+    assert_eq!(data_file("t\n\nAtoms\n\n1 1 0 0 0\n", Column::Third).unwrap_err().line, 5);
+    // Of a hybrid the columns of a style that comes first are before it.
+    for (styles, before) in [("mdpd bond", 5), ("bond mdpd", 6), ("bond full mdpd", 7), ("sphere mdpd", 7)] {
+        let styles: Vec<&str> = styles.split(' ').collect();
+        assert_eq!(Column::of_hybrid(&styles), Some(Column::Behind(before)), "{styles:?}");
+    }
+    assert_eq!(Column::of_hybrid(&["line", "mdpd"]), None);
+    let hybrid = "t\n\nAtoms # hybrid\n\n1 1 0.1 0.2 0.3 6.5 7 1 0 0\n";
+    let without = hybrid.replace("6.5 ", "");
+    assert_eq!(data_file(hybrid, Column::Behind(5)).unwrap(), without);
+    assert_eq!(data_file(&without, Column::Behind(9)).unwrap_err().line, 5);
+}
+
+/// Commands that name the built-in where they cannot be rewritten, with their lines.
+#[test]
+fn what_is_hidden_is_named() {
+    let style = "pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5\n";
+    for (old, said) in [
+        ("atom_style ${a}\n", "1: a variable has the style"),
+        ("pair_style ${p}\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n", "1: a variable has the style"),
+        ("pair_style ${p}\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n", "2: names the built-in style"),
+        ("variable p string \"hybrid/overlay mdpd/rhosum mdpd 1 1 5\"\n", "1: names the built-in style"),
+        ("run 1\nif \"1 > 0\" then \"fix 1 all mvv/dpd\" else 'run 1'\n", "2: names the built-in style"),
+        ("run 10 every 5 \"set group all sph/rho 0\"\n", "1: names the built-in style"),
+        ("include ${f}\n", "1: a variable has the included file"),
+        ("\ninclude none\n", "2: the included file cannot be read"),
+        ("atom_style hybrid line mdpd\nread_data d\n", "2: atoms of this hybrid have a column"),
+    ] {
+        let new = converted(&format!("{old}{style}"), Law::Lucy, "p.so");
+        assert!(texts(&new.by_hand).contains(said), "{said}: {new:?}");
+        assert!(new.script.contains(old.lines().last().unwrap()), "{said}: {}", new.script);
+    }
+    // Groups, regions and files may have any name.
+    let named =
+        "region mdpd block 0 1 0 1 0 1\ngroup mdpd region mdpd\nfix 2 mdpd nve\ndump 1 mdpd atom 9 mdpd/f\n";
+    assert_eq!(converted(&format!("{named}{style}"), Law::Lucy, "p.so").by_hand, []);
+}
+
+/// Files that a script includes are converted as if they were in it, each once.
+#[test]
+fn included_files_are_converted() {
+    let read = |name: &str| match name {
+        "set/fluid.in" => {
+            Some("pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5\ninclude more.in\n".to_owned())
+        }
+        "more.in" => {
+            Some("pair_coeff * * mdpd/rhosum 0.75\npair_coeff * * mdpd -40 25 18 1 0.75\n".to_owned())
+        }
+        "other.in" => Some("include other.in\nthermo 10\n".to_owned()),
+        _ => None,
+    };
+    let old = "atom_style mdpd\ninclude set/fluid.in\ninclude \"set/fluid.in\"\ninclude other.in\nfix 1 all mvv/dpd\n";
+    let new = script(old, Law::Lucy, "p.so", &read);
+    assert_eq!(
+        new.script,
+        "atom_style atomic\ninclude fluid.in.psi\ninclude fluid.in.psi\ninclude other.in\nfix 1 all nve\n"
+    );
+    let fluid = "comm_modify vel yes\nplugin     load p.so\npair_style mdpd/psi 1 1 5 law lucy\ninclude more.in.psi\n";
+    let files = [("set/fluid.in", fluid), ("more.in", "pair_coeff * * -40 25 18 1 0.75\n")];
+    for (name, text) in files {
+        assert!(new.included.contains(&(name.to_owned(), text.to_owned())), "{name}: {:?}", new.included);
+    }
+    assert_eq!(new.included.len(), 2);
+    let [circle] = &new.by_hand[..] else { panic!("{:?}", new.by_hand) };
+    assert!(circle.file.as_deref() == Some("other.in") && circle.line == 1, "{circle:?}");
+    assert!(new.changed.iter().any(|n| n.file.as_deref() == Some("more.in") && n.line == 2));
+}
