@@ -43,6 +43,7 @@ fn main() {
             "cpp/pair_dpd_spline.cpp",
             "cpp/fix_splitting.cpp",
             "cpp/fix_splitting_displaced.cpp",
+            "cpp/fix_splitting_held.cpp",
             "cpp/register.cpp",
         ])
         .include("cpp")

@@ -21,6 +21,7 @@
 #include "atom_vec.h"
 #endif
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -109,18 +110,17 @@ FixSplitting *FixSplitting::find(const Modify *modify)
 
 int FixSplitting::setmask()
 {
-  return INITIAL_INTEGRATE | FINAL_INTEGRATE;
+  return INITIAL_INTEGRATE | FINAL_INTEGRATE | PRE_FORCE;
 }
 
 PairPsi *FixSplitting::find_pair()
 {
   PairPsi *found = nullptr;
   for (const char *name : {"dpd/psi", "mdpd/psi", "dpd/spline"}) {
-    Pair *one = force->pair_match(name, 1, 0);
-    // A hybrid may contain one style several times.
-    if (!one) one = force->pair_match(name, 1, 1);
+    // A hybrid may contain a style several times: then its numbers count from 1.
+    Pair *one = force->pair_match(name, 1, 1);
     if (!one) continue;
-    if (found || (force->pair_match(name, 1, 2) && force->pair != one))
+    if (found || force->pair_match(name, 1, 2) != one)
       stop("uses the thermostat of one pair style, and the hybrid contains several");
     found = dynamic_cast<PairPsi *>(one);
   }
@@ -135,14 +135,23 @@ void FixSplitting::init()
   if (update->whichflag == 2) return;
   if (strcmp(update->integrate_style, "verlet") != 0)
     stop(std::string("works with 'run_style verlet' only, found '") + update->integrate_style + "'");
-  if (strcmp(update->unit_style, "lj") != 0)
-    stop(std::string("works with 'units lj' only, found 'units ") + update->unit_style + "'");
   const std::string why = pair->why_not_apart();
-  if (!why.empty()) stop(why + ": not supported with drag and noise apart from the forces");
+  if (!why.empty()) stop("cannot apply drag and noise here: " + why);
+  check_styles_beside();
   check_others();
 }
 
-// Stops at fixes that also move atoms, or that expect one evaluation of forces in each step.
+void FixSplitting::check_styles_beside()
+{
+  for (const char *known : {"^dpd$", "^dpd/tstat", "^dpd/ext", "^dpd/coul", "^dpd/fdt", "^dpd/gpu", "^dpd/intel", "^dpd/kk",
+                            "^dpd/omp", "^mdpd$", "^edpd", "^tdpd", "^brownian", "^gran"})
+    if (Pair *beside = force->pair_match(known, 0, 1))
+      stop(std::string("pair_style ") + force->pair_match_ptr(beside) +
+           " beside it expects one evaluation of forces in a step of velocity Verlet: use fix nve");
+}
+
+// Stops at fixes that also move atoms, or that expect one evaluation of forces in each step: their random forces
+// are scaled for it, or they advance a state at each.
 void FixSplitting::check_others()
 {
   for (int k = 0; k < modify->nfix; k++) {
@@ -153,9 +162,13 @@ void FixSplitting::check_others()
     if (other->time_integrate)
       stop(name + " integrates too, and its atoms would be elsewhere when forces are computed: remove it; atoms that "
                   "no fix integrates stay where they are");
-    for (const char *known : {"shake", "rattle", "langevin", "package_omp", "package_intel"}) {
+    if (scheme == Scheme::aboba && strcmp(other->style, "pair") == 0)
+      stop(name + " reads the pair style where forces are first computed, with aboba in the middle of a step: use two-stage");
+    for (const char *known :
+         {"shake", "rattle", "langevin", "qtb", "ttm", "srd", "lb/", "smd", "tmd", "colvars", "plumed", "atc", "hyper/", "pimd",
+          "drude/transform", "wall/gran", "wall/body", "electron/stopping", "rx", "package_omp", "package_intel"}) {
       if (!begins(other->style, known) && strcmp(other->id, known) != 0) continue;
-      stop(name + " expects one evaluation of forces in a step of velocity Verlet");
+      stop(name + " expects one evaluation of forces in a step of velocity Verlet: use fix nve");
     }
   }
 }
@@ -167,6 +180,7 @@ void FixSplitting::setup(int vflag)
 
 void FixSplitting::initial_integrate(int vflag)
 {
+  if (!pair) stop("LAMMPS has not set it up: 'run N pre no' cannot follow a new fix");
   vflag_of_step = vflag;
   const double dt = update->dt;
   if (scheme == Scheme::aboba) {
@@ -246,7 +260,13 @@ void FixSplitting::act()
   if (step % every != 0) return;
   double impulses[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const double times = static_cast<double>(every);
-  pair->heat(groupbit, times * update->dt, uniform, vflag_global != 0, impulses);
+  const int owned = atom->nlocal;
+  masses.resize(owned);
+  for (int i = 0; i < owned; i++) {
+    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
+    masses[i] = (atom->mask[i] & groupbit) && !held[i] ? force->mvv2e * mass : HUGE_VAL;
+  }
+  pair->heat(masses, times * update->dt, uniform, vflag_global != 0, impulses);
   // The virial is that of the mean force over the step.
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += times * impulses[k];
@@ -317,7 +337,19 @@ void FixSplitting::compute_forces(int eflag, int vflag)
   if (force->kspace && force->kspace->compute_flag) force->kspace->compute(eflag, vflag);
   modify->pre_reverse(eflag, vflag);
   if (force->newton) comm->reverse_comm();
-  modify->post_force(vflag);
+  add_forces(vflag);
+}
+
+// Fix pair reads the pair style at the first evaluation of a step that it sees: it sees that at the end only.
+void FixSplitting::add_forces(int vflag)
+{
+  const auto is_reader = [](const Fix *fix) { return strcmp(fix->style, "pair") == 0; };
+  if (std::none_of(modify->fix, modify->fix + modify->nfix, is_reader)) {
+    modify->post_force(vflag);
+    return;
+  }
+  for (int k = 0; k < modify->nfix; k++)
+    if ((modify->fmask[k] & POST_FORCE) && !is_reader(modify->fix[k])) modify->fix[k]->post_force(vflag);
 }
 
 extern "C" void *psidpd_create_dpd_splitting(void *lmp, int narg, char **arg)

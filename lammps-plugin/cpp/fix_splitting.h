@@ -33,6 +33,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
   int setmask() override;
   void init() override;
   void setup(int vflag) override;
+  void setup_pre_force(int vflag) override { pre_force(vflag); }
+  void pre_force(int vflag) override;
   void initial_integrate(int vflag) override;
   void final_integrate() override;
   double compute_scalar() override;
@@ -47,6 +49,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
  private:
   [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   void check_others();
+  // Stops at pair styles of a hybrid whose random forces or states expect one evaluation of forces in each step.
+  void check_styles_beside();
   // The pair style whose drag and noise this fix applies.
   PairPsi *find_pair();
 
@@ -69,6 +73,12 @@ class FixSplitting : public LAMMPS_NS::Fix {
   // Computes all forces at the present positions, as a step of run_style verlet does.
   void compute_forces(int eflag, int vflag);
   void act();
+  // Adds what other fixes add to forces.
+  void add_forces(int vflag);
+  // Finds the atoms whose whole force other fixes set: drag and noise must not change their velocities either.
+  void find_held();
+  // What a fix makes of forces that are `scale` times a probe.
+  std::vector<double> replaced(LAMMPS_NS::Fix *fix, double scale);
 
   enum class Scheme { two_stage, force_gradient, aboba };
   Scheme scheme = Scheme::two_stage;
@@ -78,6 +88,10 @@ class FixSplitting : public LAMMPS_NS::Fix {
   LAMMPS_NS::bigint every = 1;
   bool uniform = false;
   PairPsi *pair = nullptr;
+  // For each atom whether other fixes set its whole force.
+  std::vector<char> held;
+  // Masses for the thermostat, infinite for atoms that keep their velocities.
+  std::vector<double> masses;
   // Flag of the virial of the present step.
   int vflag_of_step = 0;
   // For force-gradient: the displacement of each atom, and its position before.

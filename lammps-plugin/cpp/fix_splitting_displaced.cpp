@@ -52,7 +52,8 @@ int FixSplitting::unpack_exchange(int i, double *buf)
 
 double FixSplitting::memory_usage()
 {
-  return (shifts ? 3.0 * atom->nmax : 0.0) * sizeof(double) + static_cast<double>(home.capacity()) * sizeof(double);
+  const auto kept = static_cast<double>(home.capacity() + masses.capacity());
+  return ((shifts ? 3.0 * atom->nmax : 0.0) + kept) * sizeof(double) + static_cast<double>(held.capacity());
 }
 
 // Displaced atoms never change ranks: LAMMPS would lose them behind a side that is not periodic.

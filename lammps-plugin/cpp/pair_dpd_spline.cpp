@@ -28,7 +28,6 @@ class PairDPDSpline : public PairTable {
     read_cutoff(arg[1]);
     read_seed(arg[2]);
     read_keywords(3, narg, arg);
-    style.reset();
   }
 
   void check(const Coefficients &given) override

@@ -31,7 +31,6 @@ class PairMDPDPsi : public PairTable {
     read_seed(arg[2]);
     lucy = false;
     read_keywords(3, narg, arg);
-    style.reset();
   }
 
   bool read_keyword(const std::string &key, const std::string &value) override

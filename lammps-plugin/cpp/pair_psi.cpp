@@ -146,6 +146,9 @@ void PairPsi::settings(int narg, char **arg)
 {
   read_settings(narg, arg);
   arguments.assign(arg, arg + narg);
+  // init_style() builds an engine with the new settings, and describes it.
+  style.reset();
+  described = false;
 }
 
 // Builds the engine, or updates it: fix adapt may have changed its coefficients or the temperature.
@@ -181,6 +184,7 @@ void PairPsi::init_style()
   lost_atoms.begin(atom, world);
   // LAMMPS sizes its buffers by this; later communications never send more.
   comm_forward = static_cast<int>((*style)->variables());
+  asked.assign(static_cast<size_t>(atom->ntypes) * atom->ntypes, 0);
 
   why_listed.clear();
   const auto because = [this](const std::string &text) { why_listed += (why_listed.empty() ? "" : " and ") + text; };
@@ -245,6 +249,7 @@ double PairPsi::init_one(int i, int j)
     stop("no coefficients for types " + std::to_string(i) + " and " + std::to_string(j) +
          ": there is no mixing, set them with pair_coeff");
   refresh();
+  asked[static_cast<size_t>(i - 1) * atom->ntypes + j - 1] = 1;
   return (*style)->cutoff();
 }
 
@@ -282,7 +287,7 @@ double PairPsi::memory_usage()
   double bytes = Pair::memory_usage();
   bytes += (pair_i.capacity() + pair_j.capacity()) * sizeof(int32_t) + pair_factor.capacity() * sizeof(double);
   bytes += special.capacity() * sizeof(SpecialPair) + marks.capacity() * sizeof(uint32_t);
-  bytes += (vectors.capacity() + masses.capacity()) * sizeof(double);
+  bytes += vectors.capacity() * sizeof(double);
   if (style) bytes += static_cast<double>((*style)->memory());
   return bytes;
 }

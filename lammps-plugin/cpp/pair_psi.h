@@ -47,9 +47,9 @@ class PairPsi : public LAMMPS_NS::Pair {
 
   // Why the fix that applies drag and noise apart from the forces cannot act; empty if it can.
   std::string why_not_apart() const;
-  // Applies drag and noise for a time to the velocities of the atoms of a group, at the positions where
-  // forces were last computed; adds the virial.
-  void heat(int groupbit, double time, bool uniform, bool wants_virial, double *virial);
+  // Applies drag and noise for a time to the velocities of atoms with these masses (energy over squared velocity), at
+  // the positions where forces were last computed; adds the virial. Atoms of infinite mass keep their velocities.
+  void heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial);
   // Iterations of the thermostat in its last update.
   int iterations() { return style ? static_cast<int>((*style)->iterations()) : 0; }
 
@@ -102,6 +102,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Whether atoms may see two images of each other.
   bool is_narrow() const;
   void find_special();
+  // Pairs of types with coefficients that a hybrid gives to other styles alone.
+  std::vector<std::array<int, 2>> pairs_elsewhere() const;
   void find_exclusions();
   void tell_special(size_t count);
   void forward();
@@ -152,8 +154,8 @@ class PairPsi : public LAMMPS_NS::Pair {
 
   // Whether a fix applies drag and noise.
   bool apart = false;
-  // Vectors of atoms and ghosts; masses of atoms.
-  std::vector<double> vectors, masses;
+  // Vectors of atoms and ghosts.
+  std::vector<double> vectors;
 
   // Numbers of atoms and ghosts of an evaluation without slopes of ghosts; single() computes those that it needs.
   std::array<int, 2> without_slopes{-1, -1};
@@ -174,6 +176,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Number of pairs of types, groups and molecules that neigh_modify excluded at setup, and the marks of their members.
   int rules = 0;
   std::vector<uint32_t> marks;
+  // Whether LAMMPS asked for the cut-off of a pair of types, at row-major places: a hybrid asks for its own pairs only.
+  std::vector<char> asked;
   bool between_molecules = false;
   bool told_marks = false;
 };

@@ -43,8 +43,6 @@ void PairPsi::check_host()
   if (strcmp(update->unit_style, "lj") != 0)
     check_units(update->unit_style);
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
-  if ((*style)->needs_velocities() && !apart && !comm->ghost_velocity)
-    stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
 }
 
 bool PairPsi::is_scaled() const

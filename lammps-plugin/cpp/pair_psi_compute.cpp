@@ -3,12 +3,14 @@
 #include "pair_psi.h"
 
 #include "compat.h"
+#include "fix_splitting.h"
 #include "slices.h"
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
 #include "force.h"
+#include "modify.h"
 #include "neighbor.h"
 #include "update.h"
 
@@ -131,6 +133,10 @@ void PairPsi::compute(int eflag, int vflag)
   request.seed = seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
   request.dt = update->dt;
+  if (request.thermostat && !comm->ghost_velocity)
+    stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
+  if (apart != (FixSplitting::find(modify) != nullptr))
+    stop("fix dpd/splitting was made or removed after the last setup: run without 'pre no'");
   if (request.thermostat && !(update->dt > 0.0))
     stop("the thermostat needs a timestep greater than 0, found " + std::to_string(update->dt));
   if (num_tally_compute > 0)

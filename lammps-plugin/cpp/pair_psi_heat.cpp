@@ -11,7 +11,6 @@
 #include "update.h"
 
 #include <algorithm>
-#include <cmath>
 
 using namespace LAMMPS_NS;
 using namespace psidpd;
@@ -19,11 +18,11 @@ using namespace psidpd;
 std::string PairPsi::why_not_apart() const
 {
   if (!why_listed.empty()) return "pairs come from a neighbor list, because of " + why_listed;
-  if (rules > 0) return "neigh_modify excludes pairs, whose drag and noise would have to be left out";
+  if (rules > 0) return "neigh_modify excludes pairs from interacting";
+  if (!pairs_elsewhere().empty()) return "the hybrid gives pairs of types that this style knows to another style alone";
   const double *factor = force->special_lj;
   if (is_scaled() && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
-    return "special_bonds has factors of 0, for which drag and noise would have to be left out: use 'special_bonds lj "
-           "1 1 1'";
+    return "special_bonds has factors of 0; in DPD bonded atoms interact like all others, with 'special_bonds lj 1 1 1'";
   if (domain->deform_vremap) return "fix deform changes velocities at the edges of the box ('remap v')";
   return {};
 }
@@ -37,16 +36,11 @@ void PairPsi::forward_vectors()
   carries = Carries::slopes;
 }
 
-void PairPsi::heat(int groupbit, double time, bool uniform, bool wants_virial, double *virial)
+void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial)
 {
   refresh();
   const size_t owned = atom->nlocal;
   const int all = atom->nlocal + atom->nghost;
-  masses.resize(owned);
-  for (size_t i = 0; i < owned; i++) {
-    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
-    masses[i] = (atom->mask[i] & groupbit) ? mass : HUGE_VAL;
-  }
   Heat what;
   what.seed = seed;
   what.step = static_cast<uint64_t>(update->ntimestep);
@@ -67,6 +61,11 @@ void PairPsi::heat(int groupbit, double time, bool uniform, bool wants_virial, d
   if (!acts) return;
   rust::Slice<double> v;
   if (owned > 0) v = {atom->v[0], 3 * owned};
+  const double velocity = fluid.velocity_unit(), energy = fluid.energy_unit();
+  const auto times = [&](double factor) {
+    if (factor != 1.0) std::for_each(v.begin(), v.end(), [=](double &c) { c *= factor; });
+  };
+  times(1.0 / velocity);
   std::array<double, 6> w{};
   if (alone) {
     w = attempt([&] { return thermostat_alone(fluid, v); });
@@ -86,5 +85,6 @@ void PairPsi::heat(int groupbit, double time, bool uniform, bool wants_virial, d
     }
     w = round.virial;
   }
-  for (int k = 0; k < 6; k++) virial[k] += w[k];
+  times(velocity);
+  for (int k = 0; k < 6; k++) virial[k] += energy * w[k];
 }

@@ -68,13 +68,33 @@ void PairPsi::find_special()
   special.insert(special.end(), with_ghosts.begin(), with_ghosts.end());
 }
 
-// Collects the exclusions of neigh_modify as two words for each atom and ghost: sides of rules for
-// types and groups, and the molecule.
+std::vector<std::array<int, 2>> PairPsi::pairs_elsewhere() const
+{
+  const int types = atom->ntypes;
+  const auto has_coefficients = [&](int i) {
+    for (int j = 1; j <= types; j++)
+      if (setflag[std::min(i, j)][std::max(i, j)]) return true;
+    return false;
+  };
+  std::vector<std::array<int, 2>> found;
+  for (int i = 1; i <= types; i++)
+    for (int j = i; j <= types; j++)
+      if (!asked[static_cast<size_t>(i - 1) * types + j - 1] && has_coefficients(i) && has_coefficients(j))
+        found.push_back({i, j});
+  return found;
+}
+
+// Collects the exclusions of neigh_modify, and of a hybrid, as two words for each atom and ghost: sides of rules
+// for types and groups, and the molecule.
 void PairPsi::find_exclusions()
 {
   marks.clear();
   told_marks = false;
-  const bool none = !why_listed.empty() || rules == 0;
+  const auto elsewhere = pairs_elsewhere();
+  const bool none = !why_listed.empty() || (rules == 0 && elsewhere.empty());
+  if (!none && elsewhere.size() + neighbor->nex_type + neighbor->nex_group > most_rules)
+    stop("the hybrid gives " + std::to_string(elsewhere.size()) + " pairs of its types to other styles; with the exclusions "
+         "of neigh_modify at most " + std::to_string(most_rules) + " pairs can be left out");
   const bool by_molecule = !none && neighbor->nex_mol > 0;
   const int all = none ? 0 : atom->nlocal + atom->nghost;
   for (int i = 0; i < all; i++) {
@@ -83,6 +103,7 @@ void PairPsi::find_exclusions()
       sides |= (one ? bit : 0) | (other ? bit << most_rules : 0);
       bit <<= 1;
     };
+    for (const auto &pair : elsewhere) add(atom->type[i] == pair[0], atom->type[i] == pair[1]);
     for (int k = 0; k < neighbor->nex_type; k++)
       add(atom->type[i] == neighbor->ex1_type[k], atom->type[i] == neighbor->ex2_type[k]);
     for (int k = 0; k < neighbor->nex_group; k++)

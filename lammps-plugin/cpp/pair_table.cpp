@@ -88,6 +88,24 @@ std::vector<Coefficients> PairTable::table() const
   return all;
 }
 
+// Gives pairs that a hybrid leaves to another style the coefficients of a pair that is set: the model needs some,
+// and the pairs themselves are left out.
+std::vector<Coefficients> PairTable::without_gaps(std::vector<Coefficients> pairs) const
+{
+  const size_t types = atom->ntypes;
+  std::vector<char> known(types, 0);
+  const Coefficients *any = nullptr;
+  const auto given = pairs;
+  for (size_t k = 0; k < given.size(); k++) {
+    if (!given[k].set) continue;
+    known[k / types] = known[k % types] = 1;
+    if (!any) any = &given[k];
+  }
+  for (size_t k = 0; k < pairs.size(); k++)
+    if (!pairs[k].set && k / types <= k % types && known[k / types] && known[k % types]) pairs[k] = *any;
+  return pairs;
+}
+
 bool PairTable::is_stale()
 {
   return table() != built;
@@ -99,7 +117,8 @@ rust::Box<Style> PairTable::make_style(double kt)
   const auto now = table();
   for (const auto &pair : now)
     if (pair.set) check(pair);
-  auto made = make_from(kt, {now.data(), now.size()});
+  const auto filled = without_gaps(now);
+  auto made = make_from(kt, {filled.data(), filled.size()});
   built = now;
   return made;
 }

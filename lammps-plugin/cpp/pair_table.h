@@ -34,6 +34,7 @@ class PairTable : public PairPsi {
  private:
   std::string words(int i, int j) const;
   std::vector<Coefficients> table() const;
+  std::vector<Coefficients> without_gaps(std::vector<Coefficients> pairs) const;
 
   const std::vector<std::string> names;
   // One table of types for each coefficient; fix adapt changes its entries.

@@ -204,6 +204,8 @@ mod ffi {
         ) -> Result<Totals>;
         /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of particles by it.
         fn energy_unit(self: &Style) -> f64;
+        /// One unit of velocity of the model in the units of LAMMPS.
+        fn velocity_unit(self: &Style) -> f64;
         fn particle_energy(self: &Style) -> &[f64];
         /// Virials, six numbers for each particle.
         fn particle_virial(self: &Style) -> &[f64];
@@ -223,7 +225,8 @@ mod ffi {
         ) -> Result<PairValue>;
         fn memory(self: &Style) -> usize;
 
-        /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat.
+        /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
+        /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
         #[allow(clippy::too_many_arguments)]
         fn thermostat_pairs(
             style: &mut Style,
@@ -263,7 +266,7 @@ fn thermostat_pairs(
 ) -> Result<bool, StyleError> {
     let ffi::Heat { seed, step, uniform, time, virial } = *heat;
     let noise = Noise { seed, step, law: if uniform { Law::Uniform } else { Law::Gaussian } };
-    let domain = domain_of(extent)?;
+    let domain = style.scale().domain(domain_of(extent)?);
     style.find_thermostat_pairs(Around { domain: &domain, images }, x, tag, kind, mass, time, virial, noise)
 }
 
@@ -508,6 +511,10 @@ impl Style {
 
     fn energy_unit(&self) -> f64 {
         self.scale().energy
+    }
+
+    fn velocity_unit(&self) -> f64 {
+        self.scale().velocity()
     }
 
     fn memory(&self) -> usize {

@@ -152,9 +152,9 @@ impl Style {
         &mut self.engine
     }
 
-    /// The thermostat apart from the forces, with the threads and the species of the types.
-    pub(crate) fn thermostat(&mut self) -> (Option<&mut PairThermostat>, &Pool, &[i32]) {
-        (self.thermostat.as_mut(), &self.pool, &self.kinds)
+    /// The thermostat apart from the forces, with the threads, the species of the types, and room for positions.
+    pub(crate) fn thermostat(&mut self) -> (Option<&mut PairThermostat>, &Pool, &[i32], &mut Converted) {
+        (self.thermostat.as_mut(), &self.pool, &self.kinds, &mut self.converted)
     }
 
     /// Describes the computation, and the letters of the coefficients, for the log.

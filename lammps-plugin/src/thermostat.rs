@@ -37,10 +37,21 @@ impl Style {
         noise: Noise,
     ) -> Result<bool, StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, kinds) = self.thermostat() else { return Ok(false) };
-            let particles = Particles { owned: mass.len(), x: triples(x), tag, kind };
+            let scale = self.scale();
+            let (Some(thermostat), pool, kinds, converted) = self.thermostat() else { return Ok(false) };
+            let taken = converted.take(&scale, x, &[], None);
+            let unit = scale.velocity().powi(2) / scale.energy;
+            let scaled: Vec<f64>;
+            let mass = match scale.is_one() {
+                true => mass,
+                false => {
+                    scaled = mass.iter().map(|m| m * unit).collect();
+                    &scaled
+                }
+            };
+            let particles = Particles { owned: mass.len(), x: triples(taken.x), tag, kind };
             let rank = Rank { around, particles, species_of_kind: kinds, mass };
-            thermostat.find_pairs_of_rank(pool, &rank, dt, virial)?;
+            thermostat.find_pairs_of_rank(pool, &rank, dt / scale.time, virial)?;
             thermostat.draw(pool, noise.seed, noise.step, Stream(0), noise.law);
             Ok(true)
         })
@@ -52,7 +63,7 @@ impl Style {
     /// Fails if a velocity is not finite.
     pub fn act_alone(&mut self, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, _) = self.thermostat() else { return Ok([0.0; 6]) };
+            let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok([0.0; 6]) };
             let v = v.as_chunks_mut::<3>().0;
             let virial = thermostat.act(pool, Update::Midpoint, v);
             finite(v)?;
@@ -66,7 +77,7 @@ impl Style {
     /// Fails if the atoms are not those of the last search for pairs.
     pub fn begin_rounds(&mut self, vectors: &[f64]) -> Result<Need, StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
+            let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
             Ok(thermostat.begin_midpoint(pool, triples(vectors))?)
         })
     }
@@ -77,7 +88,7 @@ impl Style {
     /// Fails as [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on), and if a velocity is not finite.
     pub fn next_round(&mut self, total: f64, vectors: &mut [f64], v: &mut [f64]) -> Result<Need, StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
+            let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
             let (vectors, v) = (vectors.as_chunks_mut::<3>().0, v.as_chunks_mut::<3>().0);
             let need = thermostat.go_on(pool, total, vectors, v)?;
             if let Need::Nothing(_) = need {

@@ -396,12 +396,6 @@ fn what_does_not_go_together_is_refused() {
         (with("fix 2 all dpd/splitting aboba\n"), "only one such fix is allowed"),
         (with("fix 2 all langevin 1 1 1 77\n"), "expects one evaluation of forces"),
         (with("run_style respa 2 2\n"), "works with 'run_style verlet' only, found 'respa'"),
-        (
-            head.replace("units lj", "units real")
-                .replace(&style, "pair_style mdpd/psi 1.0 1.0 5")
-                .replace(&coeff, "pair_coeff * * -40 25 18 1 0.75"),
-            "works with 'units lj' only, found 'units real'",
-        ),
         (with("neigh_modify exclude type 1 2\n"), "neigh_modify excludes pairs"),
         (
             with("fix 2 all deform 1 xy erate 0.1 remap v\n")

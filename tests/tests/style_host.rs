@@ -176,6 +176,60 @@ fn the_model_sees_the_new_temperature() {
     twice(&l);
 }
 
+/// Precision and threads of a second pair_style hold without a second pair_coeff, for all styles, and the log says so.
+#[test]
+fn settings_given_again_hold() {
+    for (style, coefficients) in [
+        ("dpd/psi 1.0", format!("* * \"{}\" F", warren())),
+        ("mdpd/psi 1.0 1.0", "* * -40 25 18 1 0.75".to_owned()),
+        ("dpd/spline 1.0 1.0", "* * 18.75 2 1 0.8 1 4.5".to_owned()),
+    ] {
+        let script = deck(&format!(
+            "pair_style {style} {SEED}\npair_coeff {coefficients}\nfix 1 all nve\nrun 0\n\
+             pair_style {style} {SEED} precision mixed threads 2\nrun 0\n"
+        ));
+        let (folder, path) = file(&script);
+        let run = psidpd_tests::lammps().0.run_script(1, folder.path(), path.as_ref(), &[], LIMIT);
+        let said = run.unwrap_or_else(|e| panic!("{e}")).stdout;
+        let lines: Vec<&str> = said.lines().filter(|l| l.starts_with("  arithmetic")).collect();
+        let [first, second] = lines[..] else { panic!("{style}: {said}") };
+        assert!(first.contains("double precision") && first.contains("1 thread(s)"), "{style}: {first}");
+        assert!(second.contains("mixed precision") && second.contains("2 thread(s)"), "{style}: {second}");
+        // The forces are those of mixed precision: near those of double precision, and not the same.
+        let [mixed, double] = [2, 1].map(|runs| {
+            let script: String = script.split_inclusive("run 0\n").take(runs).collect();
+            frame(&open(&script)).f
+        });
+        let apart = difference(&mixed, &double);
+        assert!((1e-9..1e-4).contains(&apart), "{style}: {apart:e}");
+    }
+}
+
+/// Commands that use no drag need no velocities of ghosts; a run does.
+#[test]
+fn only_runs_need_velocities_of_ghosts() {
+    let (folder, path) = file("");
+    let out = folder.path().join("all.data");
+    let start = deck(&format!("{}fix 1 all nve\n", psi())).replace("comm_modify vel yes\n", "");
+    let commands = format!(
+        "balance 1.0 shift x 5 1.1\nwrite_data {}\ndelete_atoms overlap 0.01 all all\nminimize 0 1e-3 3 10\n",
+        out.display()
+    );
+    for (more, message) in [
+        ("", None),
+        ("run 0\n", Some("add 'comm_modify vel yes'")),
+        ("unfix 1\nfix 1 all dpd/splitting aboba\nrun 1\n", None),
+    ] {
+        std::fs::write(&path, format!("{start}{commands}{more}")).unwrap();
+        let run = psidpd_tests::lammps().0.run_script(1, folder.path(), path.as_ref(), &[], LIMIT);
+        match (run, message) {
+            (Ok(_), None) => assert!(out.is_file()),
+            (Err(error), Some(message)) => assert!(error.to_string().contains(message), "{more}: {error}"),
+            (run, _) => panic!("{more}: {:?}", run.map(|run| run.stdout)),
+        }
+    }
+}
+
 /// Minimising lowers the energy, draws no noise, and ends where forces vanish.
 #[test]
 fn minimisers_go_downhill() {

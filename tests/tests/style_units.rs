@@ -22,6 +22,9 @@ struct Units {
     boltzmann: f64,
 }
 
+/// Fixes that integrate, with drag and noise among the forces and apart from them.
+const FIXES: [&str; 2] = ["nve", "dpd/splitting force-gradient"];
+
 const AVOGADRO: f64 = 6.022_140_76e23;
 
 const ALL: [Units; 4] = [
@@ -99,14 +102,14 @@ fn data(units: &Units) -> String {
 
 /// Positions and velocities after some steps; energy, pressure, energies of atoms and the mean density, in
 /// units of the model; and the log.
-fn outcome(units: &Units, style: &str, ranks: usize) -> (Frame, Vec<f64>, String) {
+fn outcome(units: &Units, style: &str, fix: &str, ranks: usize) -> (Frame, Vec<f64>, String) {
     let [length, energy, time] = units.of_model();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fluid.data"), data(units)).unwrap();
     let name = style.split_whitespace().nth(1).unwrap();
     let script = format!(
         "units {}\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\nneighbor {:.17e} bin\n\
-         read_data fluid.data\n{}{style}fix 1 all nve\ntimestep {:.17e}\nfix n all pair 1 {name} density 0\n\
+         read_data fluid.data\n{}{style}fix 1 all {fix}\ntimestep {:.17e}\nfix n all pair 1 {name} density 0\n\
          compute n all reduce ave f_n[1]\ncompute e all pe/atom pair\ncompute s all reduce sum c_e\n\
          thermo_style custom step pe press c_s c_n\nthermo_modify norm no\nrun 20\n\
          print \"$(pe:%.17g) $(press:%.17g) $(c_s:%.17g) $(c_n:%.17g)\" file totals\n",
@@ -151,13 +154,15 @@ fn a_model_moves_the_same_in_all_units() {
         let temperature = units.of_model()[1] / units.boltzmann;
         format!("pair_style dpd/psi {temperature:.17e} {SEED}\npair_coeff * * \"{model}\" A B\n")
     };
-    let expected = outcome(&ALL[0], &style(&ALL[0]), 1);
-    assert!(!expected.2.contains("  units         the model's"), "{}", expected.2);
-    for units in &ALL[1..] {
-        for ranks in [1, 2] {
-            let found = outcome(units, &style(units), ranks);
-            agree(&found, &expected, &format!("{}, {ranks} ranks", units.name));
-            assert!(found.2.contains("  units         the model's"), "{}", found.2);
+    for fix in FIXES {
+        let expected = outcome(&ALL[0], &style(&ALL[0]), fix, 1);
+        assert!(!expected.2.contains("  units         the model's"), "{}", expected.2);
+        for units in &ALL[1..] {
+            for ranks in [1, 2] {
+                let found = outcome(units, &style(units), fix, ranks);
+                agree(&found, &expected, &format!("{}, {fix}, {ranks} ranks", units.name));
+                assert!(found.2.contains("  units         the model's"), "{}", found.2);
+            }
         }
     }
 }
@@ -178,9 +183,11 @@ fn coefficients_are_in_the_units_of_the_simulation() {
             0.75 * length
         )
     };
-    let expected = outcome(&ALL[0], &style(&ALL[0]), 1);
-    for units in &ALL[1..3] {
-        agree(&outcome(units, &style(units), 2), &expected, units.name);
+    for fix in FIXES {
+        let expected = outcome(&ALL[0], &style(&ALL[0]), fix, 1);
+        for units in &ALL[1..3] {
+            agree(&outcome(units, &style(units), fix, 2), &expected, &format!("{}, {fix}", units.name));
+        }
     }
 }
 
