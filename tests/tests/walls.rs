@@ -47,6 +47,7 @@ const MODEL: &[&[&str]] = &[&["expression"], &["document"], &[""]];
 const PASSES: &[&[&str]] = &[
     &["domain", "instruction_set", "noise", "settings", "tally"],
     &["simd"],
+    &["vectors"],
     &["ground"],
     &["cells"],
     &["pair_search"],

@@ -8,7 +8,7 @@
 //!
 //! - [`domain`], [`noise`], [`settings`], [`instruction_set`], [`tally`]: definitions that the whole
 //!   engine shares.
-//! - [`simd`]: vectors of each instruction set.
+//! - [`simd`]: vectors of each instruction set; [`vectors`]: loops that the compiler vectorises.
 //! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
 //! - [`cells`]: the particles in the order of cells.
 //! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
@@ -28,3 +28,4 @@ pub mod plane;
 pub mod settings;
 pub mod simd;
 pub mod tally;
+pub mod vectors;

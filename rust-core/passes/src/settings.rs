@@ -1,5 +1,6 @@
 use std::fmt;
 use std::num::NonZeroUsize;
+use std::sync::LazyLock;
 
 /// The precision of the arithmetic of pairs. Positions and velocities of the host, sums over pairs, ψ
 /// and totals are always in double precision.
@@ -83,8 +84,11 @@ impl Instructions {
 
     /// The best instruction set of this processor.
     pub fn best() -> Instructions {
-        let mut available = Instructions::ALL.into_iter().map(|(_, i)| i).filter(|i| i.available());
-        available.next_back().unwrap_or(Instructions::Portable)
+        static BEST: LazyLock<Instructions> = LazyLock::new(|| {
+            let mut available = Instructions::ALL.into_iter().map(|(_, i)| i).filter(|i| i.available());
+            available.next_back().unwrap_or(Instructions::Portable)
+        });
+        *BEST
     }
 }
 

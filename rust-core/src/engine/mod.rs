@@ -35,7 +35,7 @@ mod reach;
 mod surroundings;
 mod sweep;
 pub mod thermostat;
-mod vectors;
+pub mod vectors;
 
 pub use counts::PassCounts;
 pub use error::EngineError;

@@ -1,5 +1,6 @@
 //! Histograms of the distances of particles.
 
+use psidpd_core::engine::vectors::{self, Loop};
 use psidpd_core::engine::{PeriodicBox, Pool};
 use std::ops::Range;
 
@@ -141,7 +142,8 @@ impl Counts {
             // In its own row a particle is paired only with later ones, so that each pair is counted once.
             let from = if std::ptr::eq(row, other) { i + 1 } else { 0 };
             for span in window.around(sorted.s[0][i]) {
-                near.bins(sorted, i, from.max(span.start)..span.end, &mut self.found);
+                let span = from.max(span.start)..span.end;
+                vectors::run_best(Bins { near, sorted, i, span, found: &mut self.found });
                 self.found.iter().for_each(|bin| numbers[*bin as usize] += 1);
             }
         }
@@ -181,41 +183,38 @@ impl<'a> Near<'a> {
             false => (second.max(third) < self.range).then_some(self.range),
         }
     }
+}
 
-    /// Finds the counters of the pairs of `i` with the particles of a span.
-    fn bins(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the condition above holds only on a processor with AVX2.
-            return unsafe { self.bins_avx2(sorted, i, span, found) };
-        }
-        self.bins_of(sorted, i, span, found);
-    }
+/// Finds the counters of the pairs of `i` with the particles of a span.
+struct Bins<'a> {
+    near: &'a Near<'a>,
+    sorted: &'a Sorted,
+    i: usize,
+    span: Range<usize>,
+    found: &'a mut Vec<u32>,
+}
 
-    /// Does the work of `bins` with AVX2, in vectors of four numbers.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn bins_avx2(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
-        self.bins_of(sorted, i, span, found);
-    }
+impl Loop for Bins<'_> {
+    type Out = ();
 
     #[inline(always)]
-    fn bins_of(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
+    fn run(self) {
+        let Bins { near, sorted, i, span, found } = self;
         let own = [sorted.s[0][i], sorted.s[1][i], sorted.s[2][i]];
-        let [a, b, c] = self.edges;
-        let last = (self.width - 1) as f64;
+        let [a, b, c] = near.edges;
+        let last = (near.width - 1) as f64;
         found.clear();
         for first in span.clone().step_by(LANES) {
-            let s = nearest(lanes(&sorted.s[0], first), own[0], self.period[0]);
-            let t = nearest(lanes(&sorted.s[1], first), own[1], self.period[1]);
-            let u = nearest(lanes(&sorted.s[2], first), own[2], self.period[2]);
+            let s = nearest(lanes(&sorted.s[0], first), own[0], near.period[0]);
+            let t = nearest(lanes(&sorted.s[1], first), own[1], near.period[1]);
+            let u = nearest(lanes(&sorted.s[2], first), own[2], near.period[2]);
             let offset = lanes(&sorted.offset, first);
             let mut bins = [0; LANES];
             for k in 0..LANES {
                 let x = s[k] * a[0] + t[k] * b[0] + u[k] * c[0];
                 let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
                 let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
-                let bin = (x * x + y * y + z * z).sqrt() * self.per_length;
+                let bin = (x * x + y * y + z * z).sqrt() * near.per_length;
                 // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
                 let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
                 bins[k] = offset[k] + bin as u32;

@@ -1,6 +1,7 @@
 //! Density waves of particles, computed for several particles at a time.
 
 use psidpd_core::engine::Pool;
+use psidpd_core::engine::vectors::{self as loops, Loop};
 use std::f64::consts::TAU;
 
 /// The sum `ρ(h) = Σ exp(2πi h·s)` over particles at fractions `s` of the box, real and imaginary part, for each `h` of
@@ -13,7 +14,7 @@ pub fn waves(pool: &Pool, fractions: impl Iterator<Item = [f64; 3]>, vectors: &[
         fractions.chunks(BLOCK).map(|block| (block, vec![[[0.0; LANES]; 2]; vectors.len()])).collect();
     pool.each(&mut blocks, |(block, waves)| {
         for particles in block.chunks(LANES) {
-            add_waves(&Phases::new(particles, top), vectors, waves);
+            loops::run_best(AddWaves { phases: Phases::new(particles, top), vectors, waves });
         }
     });
     let mut sums = vec![[0.0; 2]; vectors.len()];
@@ -69,33 +70,28 @@ fn times(a: &Complex, b: &Complex, sign: f64) -> Complex {
 }
 
 /// Adds the contributions of some particles to the wave of each vector.
-fn add_waves(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: the condition above holds only on a processor with AVX2.
-        return unsafe { add_waves_avx2(phases, vectors, waves) };
-    }
-    add_waves_of(phases, vectors, waves);
+struct AddWaves<'a> {
+    phases: Phases,
+    vectors: &'a [[i32; 3]],
+    waves: &'a mut [Complex],
 }
 
-/// Does the work of `add_waves` with AVX2, in vectors of four numbers.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn add_waves_avx2(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
-    add_waves_of(phases, vectors, waves);
-}
+impl Loop for AddWaves<'_> {
+    type Out = ();
 
-#[inline(always)]
-fn add_waves_of(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
-    for (h, wave) in vectors.iter().zip(waves) {
-        let (first, _) = phases.at(0, h[0]);
-        let (second, sign) = phases.at(1, h[1]);
-        let product = times(first, second, sign);
-        let (third, sign) = phases.at(2, h[2]);
-        let product = times(&product, third, sign);
-        for part in 0..2 {
-            for k in 0..LANES {
-                wave[part][k] += product[part][k];
+    #[inline(always)]
+    fn run(self) {
+        let AddWaves { phases, vectors, waves } = self;
+        for (h, wave) in vectors.iter().zip(waves) {
+            let (first, _) = phases.at(0, h[0]);
+            let (second, sign) = phases.at(1, h[1]);
+            let product = times(first, second, sign);
+            let (third, sign) = phases.at(2, h[2]);
+            let product = times(&product, third, sign);
+            for part in 0..2 {
+                for k in 0..LANES {
+                    wave[part][k] += product[part][k];
+                }
             }
         }
     }

@@ -2,6 +2,7 @@
 //! arrays, so that the results are the same for any number of parts.
 
 use crate::run::bounds::Bounds;
+use psidpd_core::engine::vectors::{self, Loop};
 use psidpd_core::engine::{PeriodicBox, Pool, part};
 
 /// Particles whose coordinates are done together, in whole vectors.
@@ -144,12 +145,7 @@ pub fn drift<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: 
 where
     R: Fn(f64, f64, f64, f64) -> (f64, f64),
 {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { drift_avx2(part, over_mass, around, rule) };
-    }
-    drift_portably(part, over_mass, around, rule);
+    vectors::run_best(Drift { part, over_mass, around, rule });
 }
 
 /// Changes velocities by `rule`, which makes one of velocity, force, kept velocity, kept force, and a number of
@@ -158,52 +154,45 @@ pub fn kick<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
 where
     R: Fn(f64, f64, [f64; 2], f64) -> f64,
 {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { kick_avx2::<KEEPS, R>(part, over_mass, rule) };
-    }
-    kick_portably::<KEEPS, R>(part, over_mass, rule);
+    vectors::run_best(Kick::<KEEPS, R> { part, over_mass, rule });
 }
 
-/// The same operations, four at a time; nothing is contracted, so the bits are the same.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn drift_avx2<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
-where
-    R: Fn(f64, f64, f64, f64) -> (f64, f64),
-{
-    drift_portably(part, over_mass, around, rule);
+struct Drift<'a, 'b, R> {
+    part: &'a mut Part<'b>,
+    over_mass: &'a [f64],
+    around: Surroundings<'a>,
+    rule: R,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn kick_avx2<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
-where
-    R: Fn(f64, f64, [f64; 2], f64) -> f64,
-{
-    kick_portably::<KEEPS, R>(part, over_mass, rule);
-}
+impl<R: Fn(f64, f64, f64, f64) -> (f64, f64)> Loop for Drift<'_, '_, R> {
+    type Out = ();
 
-#[inline(always)]
-fn drift_portably<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
-where
-    R: Fn(f64, f64, f64, f64) -> (f64, f64),
-{
-    match over_mass {
-        [_] => drift_in_groups::<true, R>(part, over_mass, around, rule),
-        _ => drift_in_groups::<false, R>(part, over_mass, around, rule),
+    #[inline(always)]
+    fn run(self) {
+        let Drift { part, over_mass, around, rule } = self;
+        match over_mass {
+            [_] => drift_in_groups::<true, R>(part, over_mass, around, rule),
+            _ => drift_in_groups::<false, R>(part, over_mass, around, rule),
+        }
     }
 }
 
-#[inline(always)]
-fn kick_portably<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
-where
-    R: Fn(f64, f64, [f64; 2], f64) -> f64,
-{
-    match over_mass {
-        [_] => kick_in_groups::<KEEPS, true, R>(part, over_mass, rule),
-        _ => kick_in_groups::<KEEPS, false, R>(part, over_mass, rule),
+struct Kick<'a, 'b, const KEEPS: bool, R> {
+    part: &'a mut Part<'b>,
+    over_mass: &'a [f64],
+    rule: R,
+}
+
+impl<const KEEPS: bool, R: Fn(f64, f64, [f64; 2], f64) -> f64> Loop for Kick<'_, '_, KEEPS, R> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Kick { part, over_mass, rule } = self;
+        match over_mass {
+            [_] => kick_in_groups::<KEEPS, true, R>(part, over_mass, rule),
+            _ => kick_in_groups::<KEEPS, false, R>(part, over_mass, rule),
+        }
     }
 }
 
