@@ -13,6 +13,7 @@ use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::{Isa, Kernel, OFFSET_BITS, Reals, Words, run};
 use psidpd_model::kernel::Real;
 use psidpd_threads::SharedSlice;
+use std::ops::Range;
 
 /// A pair: its vector `g`, and the second particle.
 #[derive(Debug, Clone, Copy, Default)]
@@ -42,6 +43,14 @@ pub struct PairList {
     pub exact: Vec<ExactPair>,
     /// Ratio `r/|g|` of each pair; empty unless requested.
     pub stretch: Vec<f64>,
+}
+
+/// The particles of a plane, counted from its first, each with the range of its pairs in the list.
+#[inline(always)]
+pub fn pairs_of_each(
+    start: &[u32],
+) -> impl DoubleEndedIterator<Item = (usize, Range<usize>)> + ExactSizeIterator {
+    start.windows(2).map(|ends| ends[0] as usize..ends[1] as usize).enumerate()
 }
 
 impl PairList {

@@ -1,6 +1,6 @@
 //! Sums over the listed pairs of a plane.
 
-use super::list::{ExactPair, Pair, PairList};
+use super::list::{ExactPair, Pair, PairList, pairs_of_each};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
@@ -100,8 +100,7 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
         // SAFETY: all loads and stores are at arrays of four numbers.
         unsafe {
             let minus_drag = I::Quad::splat(-terms.drag);
-            for (i, ends) in start.windows(2).enumerate() {
-                let of_i = ends[0] as usize..ends[1] as usize;
+            for (i, of_i) in pairs_of_each(start) {
                 let noises = if NOISE { &xi[of_i.clone()] } else { &[] };
                 let at = I::Quad::load(p[i].as_ptr());
                 let mut sum = I::Quad::zero();

@@ -9,7 +9,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::WeightTables;
+use psidpd_passes::plane::list::{WeightTables, pairs_of_each};
 use std::num::NonZeroUsize;
 
 /// Finds the pairs of a fluid in boxes at least twice as wide as their range.
@@ -76,9 +76,9 @@ impl SweepPairs {
         places.gather(*dimensions, domain, x, lists.order(), copies);
         let (places, x, images) = (&*places, places.x(), places.images());
         for PlanePairs { own, list, .. } in planes {
-            for (i, ends) in (own.start..).zip(list.start.windows(2)) {
-                for pair in &list.pairs[ends[0] as usize..ends[1] as usize] {
-                    let j = own.start + pair.j as usize;
+            for (i, of_i) in pairs_of_each(&list.start) {
+                for pair in &list.pairs[of_i] {
+                    let (i, j) = (own.start + i, own.start + pair.j as usize);
                     let mut d = [0, 1, 2].map(|c| [x[i][c] - x[j][c]]);
                     images.find_nearest(&mut d);
                     let d = d.map(|[d]| d);

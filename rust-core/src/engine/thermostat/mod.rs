@@ -42,7 +42,7 @@ use super::error::EngineError;
 use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
-use super::sweep::{MARGIN, PairLists, Places, PlanePairs, Pool};
+use super::sweep::{MARGIN, PairLists, Places, Pool};
 use part::Part;
 use pass::Sums;
 use planes::Plane;
@@ -217,22 +217,16 @@ impl PairThermostat {
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
-            let PlanePairs { own, next, list } = &plane.found;
-            for (i, ends) in list.start.windows(2).enumerate() {
-                for k in ends[0] as usize..ends[1] as usize {
-                    let j = list.pairs[k].j as usize;
-                    let j = j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
-                    let i = own.start + i;
-                    let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
-                    let g = list.g(k);
-                    let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                    let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
-                    let square: f64 = g.iter().map(|g| g * g).sum();
-                    if inverse > 0.0 {
-                        squares += along * along / inverse;
-                        weights += square;
-                        rates += square * inverse;
-                    }
+            for [i, j, k] in plane.pairs() {
+                let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
+                let g = plane.found.list.g(k);
+                let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
+                let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
+                let square: f64 = g.iter().map(|g| g * g).sum();
+                if inverse > 0.0 {
+                    squares += along * along / inverse;
+                    weights += square;
+                    rates += square * inverse;
                 }
             }
         }

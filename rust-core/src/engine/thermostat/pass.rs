@@ -6,6 +6,7 @@
 use super::planes::Plane;
 use crate::engine::sweep::{Pool, part};
 use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::list::pairs_of_each;
 use psidpd_passes::plane::pair_sums::add_pairs;
 pub use psidpd_passes::plane::pair_sums::{Terms, Wide};
 
@@ -91,8 +92,8 @@ impl Plane {
         if self.found.list.stretch.is_empty() {
             return virial;
         }
-        for (i, ends) in self.found.list.start.windows(2).enumerate() {
-            for k in ends[0] as usize..ends[1] as usize {
+        for (i, of_i) in pairs_of_each(&self.found.list.start) {
+            for k in of_i {
                 let pair = &self.found.list.pairs[k];
                 let (g, other) = (self.found.list.g(k), p[pair.j as usize]);
                 let along: f64 = (0..3).map(|c| (p[i][c] - other[c]) * g[c]).sum();

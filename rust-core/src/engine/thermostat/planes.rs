@@ -5,7 +5,8 @@ use crate::engine::sweep::PlanePairs;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::noise::{Law, PairNoise};
-use psidpd_passes::plane::list::WeightTables;
+use psidpd_passes::plane::list::{WeightTables, pairs_of_each};
+use std::ops::Range;
 
 /// Pairs whose first particle is in one plane; the second is in the same plane or in the next.
 #[derive(Debug, Clone, Default)]
@@ -44,15 +45,29 @@ pub fn weights(plan: &ThermostatPlan, dt: f64, margin: f64) -> WeightTables {
     }
 }
 
+/// The sorted index of the second particle of a pair, whose own index continues from a plane to the next.
+pub fn second(own: &Range<usize>, next: &Range<usize>, j: u32) -> usize {
+    let j = j as usize;
+    j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k)
+}
+
 impl Plane {
+    /// The sorted indices of the two particles of each pair, and the index of the pair in the list.
+    pub fn pairs(&self) -> impl Iterator<Item = [usize; 3]> {
+        let PlanePairs { own, next, list } = &self.found;
+        pairs_of_each(&list.start).flat_map(move |(i, of_i)| {
+            of_i.map(move |k| [own.start + i, second(own, next, list.pairs[k].j), k])
+        })
+    }
+
     /// Draws the noise of the pairs.
     pub fn draw(&mut self, tags: &[u32], noise: PairNoise, law: Law) {
         let Plane { found: PlanePairs { own, next, list }, xi, tags: [a, b] } = self;
         a.clear();
         b.clear();
         let tags = &tags[own.start..][..own.len() + next.len()];
-        for (tag, ends) in tags.iter().zip(list.start.windows(2)) {
-            a.resize(ends[1] as usize, *tag);
+        for (i, of_i) in pairs_of_each(&list.start) {
+            a.resize(of_i.end, tags[i]);
         }
         b.extend(list.pairs.iter().map(|pair| tags[pair.j as usize]));
         xi.resize(list.pairs.len(), 0.0);

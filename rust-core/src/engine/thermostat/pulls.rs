@@ -4,7 +4,6 @@
 //! contributes only scatter to a mean.
 
 use super::PairThermostat;
-use crate::engine::sweep::PlanePairs;
 
 /// A pair and the mean force of drag on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,18 +39,14 @@ impl PairThermostat {
         let mut pulls = Vec::new();
         let order = self.lists.order();
         for (number, plane) in self.planes.iter().enumerate() {
-            let PlanePairs { own, next, list } = &plane.found;
+            let list = &plane.found.list;
             if list.stretch.is_empty() {
                 continue;
             }
-            for (i, ends) in list.start.windows(2).enumerate() {
-                for k in ends[0] as usize..ends[1] as usize {
-                    let (j, stretch) = (list.pairs[k].j as usize, list.stretch[k]);
-                    let j = j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
-                    let (i, g) = (own.start + i, list.g(k));
-                    let strength = strength(i, j, number, k, g) / stretch;
-                    pulls.push(Pull { i: order[i] as usize, d: g.map(|g| stretch * g), strength });
-                }
+            for [i, j, k] in plane.pairs() {
+                let (stretch, g) = (list.stretch[k], list.g(k));
+                let strength = strength(i, j, number, k, g) / stretch;
+                pulls.push(Pull { i: order[i] as usize, d: g.map(|g| stretch * g), strength });
             }
         }
         pulls

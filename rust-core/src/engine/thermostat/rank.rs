@@ -5,12 +5,13 @@
 //! ranks, and the rule continues. All ranks decide by the same sums, so that they need the same.
 
 use super::PairThermostat;
-use super::planes::Plane;
+use super::planes::{Plane, second};
 use super::round::Round;
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
-use crate::engine::sweep::Pool;
+use crate::engine::sweep::{PlanePairs, Pool};
+use psidpd_passes::plane::list::{PairList, pairs_of_each};
 
 /// The particles of a rank, owned particles first, and their surroundings.
 #[derive(Debug, Clone, Copy)]
@@ -89,13 +90,12 @@ impl PairThermostat {
         let Rank { around, particles, species_of_kind, .. } = *rank;
         let species = plan.gamma.len().isqrt();
         for Plane { found, .. } in planes {
-            for (i, ends) in found.list.start.windows(2).enumerate() {
-                let i = found.own.start + i;
-                for k in ends[0] as usize..ends[1] as usize {
-                    let pair = &mut found.list.pairs[k];
-                    let j = pair.j as usize;
-                    let j =
-                        j.checked_sub(found.own.len()).map_or(found.own.start + j, |k| found.next.start + k);
+            let PlanePairs { own, next, list: PairList { start, pairs, stretch, .. } } = found;
+            for (i, of_i) in pairs_of_each(start) {
+                let i = own.start + i;
+                for k in of_i {
+                    let pair = &mut pairs[k];
+                    let j = second(own, next, pair.j);
                     if ghosts[i] == ghosts[j] {
                         continue;
                     }
@@ -109,7 +109,7 @@ impl PairThermostat {
                     let factor = (0.5 * dt * plan.gamma[law]).sqrt() * w / r;
                     if factor > 0.0 && factor.is_finite() {
                         pair.g = d.map(|d| (factor * d) as f32);
-                        if let Some(stretch) = found.list.stretch.get_mut(k) {
+                        if let Some(stretch) = stretch.get_mut(k) {
                             *stretch = factor.recip();
                         }
                     }

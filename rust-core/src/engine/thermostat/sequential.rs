@@ -12,6 +12,7 @@ use super::pass::add_virial;
 use super::planes::Plane;
 use crate::engine::sweep::Pool;
 use psidpd_passes::noise::Law;
+use psidpd_passes::plane::list::pairs_of_each;
 
 /// The order in which the pairs come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,14 +168,11 @@ impl PairThermostat {
 impl Share<'_> {
     fn update(&mut self, kt: f64, reversed: bool, rule: impl Fn(&Encounter) -> f64) {
         let plane = self.plane;
-        let rows = plane.found.list.start.len() - 1;
-        for n in 0..rows {
-            let i = if reversed { rows - 1 - n } else { n };
-            let of_i = plane.found.list.start[i] as usize..plane.found.list.start[i + 1] as usize;
-            for n in 0..of_i.len() {
-                let k = if reversed { of_i.end - 1 - n } else { of_i.start + n };
-                self.encounter(i, k, kt, &rule);
-            }
+        let particles = pairs_of_each(&plane.found.list.start);
+        let mut meet = |i, k| self.encounter(i, k, kt, &rule);
+        match reversed {
+            true => particles.rev().for_each(|(i, of_i)| of_i.rev().for_each(|k| meet(i, k))),
+            false => particles.for_each(|(i, of_i)| of_i.for_each(|k| meet(i, k))),
         }
     }
 
