@@ -1,5 +1,5 @@
 //! Checks that the JSON schema and the reference of the model file are current with the table of
-//! keys, and agree with the reader.
+//! keys, and that the reader reads every key.
 
 use psidpd_core::model::Model;
 use psidpd_core::model::keys::{
@@ -289,49 +289,50 @@ fn every_example_of_the_reference_loads() {
     assert_eq!(count, TABLES.iter().map(|t| t.keys.len()).sum::<usize>());
 }
 
-/// For an unknown key the reader's error lists the known keys, which must be those of the table.
-#[test]
-fn the_reader_knows_the_keys_of_the_table_and_no_others() {
-    let known = |text: &str| -> Vec<String> {
-        let error = Model::parse("m.toml", text).unwrap_err().to_string();
-        let (_, list) = error.split_once("known here: ").unwrap_or_else(|| panic!("{error}\n{text}"));
-        list.trim_end_matches(')').split(", ").map(str::to_owned).collect()
-    };
-    let listed = |table: &Table, form: Option<&str>| {
-        let mut names: Vec<String> = table.keys_of(form).map(|k| k.name.to_owned()).collect();
-        names.sort();
-        names
-    };
-    let head = "title = \"t\"\nspecies = [\"A\"]\n";
-    let mut top = listed(&TOP, None);
-    top.extend(
-        ["density", "excess_free_energy", "literature", "pair", "parameters", "thermostat", "units"]
-            .map(str::to_owned),
-    );
-    top.sort();
-    assert_eq!(known(&format!("{head}zzz = 1")), top);
-    assert_eq!(
-        known(&format!("{head}[units]\nlength = 1\nmass = 1\nenergy = 1\nzzz = 1")),
-        listed(&UNITS, None)
-    );
-    let density = "[density.n]\nkernel = \"lucy\"\nrange = 1\n";
-    assert_eq!(known(&format!("{head}{density}zzz = 1")), listed(&DENSITY, None));
-    assert_eq!(
-        known(&format!("{head}{density}[excess_free_energy]\nA = {{ pressure = \"rho\", zzz = 1 }}")),
-        listed(&CURVES, None)
-    );
-    assert_eq!(
-        known(&format!("{head}[[thermostat]]\ngamma = 1\nrange = 1\nzzz = 1")),
-        listed(&THERMOSTAT, None)
-    );
-    for form in FORMS {
-        let keys = match *form {
-            "soft" => "strength = 1\nrange = 1",
-            "spline" => "strength = 1\nA = 1\nB = 1\nrange_A = 1\nrange_B = 1",
-            "expression" => "phi = \"1 - r\"\nrange = 1",
-            _ => "file = \"tests/models/good/phi.txt\"",
-        };
-        let text = format!("{head}[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"{form}\"\n{keys}\nzzz = 1");
-        assert_eq!(known(&text), listed(&PAIR, Some(form)), "{form}");
+/// Puts a value of a type that no key has into the table at `path`; false if the table lacks the key.
+fn spoil(value: &mut toml::Value, path: &str, key: &str) -> bool {
+    let is_chosen = |name: &str| name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase());
+    match value {
+        toml::Value::Array(items) => items.iter_mut().any(|item| spoil(item, path, key)),
+        toml::Value::Table(table) => {
+            let (name, rest) = path.split_once('.').unwrap_or((path, ""));
+            let (name, rest) = if path.is_empty() { (key, None) } else { (name, Some(rest)) };
+            let mut found = table.iter_mut().filter(|(k, _)| *k == name || is_chosen(name));
+            found.any(|(_, inner)| match rest {
+                Some(rest) => spoil(inner, rest, key),
+                None => {
+                    *inner = toml::Value::Array(vec![toml::Value::Array(Vec::new())]);
+                    true
+                }
+            })
+        }
+        _ => false,
     }
+}
+
+/// The reader refuses a wrong type in every key of the tables: it reads all of them.
+#[test]
+fn every_key_is_read() {
+    let name = root().join("tests/models/good/example.toml").display().to_string();
+    for table in TABLES {
+        for key in table.keys {
+            let mut model: toml::Value = toml::from_str(&completed(key.example)).unwrap();
+            assert!(spoil(&mut model, table.path, key.name), "{}", key.example);
+            let text = toml::to_string(&model).unwrap();
+            let error = Model::parse(&name, &text).expect_err(&text).to_string();
+            let is_chosen = key.name.len() > 1 && key.name == key.name.to_uppercase();
+            assert!(is_chosen || error.contains(key.name), "{}: {error}\n{text}", key.name);
+        }
+    }
+}
+
+/// A key of another form is unknown, and the error lists the keys of this form.
+#[test]
+fn each_form_has_its_own_keys() {
+    let text = "title = \"t\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 1\nphi = \"1 - r\"\nrange = 1\n";
+    let error = Model::parse("m.toml", text).unwrap_err().to_string();
+    assert!(
+        error.contains("phi") && error.ends_with("known here: between, form, range, strength"),
+        "{error}"
+    );
 }

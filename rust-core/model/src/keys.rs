@@ -1,12 +1,11 @@
-//! Every key of the model file, as tables: the JSON schema for editors and the reference
-//! `docs/model-file.md` are generated from them, and tests compare the reader with them.
+//! Every key of the model file, as tables. A file with other keys is refused; the JSON schema for
+//! editors and the reference `docs/model-file.md` are generated from the tables too.
 
 use super::kernel::KernelKind;
-use crate::document::keys::keys;
 pub use crate::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
-
-/// The forms of a `[[pair]]`.
-pub const FORMS: &[&str] = &["soft", "spline", "expression", "table"];
+use crate::document::keys::{count, joined, keys};
+use crate::pair::FORM_KEYS;
+pub use crate::pair::FORMS;
 
 fn forms() -> Vec<&'static str> {
     FORMS.to_vec()
@@ -197,51 +196,17 @@ pub const PAIR: Table = Table {
     forms: ("form", FORMS),
     about: "A pair potential `phi(r)`, added to the many-body terms; any number of them. In a model with \
             interactions every two species must have one, of strength 0 if that is meant.",
-    keys: keys! {
-        "between": ValueKind::Between, REQUIRED,
-            "The two species."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1.0";
-        "form": ValueKind::Choice(forms), REQUIRED,
-            "Which potential: `soft`, `phi = strength range/2 (1 - r/range)^2`; `spline`, `phi = strength [A \
-             W(r, range_A) - B W(r, range_B)]` with Wang and Chen's cubic spline, `W(0) = 1`; `expression`, a \
-             formula; `table`, a file."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
-             0.8\nrange_B = 1.0";
-        "strength" [&["soft", "spline"]]: ValueKind::NumberOrFormula, REQUIRED,
-            "The amplitude: a force for `soft`, negative if it attracts, an energy for `spline`."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = \"-40\"\nrange = 1.0";
-        "A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
-            "The weight of the repulsion."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A \
-             = 0.8\nrange_B = 1.0";
-        "B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
-            "The weight of the attraction."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = \
-             0.8\nrange_A = 0.8\nrange_B = 1.0";
-        "range_A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
-            "The range of the repulsion."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
-             0.75\nrange_B = 1.0";
-        "range_B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
-            "The range of the attraction."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
-             0.8\nrange_B = 1.1";
-        "phi" [&["expression"]]: ValueKind::Formula, REQUIRED,
-            "The potential as a formula of `r`, the parameters and `kT`. It is not shifted, and should vanish \
-             at the range."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"2*(1 - r^2)^2\"\nrange = \
-             1.0";
-        "file" [&["table"]]: ValueKind::TableFile, REQUIRED,
-            "Rows of `r` and `phi`, as for a table of psi; the cubic spline through them. It is not shifted, \
-             and must end at 0."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"";
-        "range" [&["soft", "expression"]]: ValueKind::NumberOrFormula, REQUIRED,
-            "The distance at and beyond which the potential is zero."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = \"2^(1/3)\"";
-        "range" [&["table"]]: ValueKind::NumberOrFormula, OPTIONAL,
-            "The same; the last `r` of the table if left out."
-            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"\nrange = 1.0";
-    },
+    keys: &joined::<{ PAIR_KEYS.len() + count(FORM_KEYS) }>(PAIR_KEYS, FORM_KEYS),
+};
+
+const PAIR_KEYS: &[Key] = keys! {
+    "between": ValueKind::Between, REQUIRED,
+        "The two species."
+        => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1.0";
+    "form": ValueKind::Choice(forms), REQUIRED,
+        "Which potential; the keys of each form say more."
+        => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
+         0.8\nrange_B = 1.0";
 };
 
 /// Keys of `[[thermostat]]`.

@@ -20,6 +20,7 @@ pub mod pair;
 
 mod file;
 mod fluid;
+mod number;
 mod presets;
 
 pub use file::{KNOWN_FUNCTIONS, Model, Published, Units};

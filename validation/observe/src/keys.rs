@@ -1,5 +1,5 @@
-//! Tables of all keys of `[observe]`. They are the source of the reference `docs/observables.md`, and a test compares
-//! them with the reader.
+//! Tables of all keys of `[observe]`. They are the source of the reference `docs/observables.md`, and other
+//! keys are refused.
 
 use psidpd_core::document::keys::keys;
 pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};

@@ -1,6 +1,6 @@
 //! The table `[observe]` of a scene.
 
-use super::keys::{COMMON, Table};
+use super::keys::{COMMON, Key, Table};
 use super::meter::{AnyMeter, KINDS};
 use super::options::{Drive, Options, Place, StageNames};
 use psidpd_core::document::{FileError, FileErrorKind, Section};
@@ -42,6 +42,8 @@ pub fn read(
 ) -> Result<Observe, FileError> {
     let Some(value) = root.get("observe") else { return Ok(Observe::default()) };
     let section = value.section()?;
+    let names = |keys: &[Key]| -> Vec<&str> { keys.iter().map(|key| key.name).collect() };
+    section.only([names(COMMON), KINDS.iter().map(|kind| kind.table.path).collect()].concat())?;
     let fluid = model.at(kt)?;
     let last: Vec<String> = stages.all.last().map(|s| (*s).to_owned()).into_iter().collect();
     let place = Place { fluid: &fluid, domain, stages, slab, drive };
@@ -49,7 +51,10 @@ pub fn read(
     let mut observe = Observe::default();
     for kind in KINDS {
         let Some(value) = section.get(kind.table.path) else { continue };
-        let mut options = Options { section: value.as_section(), value: value.clone(), place: &place };
+        let options = Options { section: value.as_section(), value: value.clone(), place: &place };
+        if let Some(section) = &options.section {
+            section.only([names(COMMON), names(kind.table.keys)].concat())?;
+        }
         if options.section.is_none() && !value.boolean()?.value {
             continue;
         }
@@ -70,13 +75,9 @@ pub fn read(
             return Err(error.with_help("observe a stage of an integrator with a time step"));
         }
         let meter = (kind.read)(&options)?;
-        if let Some(section) = options.section.take() {
-            section.finish()?;
-        }
         let Common { every, skip, stages } = settings;
         observe.requests.push(Request { every, skip, stages, meter });
     }
-    section.finish()?;
     Ok(observe)
 }
 

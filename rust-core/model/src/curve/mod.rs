@@ -3,9 +3,11 @@
 mod pressure;
 pub mod pressure_table;
 mod primitive;
+mod read;
 mod spline;
 
 pub use pressure::Pressure;
+pub(crate) use read::read_spline;
 pub use spline::{Spline, SplineError};
 
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! The keys that a file may have, as tables. Editor schemas and pages of documentation are generated
-//! from them, and tests compare the readers with them.
+//! The keys that a file may have, as tables. A file with other keys is refused; editor schemas and
+//! pages of documentation are generated from the tables too.
 
 use super::{FileError, FileErrorKind, Section, Value};
 
@@ -214,43 +214,49 @@ impl Table {
     }
 }
 
-/// Reports a misspelt key before a key that is missing because of it. `more` are tables that are described elsewhere.
-pub fn strangers_first(error: FileError, root: &Section, tables: &[Table], more: &[&str]) -> FileError {
-    match error.kind() {
-        // The error is about another file, or already names the key.
-        _ if error.file() != root.source().as_ref() => error,
-        FileErrorKind::UnknownKey { .. } => error,
-        _ => refuse_strangers(root, tables, more).err().unwrap_or(error),
-    }
-}
-
 /// An error at `key`, for a file of another kind than the one expected.
 pub fn of_another_kind(root: &Section, key: &str, what: &str) -> FileError {
     let span = root.get(key).map_or(0..0, |value| value.span());
     FileError::new(root.source(), span, key, FileErrorKind::Value(what.to_owned()))
 }
 
-fn refuse_strangers(root: &Section, tables: &[Table], more: &[&str]) -> Result<(), FileError> {
+/// Calls `read`, and refuses the keys of a file that its tables do not have. A misspelt key is reported first, before a key
+/// that is missing because of it, and a key of another form of its table last. `more` are tables that are described elsewhere.
+///
+/// # Errors
+/// Fails for such keys, and as `read`.
+pub fn read_known<T>(
+    root: &Section,
+    tables: &[Table],
+    more: &[&'static str],
+    read: impl FnOnce() -> Result<T, FileError>,
+) -> Result<T, FileError> {
+    refuse_strangers(root, tables, more, |_, _| None)?;
+    let found = read()?;
+    refuse_strangers(root, tables, more, |section, table| {
+        let form = section.get(table.forms.0)?.as_str();
+        form.filter(|form| table.forms.1.contains(form))
+    })?;
+    Ok(found)
+}
+
+fn refuse_strangers<'a>(
+    root: &Section<'a>,
+    tables: &[Table],
+    more: &[&'static str],
+    form: impl Fn(&Section<'a>, &Table) -> Option<&'a str>,
+) -> Result<(), FileError> {
+    let is_chosen = |name: &str| name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase());
     for table in tables {
-        let first = |path: &'static str| path.split('.').next().unwrap_or_default();
         for section in sections(root, table.path) {
-            // A key of another form of the table is spelt correctly.
-            let mut known: Vec<&str> = table.keys.iter().map(|k| k.name).collect();
+            let mut known: Vec<&str> = table.keys_of(form(&section, table)).map(|k| k.name).collect();
             if table.path.is_empty() {
-                known.extend(tables.iter().map(|t| first(t.path)).filter(|name| !name.is_empty()));
+                known.extend(tables.iter().filter_map(|t| t.path.split('.').next()));
+                known.retain(|name| !name.is_empty());
                 known.extend(more);
             }
-            // A table that has keys with names of the user's choice has no misspelt keys.
-            if known.iter().any(|name| name.chars().all(|c| c.is_ascii_uppercase()) && name.len() > 1) {
-                continue;
-            }
-            known.sort_unstable();
-            known.dedup();
-            for (name, _) in section.entries() {
-                if !known.contains(&name.value.as_str()) {
-                    let kind = FileErrorKind::UnknownKey { known: known.join(", ") };
-                    return Err(name.error(section.source(), kind));
-                }
+            if !known.iter().any(|name| is_chosen(name)) {
+                section.only(known)?;
             }
         }
     }
@@ -260,7 +266,7 @@ fn refuse_strangers(root: &Section, tables: &[Table], more: &[&str]) -> Result<(
 /// The tables of a file at a path such as `density.NAME`.
 fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
     let Some((first, rest)) = path.split_once('.').or((!path.is_empty()).then_some((path, ""))) else {
-        return root.again();
+        return vec![root.clone()];
     };
     let inner = |value: Value<'a>| -> Vec<Section<'a>> {
         let elements = value.as_array().unwrap_or_else(|| vec![value]);
@@ -285,3 +291,33 @@ macro_rules! keys {
 }
 
 pub use keys;
+
+/// The `first` keys and those of every group, `N` in all.
+pub const fn joined<const N: usize>(first: &[Key], groups: &[&[Key]]) -> [Key; N] {
+    let mut keys = [first[0]; N];
+    let mut n = 0;
+    while n < first.len() {
+        keys[n] = first[n];
+        n += 1;
+    }
+    let mut group = 0;
+    while group < groups.len() {
+        let mut k = 0;
+        while k < groups[group].len() {
+            keys[n] = groups[group][k];
+            (n, k) = (n + 1, k + 1);
+        }
+        group += 1;
+    }
+    keys
+}
+
+/// The number of keys of all groups.
+pub const fn count(groups: &[&[Key]]) -> usize {
+    let (mut n, mut group) = (0, 0);
+    while group < groups.len() {
+        n += groups[group].len();
+        group += 1;
+    }
+    n
+}

@@ -1,7 +1,6 @@
 //! Reading TOML files strictly, with errors that name file, line and key.
 //!
-//! Model files and scene files are read here. A [`Section`] returns each key at most once and remembers
-//! it, so that [`Section::finish`] can name the keys that no reader asked for.
+//! Model files and scene files are read here. Tables state the keys that a file may have: see [`keys`].
 
 mod columns;
 mod error;

@@ -1,7 +1,6 @@
 use super::node::{Content, Node, Table};
 use super::printable::is_control;
 use super::{FileError, FileErrorKind, Source};
-use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -28,14 +27,13 @@ impl<T> Located<T> {
     }
 }
 
-/// A table of a document, whose keys are read one by one.
-#[derive(Debug)]
+/// A table of a document.
+#[derive(Debug, Clone)]
 pub struct Section<'a> {
     source: &'a Arc<Source>,
     path: String,
     span: Range<usize>,
     table: &'a Table,
-    asked: RefCell<Vec<String>>,
 }
 
 /// A value of a document, not yet interpreted.
@@ -53,12 +51,7 @@ impl<'a> Section<'a> {
         span: Range<usize>,
         table: &'a Table,
     ) -> Section<'a> {
-        Section { source, path, span, table, asked: RefCell::default() }
-    }
-
-    /// The sections of the same table with no key marked as read.
-    pub(super) fn again(&self) -> Vec<Section<'a>> {
-        vec![Section::new(self.source, self.path.clone(), self.span.clone(), self.table)]
+        Section { source, path, span, table }
     }
 
     /// The file that contains this section.
@@ -82,7 +75,6 @@ impl<'a> Section<'a> {
 
     /// The value of an optional key.
     pub fn get(&self, key: &str) -> Option<Value<'a>> {
-        self.asked.borrow_mut().push(key.to_owned());
         let value = self.table.get(key)?;
         Some(Value { source: self.source, key: self.path_of(key), value })
     }
@@ -101,7 +93,6 @@ impl<'a> Section<'a> {
             .iter()
             .map(|entry| {
                 let name = entry.key.clone();
-                self.asked.borrow_mut().push(name.clone());
                 let key = self.path_of(&name);
                 let located = Located { value: name, span: entry.key_span.clone(), key: key.clone() };
                 (located, Value { source: self.source, key, value: &entry.value })
@@ -109,24 +100,16 @@ impl<'a> Section<'a> {
             .collect()
     }
 
-    /// Fails if the section has a key that no reader asked for.
-    pub fn finish(self) -> Result<(), FileError> {
-        let asked = self.asked.borrow();
-        let stranger = self.table.entries.iter().find(|e| !asked.contains(&e.key));
-        match stranger {
-            None => Ok(()),
-            Some(entry) => {
-                let mut known: Vec<&str> = asked.iter().map(String::as_str).collect();
-                known.sort_unstable();
-                known.dedup();
-                Err(FileError::new(
-                    self.source,
-                    entry.key_span.clone(),
-                    &self.path_of(&entry.key),
-                    FileErrorKind::UnknownKey { known: known.join(", ") },
-                ))
-            }
-        }
+    /// Fails if the section has a key that is not in this list.
+    pub fn only<'k>(&self, known: impl IntoIterator<Item = &'k str>) -> Result<(), FileError> {
+        let mut known: Vec<&str> = known.into_iter().collect();
+        let Some(stranger) = self.table.entries.iter().find(|e| !known.contains(&e.key.as_str())) else {
+            return Ok(());
+        };
+        known.sort_unstable();
+        known.dedup();
+        let kind = FileErrorKind::UnknownKey { known: known.join(", ") };
+        Err(FileError::new(self.source, stranger.key_span.clone(), &self.path_of(&stranger.key), kind))
     }
 }
 
@@ -134,6 +117,11 @@ impl<'a> Value<'a> {
     /// The value's dotted key.
     pub fn key(&self) -> &str {
         &self.key
+    }
+
+    /// The file that contains the value.
+    pub fn source(&self) -> &'a Arc<Source> {
+        self.source
     }
 
     /// The value's bytes in the file.

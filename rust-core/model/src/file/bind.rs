@@ -3,17 +3,16 @@
 use super::Model;
 use super::density::DensityEntry;
 use super::excess::ExcessEntry;
-use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
-use super::number::formula_error;
+use super::interaction::{PairTable, ThermostatEntry};
 use crate::curve::pressure_table;
-use crate::curve::{Curve, CurveForm, Pressure, Spline};
+use crate::curve::{Curve, CurveForm, Pressure};
 use crate::document::{FileError, FileErrorKind, Located, Source};
 use crate::expression::{Ast, ErrorKind, Expansion, ExpressionError, Formula, Variables};
 use crate::fluid::{
     Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
 };
 use crate::kernel::Kernel;
-use crate::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive, TablePair};
+use crate::number::formula_error;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -45,7 +44,11 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
         .map(|entry| bind_excess(entry, &context, &variables, &densities))
         .collect::<Result<Vec<_>, _>>()?;
     check_bounded(model, &densities, &excess)?;
-    let pairs = model.pairs.iter().map(|entry| bind_pair(entry, &context)).collect::<Result<Vec<_>, _>>()?;
+    let bind_pair = |table: &PairTable| {
+        let potential = table.form.bind(&context.constants, source)?;
+        Ok(PairTerm { between: table.between, potential })
+    };
+    let pairs = model.pairs.iter().map(bind_pair).collect::<Result<Vec<_>, _>>()?;
     Ok(Fluid {
         title: model.title.clone(),
         reference: model.reference.clone(),
@@ -238,72 +241,6 @@ fn bind_density(
         correction,
         bounds,
     })
-}
-
-fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError> {
-    let (constants, source) = (&context.constants, context.source);
-    let value = |n: &super::Number| n.evaluate(constants, source).map(|x| x.value);
-    let potential = match &entry.form {
-        PairFormEntry::Soft { strength, range } => {
-            PairPotential::Soft(Soft::new(value(strength)?, range.positive(constants, source)?))
-        }
-        PairFormEntry::Spline { strength, repulsion, attraction, range_a, range_b } => {
-            PairPotential::Spline(SplineAttractive::new(
-                value(strength)?,
-                value(repulsion)?,
-                value(attraction)?,
-                range_a.positive(constants, source)?,
-                range_b.positive(constants, source)?,
-            ))
-        }
-        PairFormEntry::Expression { phi, range } => {
-            let variables = Variables { count: 1, names: BTreeMap::from([("r".to_owned(), vec![0])]) };
-            let range = range.positive(constants, source)?;
-            Formula::compile(&phi.value, constants, &variables)
-                .and_then(|formula| {
-                    let whole = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
-                    ExpressionPair::new(&formula, range).map_err(whole)
-                })
-                .map(PairPotential::Expression)
-                .map_err(|e| formula_error(source, phi, e))?
-        }
-        PairFormEntry::Table { spline, file, range } => {
-            let last = spline.ends()[1];
-            let range = match range {
-                Some(range) => {
-                    let place = range.evaluate(constants, source)?;
-                    let range = range.positive(constants, source)?;
-                    if range > last {
-                        let message = format!("is beyond the last r of the table, {last}");
-                        return Err(place.error(source, FileErrorKind::Value(message)));
-                    }
-                    range
-                }
-                None => last,
-            };
-            check_table(spline, range).map_err(|m| file.error(source, FileErrorKind::Value(m)))?;
-            PairPotential::Table(TablePair::new(Arc::clone(spline), range))
-        }
-    };
-    Ok(PairTerm { between: entry.between, potential })
-}
-
-/// Refuses a potential that jumps at its range, which would not conserve energy.
-fn check_table(spline: &Spline, range: f64) -> Result<(), String> {
-    let [first, _] = spline.ends();
-    if !(first >= 0.0 && range > first) {
-        return Err(format!("goes from r = {first} to {range}: r must rise from 0 or more"));
-    }
-    let largest = (0..=1000)
-        .map(|k| spline.at(first + (range - first) * k as f64 / 1000.0)[0].abs())
-        .fold(0.0, f64::max);
-    let end = spline.at(range)[0];
-    if end.abs() > 1e-6 * largest {
-        return Err(format!(
-            "phi is {end} at the range {range}: it must end at 0, or energy is not conserved"
-        ));
-    }
-    Ok(())
 }
 
 fn bind_thermostats(

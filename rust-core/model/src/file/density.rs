@@ -1,9 +1,9 @@
 use super::names::check_identifier;
-use super::number::Number;
 use super::species_index;
 use crate::document::{FileError, FileErrorKind, Located, Section, Value};
 use crate::fluid::Continuation;
 use crate::kernel::KernelKind;
+use crate::number::Number;
 use std::collections::BTreeMap;
 
 /// A `[density.NAME]` table.
@@ -47,7 +47,6 @@ pub fn read(
                 .with_help(format!("densities have names: write [density.{}]", "n")));
         };
         let entry = read_one(name.clone(), &table, species)?;
-        table.finish()?;
         check_clashes(&name, &section, species, parameters, &densities)?;
         densities.push(entry);
     }
@@ -61,7 +60,7 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
         Some(value) => value.one_of("kernel", &choices)?.value,
         None => kernel,
     };
-    let range = Number::read(&table.require("range")?, table.source())?;
+    let range = Number::require(table, "range")?;
     let includes_self = match table.get("self") {
         Some(value) => value.boolean()?.value,
         None => false,
@@ -76,7 +75,7 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
             let [low, high] = items.as_slice() else {
                 return Err(value.error(FileErrorKind::Value("expected [lowest, highest]".into())));
             };
-            Some([Number::read(low, table.source())?, Number::read(high, table.source())?])
+            Some([Number::read(low)?, Number::read(high)?])
         }
         None => None,
     };
@@ -107,7 +106,7 @@ fn read_correction(
                 value.error(FileErrorKind::Value("expected 1 to 16 coefficients in ascending powers".into()))
             );
         }
-        items.iter().map(|item| Number::read(item, table.source())).collect()
+        items.iter().map(|item| Number::read(item)).collect()
     };
     let count = species.len();
     if value.as_array().is_some() {

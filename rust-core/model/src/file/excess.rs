@@ -1,10 +1,9 @@
 use super::density::DensityEntry;
-use super::number::read_formula;
 use super::species_index;
-use super::table::read_spline;
-use crate::curve::Spline;
+use crate::curve::{Spline, read_spline};
 use crate::document::{FileError, FileErrorKind, Located, Section, Value};
 use crate::expression::Ast;
+use crate::number::read_formula;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -40,12 +39,8 @@ pub fn read(
     for (name, value) in section.entries() {
         let index = species_index(&species.value, &name, section.source())?;
         all[index] = match value.as_section() {
-            None => ExcessEntry::Formula(read_formula(&value, section.source())?),
-            Some(table) => {
-                let entry = read_curve(&table, species.value.len(), densities, directory)?;
-                table.finish()?;
-                entry
-            }
+            None => ExcessEntry::Formula(read_formula(&value)?),
+            Some(table) => read_curve(&table, species.value.len(), densities, directory)?,
         };
     }
     match all.iter().position(|e| matches!(e, ExcessEntry::None)) {
@@ -73,7 +68,7 @@ fn read_curve(
         if let Some((name, Some(other))) = others.iter().find(|(_, v)| v.is_some()) {
             return Err(other.error(FileErrorKind::Value(format!("slopes exclude {name}"))));
         }
-        return read_slopes(&slopes, energy, table);
+        return read_slopes(&slopes, energy);
     }
     if let Some(energy) = energy {
         return Err(energy.error(value("has no meaning without slopes")));
@@ -85,9 +80,9 @@ fn read_curve(
         }
         (None, Some(pressure)) if species == 1 => {
             if let Some(section) = pressure.as_section() {
+                section.only(["table"])?;
                 let file = section.require("table")?;
                 let spline = Arc::new(read_spline(&file, directory, ["rho", "p"])?);
-                section.finish()?;
                 let key = Located { value: (), span: file.span(), key: file.key().to_owned() };
                 return Ok(ExcessEntry::PressureTable { spline, density, key });
             }
@@ -95,14 +90,13 @@ fn read_curve(
                 let extension = Path::new(text).extension().and_then(|e| e.to_str());
                 extension.is_some_and(|e| e.bytes().all(|b| b.is_ascii_alphabetic()))
             };
-            let formula = read_formula(&pressure, table.source()).map_err(|error| {
-                match pressure.as_str().is_some_and(names_file) {
+            let formula =
+                read_formula(&pressure).map_err(|error| match pressure.as_str().is_some_and(names_file) {
                     true => {
                         error.with_help("p(rho) in a file is written { pressure = { table = \"p.csv\" } }")
                     }
                     false => error,
-                }
-            })?;
+                })?;
             Ok(ExcessEntry::Pressure { formula, density })
         }
         (None, Some(pressure)) => Err(pressure
@@ -115,15 +109,14 @@ fn read_curve(
     }
 }
 
-fn read_slopes(slopes: &Value, energy: Option<Value>, table: &Section) -> Result<ExcessEntry, FileError> {
+fn read_slopes(slopes: &Value, energy: Option<Value>) -> Result<ExcessEntry, FileError> {
     let section = slopes.section()?;
     let slopes = section
         .entries()
         .into_iter()
-        .map(|(name, value)| Ok((name, read_formula(&value, table.source())?)))
+        .map(|(name, value)| Ok((name, read_formula(&value)?)))
         .collect::<Result<Vec<_>, FileError>>()?;
-    section.finish()?;
-    let energy = energy.map(|e| read_formula(&e, table.source())).transpose()?;
+    let energy = energy.map(|e| read_formula(&e)).transpose()?;
     Ok(ExcessEntry::Slopes { slopes, energy })
 }
 

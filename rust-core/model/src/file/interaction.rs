@@ -1,27 +1,16 @@
-use super::number::{Number, read_formula};
 use super::species_index;
-use super::table::read_spline;
-use crate::curve::Spline;
-use crate::document::{FileError, FileErrorKind, Located, Section, Source, Value};
-use crate::expression::Ast;
+use crate::document::{FileError, FileErrorKind, Section, Source, Value};
 use crate::fluid::{ExcessFreeEnergy, Fluid};
+use crate::number::Number;
+use crate::pair::PairEntry;
 use std::path::Path;
 use std::sync::Arc;
 
 /// A `[[pair]]` table.
 #[derive(Debug, Clone)]
-pub struct PairEntry {
+pub struct PairTable {
     pub between: [usize; 2],
-    pub form: PairFormEntry,
-}
-
-/// The form of a pair potential, with its parameters.
-#[derive(Debug, Clone)]
-pub enum PairFormEntry {
-    Soft { strength: Number, range: Number },
-    Spline { strength: Number, repulsion: Number, attraction: Number, range_a: Number, range_b: Number },
-    Expression { phi: Located<Ast>, range: Number },
-    Table { spline: Arc<Spline>, file: Located<String>, range: Option<Number> },
+    pub form: PairEntry,
 }
 
 /// A `[[thermostat]]` table.
@@ -43,59 +32,15 @@ fn read_between(value: &Value, species: &[String], source: &Arc<Source>) -> Resu
 }
 
 /// Reads every `[[pair]]`.
-pub fn read_pairs(root: &Section, species: &[String], directory: &Path) -> Result<Vec<PairEntry>, FileError> {
-    let Some(value) = root.get("pair") else {
-        return Ok(Vec::new());
-    };
-    let mut pairs = Vec::new();
-    for item in value.array()? {
+pub fn read_pairs(root: &Section, species: &[String], directory: &Path) -> Result<Vec<PairTable>, FileError> {
+    let tables = root.get("pair").map_or(Ok(Vec::new()), |value| value.array())?;
+    let read = |item: &Value| {
         let table = item.section()?;
-        pairs.push(read_pair(&table, species, directory)?);
-        table.finish()?;
-    }
-    Ok(pairs)
-}
-
-fn read_pair(table: &Section, species: &[String], directory: &Path) -> Result<PairEntry, FileError> {
-    #[derive(Clone, Copy)]
-    enum Form {
-        Soft,
-        Spline,
-        Expression,
-        Table,
-    }
-    let source = table.source();
-    let between = read_between(&table.require("between")?, species, source)?;
-    let number = |key: &str| Number::read(&table.require(key)?, source);
-    let forms = [
-        ("soft", Form::Soft),
-        ("spline", Form::Spline),
-        ("expression", Form::Expression),
-        ("table", Form::Table),
-    ];
-    let form = match table.require("form")?.one_of("form", &forms)?.value {
-        Form::Soft => PairFormEntry::Soft { strength: number("strength")?, range: number("range")? },
-        Form::Spline => PairFormEntry::Spline {
-            strength: number("strength")?,
-            repulsion: number("A")?,
-            attraction: number("B")?,
-            range_a: number("range_A")?,
-            range_b: number("range_B")?,
-        },
-        Form::Expression => PairFormEntry::Expression {
-            phi: read_formula(&table.require("phi")?, source)?,
-            range: number("range")?,
-        },
-        Form::Table => {
-            let file = table.require("file")?;
-            PairFormEntry::Table {
-                spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
-                file: file.string()?,
-                range: table.get("range").map(|v| Number::read(&v, source)).transpose()?,
-            }
-        }
+        let between = read_between(&table.require("between")?, species, table.source())?;
+        let form = PairEntry::read(&table.require("form")?, &table, directory)?;
+        Ok(PairTable { between, form })
     };
-    Ok(PairEntry { between, form })
+    tables.iter().map(read).collect()
 }
 
 /// Reads every `[[thermostat]]`.
@@ -106,11 +51,8 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
     let mut entries: Vec<ThermostatEntry> = Vec::new();
     for item in value.array()? {
         let table = item.section()?;
-        let source = table.source();
-        let between = match table.get("between") {
-            Some(value) => Some(read_between(&value, species, source)?),
-            None => None,
-        };
+        let between =
+            table.get("between").map(|value| read_between(&value, species, table.source())).transpose()?;
         let same = |a: [usize; 2], b: [usize; 2]| a == b || a == [b[1], b[0]];
         let twice = entries.iter().any(|e| match (e.between, between) {
             (None, None) => true,
@@ -124,14 +66,10 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
         }
         entries.push(ThermostatEntry {
             between,
-            gamma: Number::read(&table.require("gamma")?, source)?,
-            range: Number::read(&table.require("range")?, source)?,
-            exponent: match table.get("exponent") {
-                Some(value) => Some(Number::read(&value, source)?),
-                None => None,
-            },
+            gamma: Number::require(&table, "gamma")?,
+            range: Number::require(&table, "range")?,
+            exponent: table.get("exponent").map(|value| Number::read(&value)).transpose()?,
         });
-        table.finish()?;
     }
     Ok(entries)
 }

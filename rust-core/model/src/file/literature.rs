@@ -47,7 +47,6 @@ pub fn read(root: &Section) -> Result<Vec<Published>, FileError> {
             let message = "a pressure needs the density that it belongs to".to_owned();
             return Err(table.require("pressure")?.error(FileErrorKind::Value(message)));
         }
-        table.finish()?;
         all.push(Published { kt, density, values });
     }
     Ok(all)

@@ -6,19 +6,17 @@ mod excess;
 mod interaction;
 mod literature;
 mod names;
-mod number;
-mod table;
+mod parameters;
 mod units;
 
 use super::fluid::Fluid;
-use crate::document::keys::{of_another_kind, strangers_first};
+use crate::document::keys::{of_another_kind, read_known};
 use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
 use density::DensityEntry;
 use excess::ExcessEntry;
-use interaction::{PairEntry, ThermostatEntry};
+use interaction::{PairTable, ThermostatEntry};
 pub use literature::Published;
 pub use names::KNOWN_FUNCTIONS;
-use number::Number;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -37,7 +35,7 @@ pub struct Model {
     parameters: BTreeMap<String, f64>,
     densities: Vec<DensityEntry>,
     excess: Vec<ExcessEntry>,
-    pairs: Vec<PairEntry>,
+    pairs: Vec<PairTable>,
     thermostats: Vec<ThermostatEntry>,
 }
 
@@ -62,8 +60,7 @@ impl Model {
     }
 
     fn read(document: &Document) -> Result<Model, FileError> {
-        Model::of(document)
-            .map_err(|error| strangers_first(error, &document.root(), crate::keys::TABLES, &[]))
+        read_known(&document.root(), crate::keys::TABLES, &[], || Model::of(document))
             .map_err(|error| no_model(&document.root()).unwrap_or(error))
     }
 
@@ -75,12 +72,11 @@ impl Model {
         let units = units::read(&root)?;
         let literature = literature::read(&root)?;
         let species = names::read_species(&root)?;
-        let parameters = number::read_parameters(&root)?;
+        let parameters = parameters::read(&root)?;
         let densities = density::read(&root, &species.value, &parameters)?;
         let excess = excess::read(&root, &species, &densities, document.directory())?;
         let pairs = interaction::read_pairs(&root, &species.value, document.directory())?;
         let thermostats = interaction::read_thermostats(&root, &species.value)?;
-        root.finish()?;
         let model = Model {
             source: Arc::clone(document.source()),
             title,

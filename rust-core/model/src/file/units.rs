@@ -26,7 +26,5 @@ pub fn read(root: &Section) -> Result<Option<Units>, FileError> {
             number => Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}")))),
         }
     };
-    let units = Units { length: positive("length")?, mass: positive("mass")?, energy: positive("energy")? };
-    table.finish()?;
-    Ok(Some(units))
+    Ok(Some(Units { length: positive("length")?, mass: positive("mass")?, energy: positive("energy")? }))
 }

@@ -1,7 +1,7 @@
 //! Pair potentials `φ(r)`, added to the many-body terms.
 //!
-//! To add a form: write one file with a type that implements [`PairForm`] and name it once in
-//! `pair_table!`; the model file's reader then needs its keys.
+//! To add a form: write one file with a type that implements [`PairForm`] and one that implements [`FormEntry`], its
+//! keys in the model file, and name both in `pair_table!`.
 
 mod expression;
 mod soft;
@@ -12,6 +12,12 @@ pub use expression::ExpressionPair;
 pub use soft::Soft;
 pub use spline::{SplineAttractive, spline_shape};
 pub use table::TablePair;
+
+use crate::document::keys::Key;
+use crate::document::{FileError, Section, Source, Value};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
 
 /// A pair potential that vanishes at and beyond its range.
 pub trait PairForm {
@@ -47,9 +53,71 @@ pub trait PairForm {
     }
 }
 
+/// The parameters of a form as the model file has them.
+pub trait FormEntry: Sized {
+    /// The potential.
+    type Form: PairForm;
+
+    /// The keys of the form.
+    const KEYS: &'static [Key];
+
+    /// Reads the keys; other files are searched in `directory`.
+    ///
+    /// # Errors
+    /// Fails for keys that are missing or have values of a wrong type.
+    fn read(table: &Section, directory: &Path) -> Result<Self, FileError>;
+
+    /// The potential for these parameters of the model, kT among them.
+    ///
+    /// # Errors
+    /// Fails for values out of their domain.
+    fn bind(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<Self::Form, FileError>;
+}
+
 /// The one list of pair forms.
 macro_rules! pair_table {
-    ($($variant:ident($form:ty) = $name:literal),+ $(,)?) => {
+    ($($variant:ident($form:ty, $entry:ty) = $name:literal),+ $(,)?) => {
+        /// The names of all forms.
+        pub const FORMS: &[&str] = &[$($name),+];
+
+        /// The keys of each form.
+        pub const FORM_KEYS: &[&[Key]] = &[$(<$entry as FormEntry>::KEYS),+];
+
+        /// The parameters of a pair potential of any form as the model file has them.
+        #[derive(Debug, Clone)]
+        pub enum PairEntry {
+            $(#[doc = concat!("The form `", $name, "`.")] $variant($entry)),+
+        }
+
+        impl PairEntry {
+            /// Reads the keys of the form that `form` names.
+            ///
+            /// # Errors
+            /// Fails for an unknown form, and for keys that are missing or have values of a wrong type.
+            pub fn read(form: &Value, table: &Section, directory: &Path) -> Result<PairEntry, FileError> {
+                type Reader = fn(&Section, &Path) -> Result<PairEntry, FileError>;
+                let readers: &[(&str, Reader)] = &[$((
+                    $name,
+                    |table, directory| <$entry>::read(table, directory).map(PairEntry::$variant),
+                )),+];
+                (form.one_of("form", readers)?.value)(table, directory)
+            }
+
+            /// The potential for these parameters of the model, kT among them.
+            ///
+            /// # Errors
+            /// Fails for values out of their domain.
+            pub fn bind(
+                &self,
+                constants: &BTreeMap<String, f64>,
+                source: &Arc<Source>,
+            ) -> Result<PairPotential, FileError> {
+                match self {
+                    $(PairEntry::$variant(entry) => entry.bind(constants, source).map(PairPotential::$variant)),+
+                }
+            }
+        }
+
         /// A pair potential of any form.
         #[derive(Debug, Clone)]
         pub enum PairPotential {
@@ -88,10 +156,10 @@ macro_rules! pair_table {
 }
 
 pair_table!(
-    Soft(Soft) = "soft",
-    Spline(SplineAttractive) = "spline",
-    Expression(ExpressionPair) = "expression",
-    Table(TablePair) = "table",
+    Soft(Soft, soft::SoftEntry) = "soft",
+    Spline(SplineAttractive, spline::SplineEntry) = "spline",
+    Expression(ExpressionPair, expression::ExpressionEntry) = "expression",
+    Table(TablePair, table::TableEntry) = "table",
 );
 
 #[cfg(test)]
@@ -121,7 +189,7 @@ mod tests {
         slope_is_derivative(&SplineAttractive::new(9.5, 2.0, 1.0, 0.8, 1.0), &[0.4, 0.5, 0.8]);
         let r: Vec<f64> = (0..=50).map(|k| 0.02 * k as f64).collect();
         let phi = r.iter().map(|r| 12.5 * (1.0 - r) * (1.0 - r)).collect();
-        let table = TablePair::new(std::sync::Arc::new(crate::curve::Spline::new(r, phi).unwrap()), 1.0);
+        let table = TablePair::new(Arc::new(crate::curve::Spline::new(r, phi).unwrap()), 1.0);
         slope_is_derivative(&table, &[]);
         let soft = Soft::new(25.0, 1.0);
         for k in 0..100 {

@@ -1,4 +1,10 @@
-use super::PairForm;
+use super::{FormEntry, PairForm};
+use crate::document::keys::{Key, REQUIRED, ValueKind, keys};
+use crate::document::{FileError, Section, Source};
+use crate::number::Number;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
 
 /// The soft potential of standard DPD, `φ = ½ a R (1 − r/R)²`: a force `a (1 − r/R)`.
 ///
@@ -18,6 +24,36 @@ impl Soft {
     /// The strength `a`: the force at contact.
     pub fn strength(&self) -> f64 {
         self.strength
+    }
+}
+
+/// The form `soft` in the model file.
+#[derive(Debug, Clone)]
+pub struct SoftEntry {
+    strength: Number,
+    range: Number,
+}
+
+impl FormEntry for SoftEntry {
+    type Form = Soft;
+
+    const KEYS: &'static [Key] = keys! {
+        "strength" [&["soft"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The amplitude of `phi = strength range/2 (1 - r/range)^2`, a force; negative if it attracts."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = \"-40\"\nrange = 1.0";
+        "range" [&["soft"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The distance at and beyond which the potential is zero."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = \"2^(1/3)\"";
+    };
+
+    fn read(table: &Section, _: &Path) -> Result<SoftEntry, FileError> {
+        let number = |key| Number::require(table, key);
+        Ok(SoftEntry { strength: number("strength")?, range: number("range")? })
+    }
+
+    fn bind(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<Soft, FileError> {
+        let strength = self.strength.evaluate(constants, source)?.value;
+        Ok(Soft::new(strength, self.range.positive(constants, source)?))
     }
 }
 

@@ -1,5 +1,11 @@
-use super::PairForm;
+use super::{FormEntry, PairForm};
+use crate::document::keys::{Key, REQUIRED, ValueKind, keys};
+use crate::document::{FileError, Section, Source};
 use crate::kernel::{CubicSpline, Shape};
+use crate::number::Number;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
 
 /// The repulsive–attractive potential of Wang and Chen,
 /// `φ = a [A W(r, R_A) − B W(r, R_B)]`, with the cubic spline `W` of their eq. (8), `W(0) = 1`,
@@ -54,6 +60,70 @@ impl SplineAttractive {
     /// The range `R_B` of the attraction.
     pub fn attraction_range(&self) -> f64 {
         self.attraction_range
+    }
+}
+
+/// The form `spline` in the model file.
+#[derive(Debug, Clone)]
+pub struct SplineEntry {
+    strength: Number,
+    repulsion: Number,
+    attraction: Number,
+    repulsion_range: Number,
+    attraction_range: Number,
+}
+
+impl FormEntry for SplineEntry {
+    type Form = SplineAttractive;
+
+    const KEYS: &'static [Key] = keys! {
+        "strength" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The amplitude, an energy, of `phi = strength [A W(r, range_A) - B W(r, range_B)]` with Wang and Chen's \
+             cubic spline, `W(0) = 1`."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A = \
+             0.8\nrange_B = 1.0";
+        "A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The weight of the repulsion."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A \
+             = 0.8\nrange_B = 1.0";
+        "B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The weight of the attraction."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = \
+             0.8\nrange_A = 0.8\nrange_B = 1.0";
+        "range_A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The range of the repulsion."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
+             0.75\nrange_B = 1.0";
+        "range_B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The range of the attraction."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
+             0.8\nrange_B = 1.1";
+    };
+
+    fn read(table: &Section, _: &Path) -> Result<SplineEntry, FileError> {
+        let number = |key| Number::require(table, key);
+        Ok(SplineEntry {
+            strength: number("strength")?,
+            repulsion: number("A")?,
+            attraction: number("B")?,
+            repulsion_range: number("range_A")?,
+            attraction_range: number("range_B")?,
+        })
+    }
+
+    fn bind(
+        &self,
+        constants: &BTreeMap<String, f64>,
+        source: &Arc<Source>,
+    ) -> Result<SplineAttractive, FileError> {
+        let value = |number: &Number| number.evaluate(constants, source).map(|x| x.value);
+        Ok(SplineAttractive::new(
+            value(&self.strength)?,
+            value(&self.repulsion)?,
+            value(&self.attraction)?,
+            self.repulsion_range.positive(constants, source)?,
+            self.attraction_range.positive(constants, source)?,
+        ))
     }
 }
 

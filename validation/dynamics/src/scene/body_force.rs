@@ -13,7 +13,6 @@ pub fn read(root: &Section, model: &Model, initial: &Initial) -> Result<Vec<Body
     for item in value.array()? {
         let section = item.section()?;
         forces.push(read_one(&section, model, initial)?);
-        section.finish()?;
     }
     Ok(forces)
 }

@@ -15,7 +15,6 @@ pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError>
     };
     let lengths = section.require("lengths")?;
     let periodic = read_boundary(&section, dimensions)?;
-    section.finish()?;
     build(&lengths, dimensions, periodic.unwrap_or([true; 3]))
 }
 
@@ -28,7 +27,6 @@ pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[
         return Err(lengths.error(FileErrorKind::Value(message())));
     }
     let periodic = read_boundary(&section, dimensions)?;
-    section.finish()?;
     Ok(periodic)
 }
 

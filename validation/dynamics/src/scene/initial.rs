@@ -92,7 +92,6 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
         let part = read_one(&kind, &key, &section, &common)?;
         (Initial::Parts(vec![part]), domain)
     };
-    section.finish()?;
     Ok(initial)
 }
 

@@ -1,5 +1,5 @@
 //! The table of all keys of the scene file: the JSON schema for editors and the reference
-//! `docs/scene-file.md` are written from it, and tests compare the reader with it.
+//! `docs/scene-file.md` are written from it, and a file with other keys is refused.
 
 // This layout takes a few lines for a key; rustfmt would take eight.
 #[rustfmt::skip]

@@ -8,7 +8,7 @@
 //! steps   = 1000
 //! ```
 //!
-//! `docs/scene-file.md` describes every key; it is written from the table in [`keys`], and tests compare the reader with it.
+//! `docs/scene-file.md` describes every key; it is written from the table in [`keys`], and a file with other keys is refused.
 
 mod arrangement;
 mod body_force;
@@ -42,7 +42,7 @@ pub use velocities::Velocities;
 
 use crate::particles::{BodyForce, State, Tags};
 use number::positive;
-use psidpd_core::document::keys::{of_another_kind, strangers_first};
+use psidpd_core::document::keys::{of_another_kind, read_known};
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{LocalEnergy, PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
@@ -114,8 +114,7 @@ impl Scene {
     }
 
     fn read(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
-        Scene::of(document, base, of_model)
-            .map_err(|error| strangers_first(error, &document.root(), keys::TABLES, &["observe"]))
+        read_known(&document.root(), keys::TABLES, &["observe"], || Scene::of(document, base, of_model))
             .map_err(|error| no_scene(&document.root()).unwrap_or(error))
     }
 
@@ -154,7 +153,6 @@ impl Scene {
         };
         scene.check_noise(&root)?;
         scene.check_trials(&root)?;
-        root.finish()?;
         scene.check_room(document)?;
         Ok(scene)
     }

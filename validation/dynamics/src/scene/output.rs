@@ -42,6 +42,5 @@ pub fn read(root: &Section) -> Result<Output, FileError> {
     if let Some(value) = section.get("checkpoint") {
         output.checkpoint = Some(value.count()?.value);
     }
-    section.finish()?;
     Ok(output)
 }

@@ -122,7 +122,6 @@ impl<'a> Common<'a> {
                     None => section.error(kind),
                 });
             }
-            section.finish()?;
             parts.push(part);
         }
         check_count(parts.iter().map(|p| p.count as f64).sum(), |kind| value.error(kind))?;

@@ -2,7 +2,7 @@
 
 use super::number::positive;
 use super::ramp;
-use crate::integrator::{Integrator, THERMOSTAT_STEPS};
+use crate::integrator::{Integrator, Settings, THERMOSTAT_STEPS};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::noise::Law;
 
@@ -86,7 +86,6 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
             }
             stages.push(stage);
         }
-        section.finish()?;
     }
     if stages.is_empty() {
         return Err(value.error(FileErrorKind::Value("needs at least one stage".into())));
@@ -181,58 +180,48 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
         Some(value) => value.one_of("integrator", &Integrator::NAMED)?.value,
         None => default,
     };
-    let name = integrator.name();
-    if let Some(value) = section.get("lambda") {
-        let Some((lambda, [low, high])) = integrator.settings().lambda else {
-            return Err(has_none(&value, name, "lambda", |other| other.settings().lambda.is_some()));
-        };
+    let kind = integrator;
+    let own = |key: &str, has: fn(&mut Integrator) -> bool| match section.get(key) {
+        Some(value) if !has(&mut { kind }) => Err(has_none(&value, kind.name(), key, has)),
+        value => Ok(value),
+    };
+    let Settings { lambda, gradient, mut coupling, noise, trials } = integrator.settings();
+    if let (Some(value), Some((lambda, [low, high]))) =
+        (own("lambda", |other| other.settings().lambda.is_some())?, lambda)
+    {
         *lambda = value.number()?.value;
         if !(low..=high).contains(lambda) {
             let message = format!("must be from {low} to {high}, is {lambda}");
             return Err(value.error(FileErrorKind::Value(message)));
         }
     }
-    if let Some(value) = section.get("gradient") {
-        let Some(gradient) = integrator.settings().gradient else {
-            return Err(has_none(&value, name, "gradient", |other| other.settings().gradient.is_some()));
-        };
+    if let (Some(value), Some(gradient)) =
+        (own("gradient", |other| other.settings().gradient.is_some())?, gradient)
+    {
         *gradient = value.number()?.value;
         if !(0.0..=1.0).contains(gradient) {
             return Err(value.error(FileErrorKind::Value(format!("must be from 0 to 1, is {gradient}"))));
         }
     }
-    if let Some(value) = section.get("thermostat_step") {
-        let Some(coupling) = integrator.settings().coupling else {
-            return Err(has_none(&value, name, "thermostat_step", |other| {
-                other.settings().coupling.is_some()
-            }));
-        };
+    let couples = |other: &mut Integrator| other.settings().coupling.is_some();
+    if let (Some(value), Some(coupling)) = (own("thermostat_step", couples)?, &mut coupling) {
         coupling.update = value.one_of("thermostat_step", &THERMOSTAT_STEPS)?.value;
     }
-    if let Some(value) = section.get("thermostat_every") {
-        let Some(coupling) = integrator.settings().coupling else {
-            return Err(has_none(&value, name, "thermostat_every", |other| {
-                other.settings().coupling.is_some()
-            }));
-        };
+    if let (Some(value), Some(coupling)) = (own("thermostat_every", couples)?, &mut coupling) {
         coupling.every = read_steps(&value)?;
     }
-    if let Some(value) = section.get("sweeps") {
-        let Some((sweeps, _)) = integrator.settings().trials else {
-            return Err(has_none(&value, name, "sweeps", |other| other.settings().trials.is_some()));
-        };
-        *sweeps = read_steps(&value)?;
+    let tries = |other: &mut Integrator| other.settings().trials.is_some();
+    let [sweeps_key, move_key] = [own("sweeps", tries)?, own("max_move", tries)?];
+    if let Some((sweeps, max_move)) = trials {
+        if let Some(value) = sweeps_key {
+            *sweeps = read_steps(&value)?;
+        }
+        if let Some(value) = move_key {
+            *max_move = Some(positive(&value)?);
+        }
     }
-    if let Some(value) = section.get("max_move") {
-        let Some((_, max_move)) = integrator.settings().trials else {
-            return Err(has_none(&value, name, "max_move", |other| other.settings().trials.is_some()));
-        };
-        *max_move = Some(positive(&value)?);
-    }
-    if let Some(value) = section.get("noise") {
-        let Some(noise) = integrator.noise() else {
-            return Err(has_none(&value, name, "noise", |other| other.noise().is_some()));
-        };
+    let noise = noise.or(coupling.map(|coupling| &mut coupling.noise));
+    if let (Some(value), Some(noise)) = (own("noise", |other| other.noise().is_some())?, noise) {
         *noise = value.one_of("noise", &Law::ALL)?.value;
     }
     Ok(integrator)

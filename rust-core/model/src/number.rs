@@ -1,7 +1,8 @@
-use super::names::check_identifier;
+//! Numbers of a model file, which may be formulas.
+
 use crate::document::{FileError, FileErrorKind, Located, Section, Source, Value};
 use crate::expression::{Ast, ExpressionError, Formula, Variables};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ pub enum Number {
 
 impl Number {
     /// Reads a number or a formula; names are looked up when it is evaluated.
-    pub fn read(value: &Value, source: &Arc<Source>) -> Result<Number, FileError> {
+    pub fn read(value: &Value) -> Result<Number, FileError> {
         if let Some(number) = value.as_number() {
             return Ok(Number::Value(Located {
                 value: number?,
@@ -25,12 +26,17 @@ impl Number {
             }));
         }
         match value.as_str() {
-            Some(_) => Ok(Number::Formula(read_formula(value, source)?)),
+            Some(_) => Ok(Number::Formula(read_formula(value)?)),
             None => Err(value.error(FileErrorKind::WrongType {
                 expected: "a number or a formula of the parameters",
                 found: "something else",
             })),
         }
+    }
+
+    /// Reads a required key.
+    pub fn require(table: &Section, key: &str) -> Result<Number, FileError> {
+        Number::read(&table.require(key)?)
     }
 
     /// The value of the number or formula with these constants.
@@ -72,8 +78,8 @@ impl Number {
 }
 
 /// Parses the formula in a string value.
-pub fn read_formula(value: &Value, source: &Arc<Source>) -> Result<Located<Ast>, FileError> {
-    let text = value.string()?;
+pub fn read_formula(value: &Value) -> Result<Located<Ast>, FileError> {
+    let (text, source) = (value.string()?, value.source());
     match Ast::parse(&text.value) {
         Ok(ast) => Ok(text.map(|_| ast)),
         Err(error) => Err(FileError::new(
@@ -113,64 +119,4 @@ fn span_in_string(source: &Source, string: &Range<usize>, error: &ExpressionErro
         end += 1;
     }
     start..end
-}
-
-/// Most parameters of a model: each may depend on all others.
-const MOST_PARAMETERS: usize = 1000;
-
-/// The `[parameters]` table: numbers, or formulas of other parameters, in any order.
-pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
-    let mut known = BTreeMap::new();
-    let Some(value) = root.get("parameters") else {
-        return Ok(known);
-    };
-    let section = value.section()?;
-    let source = section.source();
-    let mut waiting: Vec<(String, Number)> = Vec::new();
-    let entries = section.entries();
-    if entries.len() > MOST_PARAMETERS {
-        let message = format!("{} parameters, more than {MOST_PARAMETERS}", entries.len());
-        return Err(value.error(FileErrorKind::Value(message)));
-    }
-    for (name, value) in entries {
-        check_identifier(&name, &section)?;
-        let number = Number::read(&value, source)?;
-        if let Number::Formula(ast) = &number
-            && ast.value.names().any(|(name, _)| name == "kT")
-        {
-            let message =
-                "a parameter has one value at all temperatures: write kT where the parameter is used";
-            return Err(value.error(FileErrorKind::Value(message.into())));
-        }
-        waiting.push((name.value, number));
-    }
-    // Formulas may refer to each other: each pass evaluates those whose parameters are known, until none is left.
-    let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
-    while !waiting.is_empty() {
-        let before = waiting.len();
-        let mut still = Vec::new();
-        for (name, number) in waiting {
-            let ready = match &number {
-                Number::Value(_) => true,
-                Number::Formula(ast) => {
-                    ast.value.names().all(|(n, _)| known.contains_key(n) || !names.contains(n))
-                }
-            };
-            if ready {
-                let value = number.evaluate(&known, source)?.value;
-                known.insert(name, value);
-            } else {
-                still.push((name, number));
-            }
-        }
-        if still.len() == before {
-            let circle: Vec<&str> = still.iter().map(|(n, _)| n.as_str()).collect();
-            return Err(section.error(FileErrorKind::Value(format!(
-                "these parameters refer to each other in a circle: {}",
-                circle.join(", ")
-            ))));
-        }
-        waiting = still;
-    }
-    Ok(known)
 }

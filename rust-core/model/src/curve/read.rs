@@ -1,4 +1,4 @@
-use crate::curve::{Spline, SplineError};
+use super::{Spline, SplineError};
 use crate::document::{Columns, FileError, FileErrorKind, Value};
 use std::path::Path;
 

@@ -1,0 +1,66 @@
+//! The table `[parameters]`.
+
+use super::names::check_identifier;
+use crate::document::{FileError, FileErrorKind, Section};
+use crate::number::Number;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Most parameters of a model: each may depend on all others.
+const MOST_PARAMETERS: usize = 1000;
+
+/// The `[parameters]` table: numbers, or formulas of other parameters, in any order.
+pub fn read(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
+    let mut known = BTreeMap::new();
+    let Some(value) = root.get("parameters") else {
+        return Ok(known);
+    };
+    let section = value.section()?;
+    let source = section.source();
+    let mut waiting: Vec<(String, Number)> = Vec::new();
+    let entries = section.entries();
+    if entries.len() > MOST_PARAMETERS {
+        let message = format!("{} parameters, more than {MOST_PARAMETERS}", entries.len());
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    for (name, value) in entries {
+        check_identifier(&name, &section)?;
+        let number = Number::read(&value)?;
+        if let Number::Formula(ast) = &number
+            && ast.value.names().any(|(name, _)| name == "kT")
+        {
+            let message =
+                "a parameter has one value at all temperatures: write kT where the parameter is used";
+            return Err(value.error(FileErrorKind::Value(message.into())));
+        }
+        waiting.push((name.value, number));
+    }
+    // Formulas may refer to each other: each pass evaluates those whose parameters are known, until none is left.
+    let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
+    while !waiting.is_empty() {
+        let before = waiting.len();
+        let mut still = Vec::new();
+        for (name, number) in waiting {
+            let ready = match &number {
+                Number::Value(_) => true,
+                Number::Formula(ast) => {
+                    ast.value.names().all(|(n, _)| known.contains_key(n) || !names.contains(n))
+                }
+            };
+            if ready {
+                let value = number.evaluate(&known, source)?.value;
+                known.insert(name, value);
+            } else {
+                still.push((name, number));
+            }
+        }
+        if still.len() == before {
+            let circle: Vec<&str> = still.iter().map(|(n, _)| n.as_str()).collect();
+            return Err(section.error(FileErrorKind::Value(format!(
+                "these parameters refer to each other in a circle: {}",
+                circle.join(", ")
+            ))));
+        }
+        waiting = still;
+    }
+    Ok(known)
+}
