@@ -40,9 +40,9 @@ pub fn c_api(input: &[u8]) {
     let mut engine: *mut Engine = null_mut();
     // SAFETY: `model` is valid until it is freed once, at the end of this block.
     unsafe {
-        told(psidpd_engine_new_with(model, bytes.number(), &settings, &mut engine));
+        told(psidpd_engine_new(model, bytes.number(), &settings, &mut engine));
         if engine.is_null() {
-            told(psidpd_engine_new(model, 1.0, &mut engine));
+            told(psidpd_engine_new(model, 1.0, null(), &mut engine));
         }
         psidpd_model_free(model);
     }
@@ -125,9 +125,7 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
     // until the end of this function. All other pointers are null.
     unsafe {
         told(match which {
-            0 => psidpd_engine_densities(engine, &request.particles, newton),
-            1 => psidpd_engine_forces(engine, &request.particles, v, step, want, force, &mut tally),
-            2 | 3 => psidpd_engine_evaluate(engine, &domain(bytes), &request, force, &mut tally),
+            0..=3 => psidpd_engine_evaluate(engine, &domain(bytes), &request, force, &mut tally),
             4 | 5 => {
                 let ghosts = cloud.tag.len().saturating_sub(cloud.owned);
                 let images: Vec<i32> = (0..ghosts).map(|_| i32::from(bytes.byte() > 128)).collect();
@@ -153,8 +151,7 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
                 let species: Vec<i32> = (0..bytes.below(6)).map(|_| small(bytes)).collect();
                 psidpd_engine_map_kinds(engine, species.as_ptr(), species.len())
             }
-            9 => psidpd_engine_sum_all_densities(engine, small(bytes)),
-            10 => {
+            9 | 10 => {
                 let (mut slopes, mut length) = (null_mut(), 0);
                 let status = psidpd_engine_slopes(engine, &mut slopes, &mut length);
                 if status == Status::Ok {
@@ -166,15 +163,13 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
                 status
             }
             _ => {
-                let get = [
-                    psidpd_engine_local_densities,
-                    psidpd_engine_particle_energy,
-                    psidpd_engine_particle_virial,
-                ];
-                let (mut numbers, mut length) = (null(), 0);
-                let status = get[bytes.below(3)](engine, &mut numbers, &mut length);
+                let mut results = std::mem::zeroed::<Results>();
+                let status = psidpd_engine_results(engine, &mut results);
                 if status == Status::Ok {
-                    let _ = (0..length).map(|k| *numbers.add(k)).sum::<f64>();
+                    let Results { density, densities, energy, energies, virial, virials } = results;
+                    for (numbers, length) in [(density, densities), (energy, energies), (virial, virials)] {
+                        let _ = (0..length).map(|k| *numbers.add(k)).sum::<f64>();
+                    }
                 }
                 status
             }

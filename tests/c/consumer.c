@@ -101,33 +101,42 @@ static void add_images(struct host *host, double cutoff)
     host->all = all;
 }
 
+/* A request for all results. */
+static psidpd_request ask(const struct host *host, size_t owned, size_t all, const psidpd_step *step)
+{
+    psidpd_request request;
+    request.particles.owned = owned;
+    request.particles.all = all;
+    request.particles.x = host->x;
+    request.particles.tag = host->tag;
+    request.particles.kind = host->kind;
+    request.v = step != NULL ? host->v : NULL;
+    request.step = step;
+    request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL | PSIDPD_WANT_PARTICLE_ENERGY |
+                   PSIDPD_WANT_PARTICLE_VIRIAL | PSIDPD_WANT_DENSITIES;
+    return request;
+}
+
 /* Energy, virial and forces on owned particles. */
 static void evaluate(psidpd_engine *engine, struct host *host, int newton, const psidpd_step *step)
 {
-    psidpd_particles particles;
-    double cutoff, *slopes;
-    size_t width, length, g, k;
-    OK(psidpd_engine_cutoff(engine, &cutoff));
-    OK(psidpd_engine_slope_width(engine, &width));
-    add_images(host, cutoff);
-    particles.owned = OWNED;
-    particles.all = host->all;
-    particles.x = host->x;
-    particles.tag = host->tag;
-    particles.kind = host->kind;
-    OK(psidpd_engine_densities(engine, &particles, newton));
+    psidpd_engine_facts facts;
+    psidpd_request request;
+    double *slopes;
+    size_t length, g, k;
+    OK(psidpd_engine_describe(engine, &facts));
+    add_images(host, facts.cutoff);
+    request = ask(host, OWNED, host->all, step);
+    OK(psidpd_engine_first(engine, NULL, NULL, newton, &request));
     OK(psidpd_engine_slopes(engine, &slopes, &length));
-    CHECK(length == host->all * width);
+    CHECK(length == host->all * facts.slope_width);
     for (g = OWNED; g < host->all; g++) {
-        for (k = 0; k < width; k++) {
-            slopes[g * width + k] = slopes[host->owner[g] * width + k];
+        for (k = 0; k < facts.slope_width; k++) {
+            slopes[g * facts.slope_width + k] = slopes[host->owner[g] * facts.slope_width + k];
         }
     }
     memset(host->force, 0, sizeof host->force);
-    OK(psidpd_engine_forces(engine, &particles, step != NULL ? host->v : NULL, step,
-                            PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL | PSIDPD_WANT_PARTICLE_ENERGY |
-                                PSIDPD_WANT_PARTICLE_VIRIAL,
-                            host->force, &host->tally));
+    OK(psidpd_engine_second(engine, &request, host->force, &host->tally));
     for (g = OWNED; g < host->all; g++) {
         for (k = 0; k < 3; k++) {
             host->force[3 * host->owner[g] + k] += host->force[3 * g + k];
@@ -152,24 +161,22 @@ static void print_outcome(const char *name, const struct host *host)
 
 static void check_particle_sums(const psidpd_engine *engine, const struct host *host)
 {
-    const double *energy, *virial, *density;
+    psidpd_results results;
     double sum = 0.0, trace = 0.0;
     const double u = host->tally.excess + host->tally.pair;
-    size_t i, energies, virials, densities;
-    OK(psidpd_engine_particle_energy(engine, &energy, &energies));
-    OK(psidpd_engine_particle_virial(engine, &virial, &virials));
-    CHECK(energies == host->all && virials == 6 * host->all);
+    size_t i;
+    OK(psidpd_engine_results(engine, &results));
+    CHECK(results.energies == host->all && results.virials == 6 * host->all);
     for (i = 0; i < host->all; i++) {
-        sum += energy[i];
-        trace += virial[6 * i] + virial[6 * i + 1] + virial[6 * i + 2];
+        sum += results.energy[i];
+        trace += results.virial[6 * i] + results.virial[6 * i + 1] + results.virial[6 * i + 2];
     }
     CHECK(fabs(sum - u) < 1e-10 * (1.0 + fabs(u)));
     sum = host->tally.virial[0] + host->tally.virial[1] + host->tally.virial[2];
     CHECK(fabs(trace - sum) < 1e-10 * (1.0 + fabs(sum)));
-    OK(psidpd_engine_local_densities(engine, &density, &densities));
-    CHECK(densities == OWNED);
+    CHECK(results.densities == OWNED);
     printf("density");
-    for (i = 0; i < densities; i++) printf(" %.17g", density[i]);
+    for (i = 0; i < OWNED; i++) printf(" %.17g", results.density[i]);
     printf("\n");
 }
 
@@ -209,7 +216,8 @@ static void check_paths(const psidpd_model *model)
     static int32_t tag[MANY], kind[MANY], i[MANY * MANY / 2], j[MANY * MANY / 2];
     static double factor[MANY * MANY / 2];
     const psidpd_box domain = {{-1.0, 0.5, 2.0}, {3.1, 0, 0, 0.3, 3.4, 0, 0, 0, 3.2}, {1, 1, 1}};
-    psidpd_settings settings = {PSIDPD_PRECISION_DOUBLE, PSIDPD_INSTRUCTIONS_BEST, 2}, told;
+    psidpd_settings settings = {PSIDPD_PRECISION_DOUBLE, PSIDPD_INSTRUCTIONS_BEST, 2};
+    psidpd_engine_facts facts;
     const psidpd_step step = {9, 4, 0.01};
     psidpd_request request;
     psidpd_pairs pairs;
@@ -217,9 +225,9 @@ static void check_paths(const psidpd_model *model)
     psidpd_tally tally;
     psidpd_path path;
     const char *text;
-    const double *given;
+    psidpd_results results;
     double *slopes, range;
-    size_t k, m, length, width;
+    size_t k, m, length;
     for (k = 0; k < 3 * MANY; k++) {
         x[k] = 3.0 * uniform();
         v[k] = uniform() - 0.5;
@@ -239,15 +247,15 @@ static void check_paths(const psidpd_model *model)
     request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL;
 
     settings.threads = 0;
-    FAILS(psidpd_engine_new_with(model, 1.0, &settings, &engine), PSIDPD_STATUS_INVALID_ARGUMENT, "threads");
+    FAILS(psidpd_engine_new(model, 1.0, &settings, &engine), PSIDPD_STATUS_INVALID_ARGUMENT, "threads");
     settings.threads = 2;
     settings.precision = 7;
-    FAILS(psidpd_engine_new_with(model, 1.0, &settings, &engine), PSIDPD_STATUS_INVALID_ARGUMENT, "precision");
+    FAILS(psidpd_engine_new(model, 1.0, &settings, &engine), PSIDPD_STATUS_INVALID_ARGUMENT, "precision");
     settings.precision = PSIDPD_PRECISION_DOUBLE;
-    OK(psidpd_engine_new_with(model, 1.0, &settings, &engine));
-    OK(psidpd_engine_settings(engine, &told));
-    CHECK(told.threads == 2 && told.precision == PSIDPD_PRECISION_DOUBLE);
-    CHECK(told.instructions != PSIDPD_INSTRUCTIONS_BEST);
+    OK(psidpd_engine_new(model, 1.0, &settings, &engine));
+    OK(psidpd_engine_describe(engine, &facts));
+    CHECK(facts.settings.threads == 2 && facts.settings.precision == PSIDPD_PRECISION_DOUBLE);
+    CHECK(facts.settings.instructions != PSIDPD_INSTRUCTIONS_BEST);
     FAILS(psidpd_engine_path(engine, &path, &text), PSIDPD_STATUS_CALL_ORDER, "nothing");
     FAILS(psidpd_engine_second(engine, &request, f[0], &tally), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
 
@@ -257,11 +265,11 @@ static void check_paths(const psidpd_model *model)
     OK(psidpd_engine_path(engine, &path, &text));
     CHECK(path == PSIDPD_PATH_SWEEP && strcmp(text, "cell sweep") == 0);
     FAILS(psidpd_engine_slopes(engine, &slopes, &length), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
-    OK(psidpd_engine_particle_energy(engine, &given, &length));
-    CHECK(length == 0);
+    OK(psidpd_engine_results(engine, &results));
+    CHECK(results.energies == 0);
     settings.threads = 1;
     settings.instructions = PSIDPD_INSTRUCTIONS_PORTABLE;
-    OK(psidpd_engine_new_with(model, 1.0, &settings, &plain));
+    OK(psidpd_engine_new(model, 1.0, &settings, &plain));
     OK(psidpd_engine_evaluate(plain, &domain, &request, f[1], &tally));
     energy[1] = tally.excess + tally.pair;
     psidpd_engine_free(plain);
@@ -270,12 +278,11 @@ static void check_paths(const psidpd_model *model)
     energy[2] = tally.excess + tally.pair;
     OK(psidpd_engine_path(engine, &path, &text));
     CHECK(path == PSIDPD_PATH_REFERENCE && strstr(text, "single particles") != NULL);
-    OK(psidpd_engine_particle_energy(engine, &given, &length));
-    CHECK(length == MANY);
-    for (range = 0.0, k = 0; k < length; k++) range += given[k];
+    OK(psidpd_engine_results(engine, &results));
+    CHECK(results.energies == MANY);
+    for (range = 0.0, k = 0; k < MANY; k++) range += results.energy[k];
     CHECK(fabs(range - energy[2]) < 1e-10 * (1.0 + fabs(energy[2])));
-    OK(psidpd_engine_local_densities(engine, &given, &length));
-    CHECK(length == MANY && given[0] > 0.0);
+    CHECK(results.densities == MANY && results.density[0] > 0.0);
 
     /* Densities that forces need anyway change nothing. */
     request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_DENSITIES;
@@ -283,8 +290,8 @@ static void check_paths(const psidpd_model *model)
     energy[3] = tally.excess + tally.pair;
     OK(psidpd_engine_path(engine, &path, &text));
     CHECK(path == PSIDPD_PATH_SWEEP);
-    OK(psidpd_engine_local_densities(engine, &given, &length));
-    CHECK(length == MANY && given[0] > 0.0);
+    OK(psidpd_engine_results(engine, &results));
+    CHECK(results.densities == MANY && results.density[0] > 0.0);
     for (m = 1; m < 4; m++) {
         CHECK(fabs(energy[m] - energy[0]) < 1e-9 * (1.0 + fabs(energy[0])));
         for (k = 0; k < 3 * MANY; k++) CHECK(fabs(f[m][k] - f[0][k]) < 1e-8 * (1.0 + fabs(f[0][k])));
@@ -295,16 +302,15 @@ static void check_paths(const psidpd_model *model)
     memset(f[3], 0, sizeof f[3]);
     request.want = PSIDPD_WANT_ENERGY;
     OK(psidpd_engine_first(engine, &domain, NULL, 1, &request));
-    OK(psidpd_engine_slope_width(engine, &width));
     OK(psidpd_engine_slopes(engine, &slopes, &length));
-    CHECK(length == MANY * width);
+    CHECK(length == MANY * facts.slope_width);
     OK(psidpd_engine_second(engine, &request, f[3], NULL));
     FAILS(psidpd_engine_second(engine, &request, f[3], NULL), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
     for (k = 0; k < 3 * MANY; k++) CHECK(fabs(f[3][k] - f[0][k]) < 1e-8 * (1.0 + fabs(f[0][k])));
 
     /* Mixed precision is mixed. */
     settings.precision = PSIDPD_PRECISION_MIXED;
-    OK(psidpd_engine_new_with(model, 1.0, &settings, &plain));
+    OK(psidpd_engine_new(model, 1.0, &settings, &plain));
     OK(psidpd_engine_evaluate(plain, &domain, &request, mixed, &tally));
     psidpd_engine_free(plain);
     for (range = 0.0, k = 0; k < 3 * MANY; k++) range = fmax(range, fabs(mixed[k] - f[0][k]) / (1.0 + fabs(f[0][k])));
@@ -364,14 +370,7 @@ static void check_narrow_box(psidpd_engine *engine, const struct host *start, co
     host = *start;
     evaluate(engine, &host, 1, step);
     own = *start;
-    request.particles.owned = OWNED;
-    request.particles.all = OWNED;
-    request.particles.x = own.x;
-    request.particles.tag = own.tag;
-    request.particles.kind = own.kind;
-    request.v = own.v;
-    request.step = step;
-    request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL;
+    request = ask(&own, OWNED, OWNED, step);
     memset(own.force, 0, sizeof own.force);
     OK(psidpd_engine_evaluate(engine, &domain, &request, own.force, &own.tally));
     CHECK(fabs(own.tally.pair - host.tally.pair) < 1e-10 * (1.0 + fabs(host.tally.pair)));
@@ -384,7 +383,7 @@ static void check_model_errors(const psidpd_model *model, const char *missing_pa
     psidpd_model *none = NULL;
     psidpd_engine *engine = NULL;
     const char *text = NULL;
-    size_t count = 77;
+    psidpd_model_facts facts;
     FAILS(psidpd_model_open(missing_path, &none), PSIDPD_STATUS_FILE, missing_path);
     FAILS(psidpd_model_open(NULL, &none), PSIDPD_STATUS_NULL_POINTER, "path is NULL");
     FAILS(psidpd_model_open(missing_path, NULL), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
@@ -394,14 +393,13 @@ static void check_model_errors(const psidpd_model *model, const char *missing_pa
     FAILS(psidpd_model_parse("bad.toml", NULL, &none), PSIDPD_STATUS_NULL_POINTER, "text is NULL");
     CHECK(none == NULL);
     FAILS(psidpd_model_species_name(model, 1, &text), PSIDPD_STATUS_INVALID_ARGUMENT, "species 1");
-    FAILS(psidpd_model_species_count(NULL, &count), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
-    FAILS(psidpd_model_species_count(model, NULL), PSIDPD_STATUS_NULL_POINTER, "count is NULL");
-    FAILS(psidpd_model_dimensions(NULL, &count), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
-    FAILS(psidpd_model_title(NULL, &text), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
-    CHECK(text == NULL && count == 77);
-    FAILS(psidpd_engine_new(NULL, 1.0, &engine), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
-    FAILS(psidpd_engine_new(model, 1.0, NULL), PSIDPD_STATUS_NULL_POINTER, "engine is NULL");
-    FAILS(psidpd_engine_new(model, -1.0, &engine), PSIDPD_STATUS_MODEL, "kT");
+    facts.species = 77;
+    FAILS(psidpd_model_describe(NULL, &facts), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    FAILS(psidpd_model_describe(model, NULL), PSIDPD_STATUS_NULL_POINTER, "facts is NULL");
+    CHECK(text == NULL && facts.species == 77);
+    FAILS(psidpd_engine_new(NULL, 1.0, NULL, &engine), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    FAILS(psidpd_engine_new(model, 1.0, NULL, NULL), PSIDPD_STATUS_NULL_POINTER, "engine is NULL");
+    FAILS(psidpd_engine_new(model, -1.0, NULL, &engine), PSIDPD_STATUS_MODEL, "kT");
     CHECK(engine == NULL);
     psidpd_model_free(NULL);
     psidpd_engine_free(NULL);
@@ -411,74 +409,78 @@ static void check_engine_errors(const psidpd_model *model, const struct host *st
 {
     static struct host host;
     psidpd_engine *engine;
-    psidpd_particles particles;
+    psidpd_engine_facts facts;
+    psidpd_results results;
+    psidpd_request request;
     psidpd_step step = {1, 2, 0.01};
     const int32_t too_high[1] = {1}, only_second[2] = {-1, 0};
-    const double *values;
-    double number, *slopes;
+    double *slopes;
     size_t length;
     host = *start;
-    particles.owned = 2;
-    particles.all = 2;
-    particles.x = host.x;
-    particles.tag = host.tag;
-    particles.kind = host.kind;
-    OK(psidpd_engine_new(model, 1.0, &engine));
-#define FORCES(v, step, want, force)                                                               \
-    psidpd_engine_forces(engine, &particles, (v), (step), (want), (force), NULL)
+    request = ask(&host, 2, 2, NULL);
+    request.want = 0;
+    OK(psidpd_engine_new(model, 1.0, NULL, &engine));
+#define FIRST(newton) psidpd_engine_first(engine, NULL, NULL, (newton), &request)
+#define SECOND(force) psidpd_engine_second(engine, &request, (force), NULL)
 
-    FAILS(psidpd_engine_cutoff(NULL, &number), PSIDPD_STATUS_NULL_POINTER, "engine is NULL");
-    FAILS(psidpd_engine_cutoff(engine, NULL), PSIDPD_STATUS_NULL_POINTER, "cutoff is NULL");
-    FAILS(psidpd_engine_sum_all_densities(engine, 2), PSIDPD_STATUS_INVALID_ARGUMENT, "all is 2");
+    FAILS(psidpd_engine_describe(NULL, &facts), PSIDPD_STATUS_NULL_POINTER, "engine is NULL");
+    FAILS(psidpd_engine_describe(engine, NULL), PSIDPD_STATUS_NULL_POINTER, "facts is NULL");
     FAILS(psidpd_engine_map_kinds(engine, too_high, 1), PSIDPD_STATUS_INVALID_ARGUMENT, "species");
     FAILS(psidpd_engine_map_kinds(engine, NULL, 1), PSIDPD_STATUS_NULL_POINTER, "species is NULL");
 
     /* Out of order. */
-    FAILS(FORCES(NULL, NULL, 0, host.force), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_densities");
-    FAILS(psidpd_engine_slopes(engine, &slopes, &length), PSIDPD_STATUS_CALL_ORDER, "densities");
-    FAILS(psidpd_engine_local_densities(engine, &values, &length), PSIDPD_STATUS_CALL_ORDER,
-          "psidpd_engine_densities");
+    FAILS(SECOND(host.force), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
+    FAILS(psidpd_engine_slopes(engine, &slopes, &length), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
+    FAILS(psidpd_engine_results(engine, &results), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_evaluate");
 
-    FAILS(psidpd_engine_densities(NULL, &particles, 1), PSIDPD_STATUS_NULL_POINTER, "engine");
-    FAILS(psidpd_engine_densities(engine, NULL, 1), PSIDPD_STATUS_NULL_POINTER, "particles is");
-    FAILS(psidpd_engine_densities(engine, &particles, 7), PSIDPD_STATUS_INVALID_ARGUMENT, "newton");
-    particles.x = NULL;
-    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_NULL_POINTER,
-          "particles.x is NULL");
-    particles.x = host.x;
-    particles.owned = 3;
-    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_INVALID_ARGUMENT,
-          "3 are owned");
-    particles.owned = 2;
+    FAILS(psidpd_engine_first(NULL, NULL, NULL, 1, &request), PSIDPD_STATUS_NULL_POINTER, "engine");
+    FAILS(psidpd_engine_first(engine, NULL, NULL, 1, NULL), PSIDPD_STATUS_NULL_POINTER, "request is");
+    FAILS(FIRST(7), PSIDPD_STATUS_INVALID_ARGUMENT, "newton");
+    request.particles.x = NULL;
+    FAILS(FIRST(1), PSIDPD_STATUS_NULL_POINTER, "particles.x is NULL");
+    request.particles.x = host.x;
+    request.particles.owned = 3;
+    FAILS(FIRST(1), PSIDPD_STATUS_INVALID_ARGUMENT, "3 are owned");
+    request.particles.owned = 2;
     host.kind[1] = 4;
-    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_ENGINE, "type 4");
+    FAILS(FIRST(1), PSIDPD_STATUS_ENGINE, "type 4");
     host.kind[1] = 0;
     host.tag[0] = 0;
-    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_ENGINE, "tags");
+    FAILS(FIRST(1), PSIDPD_STATUS_ENGINE, "tags");
     host.tag[0] = 1;
-
-    OK(psidpd_engine_densities(engine, &particles, 1));
-    FAILS(FORCES(NULL, NULL, 0, NULL), PSIDPD_STATUS_NULL_POINTER, "force is NULL");
-    FAILS(FORCES(NULL, NULL, 1u << 9, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "0x200");
-    FAILS(FORCES(NULL, &step, 0, host.force), PSIDPD_STATUS_NULL_POINTER, "v is NULL");
-    FAILS(FORCES(host.force, &step, 0, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "overlap");
+    request.step = &step;
+    FAILS(FIRST(1), PSIDPD_STATUS_NULL_POINTER, "v is NULL");
     step.dt = 0.0;
-    FAILS(FORCES(host.v, &step, 0, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "step.dt");
-    particles.all = 3;
-    FAILS(FORCES(NULL, NULL, 0, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "changed");
-    particles.all = 2;
-    OK(FORCES(NULL, NULL, 0, host.force));
-    OK(psidpd_engine_particle_energy(engine, &values, &length));
-    CHECK(length == 0);
+    request.v = host.v;
+    FAILS(FIRST(1), PSIDPD_STATUS_INVALID_ARGUMENT, "step.dt");
+    request.v = NULL;
+    request.step = NULL;
+    request.want = 1u << 9;
+    FAILS(FIRST(1), PSIDPD_STATUS_INVALID_ARGUMENT, "0x200");
+    request.want = 0;
+
+    OK(FIRST(1));
+    FAILS(SECOND(NULL), PSIDPD_STATUS_NULL_POINTER, "force is NULL");
+    request.v = host.force;
+    FAILS(SECOND(host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "overlap");
+    request.v = NULL;
+    OK(SECOND(host.force));
+    OK(psidpd_engine_results(engine, &results));
+    CHECK(results.energies == 0);
+    OK(FIRST(1));
+    request.particles.all = 3;
+    FAILS(SECOND(host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "changed");
+    request.particles.all = 2;
 
     /* A message outlives successes, and types that are not mapped take no part. */
-    CHECK(strstr(psidpd_last_error(), "changed") != NULL);
     OK(psidpd_engine_map_kinds(engine, only_second, 2));
+    CHECK(strstr(psidpd_last_error(), "changed") != NULL);
     memset(host.force, 0, sizeof host.force);
-    OK(psidpd_engine_densities(engine, &particles, 1));
-    OK(FORCES(NULL, NULL, 0, host.force));
+    OK(FIRST(1));
+    OK(SECOND(host.force));
     CHECK(host.force[0] == 0.0);
-#undef FORCES
+#undef FIRST
+#undef SECOND
     psidpd_engine_free(engine);
 }
 
@@ -488,10 +490,10 @@ int main(int count, char **arguments)
     psidpd_model *model = NULL, *opened = NULL;
     psidpd_engine *engine = NULL;
     psidpd_step step;
+    psidpd_model_facts said;
+    psidpd_engine_facts facts;
     const char *text = NULL;
-    double range;
-    size_t number, i;
-    int32_t needs;
+    size_t i;
 
     CHECK(count == 3);
     CHECK(psidpd_abi_version() == PSIDPD_ABI_VERSION);
@@ -499,12 +501,8 @@ int main(int count, char **arguments)
     printf("version %s\n", psidpd_version());
 
     OK(psidpd_model_parse("set-6", model_text, &model));
-    OK(psidpd_model_title(model, &text));
-    CHECK(strcmp(text, "Warren 2003, set 6") == 0);
-    OK(psidpd_model_dimensions(model, &number));
-    CHECK(number == 3);
-    OK(psidpd_model_species_count(model, &number));
-    CHECK(number == 1);
+    OK(psidpd_model_describe(model, &said));
+    CHECK(strcmp(said.title, "Warren 2003, set 6") == 0 && said.dimensions == 3 && said.species == 1);
     OK(psidpd_model_species_name(model, 0, &text));
     CHECK(strcmp(text, "F") == 0);
 
@@ -518,14 +516,10 @@ int main(int count, char **arguments)
     }
     check_model_errors(model, arguments[2]);
 
-    OK(psidpd_engine_new(model, 1.0, &engine));
-    OK(psidpd_engine_noise_range(engine, &range));
-    CHECK(range == 1.0);
-    OK(psidpd_engine_needs_velocities(engine, &needs));
-    CHECK(needs == 1);
-    OK(psidpd_engine_plan_text(engine, &text));
-    CHECK(strstr(text, "density pass  n") != NULL);
-    OK(psidpd_engine_sum_all_densities(engine, 1));
+    OK(psidpd_engine_new(model, 1.0, NULL, &engine));
+    OK(psidpd_engine_describe(engine, &facts));
+    CHECK(facts.noise_range == 1.0 && facts.needs_velocities == 1);
+    CHECK(strstr(facts.plan, "density pass  n") != NULL);
 
     for (i = 0; i < OWNED; i++) {
         int k;

@@ -20,15 +20,15 @@ int main(void)
     int32_t tag[2] = {1, 2}, kind[2] = {0, 0};
     psidpd_model *model = NULL;
     psidpd_engine *engine = NULL;
-    psidpd_particles particles = {0};
-    particles.owned = 2;
-    particles.all = 2;
-    particles.x = x;
-    particles.tag = tag;
-    particles.kind = kind;
+    psidpd_request request = {0};
+    request.particles.owned = 2;
+    request.particles.all = 2;
+    request.particles.x = x;
+    request.particles.tag = tag;
+    request.particles.kind = kind;
     if (psidpd_model_parse("soft", model_text, &model)) return 3;
-    if (psidpd_engine_new(model, 1.0, &engine)) return 3;
-    if (psidpd_engine_densities(engine, &particles, 1)) return 3;
-    if (psidpd_engine_forces(engine, &particles, NULL, NULL, 0, force, NULL)) return 3;
+    if (psidpd_engine_new(model, 1.0, NULL, &engine)) return 3;
+    if (psidpd_engine_first(engine, NULL, NULL, 1, &request)) return 3;
+    if (psidpd_engine_second(engine, &request, force, NULL)) return 3;
     return 0;
 }

@@ -26,7 +26,7 @@
  * The version of this interface. It goes up when a function or structure changes its meaning or
  * layout or goes away, not when one is added.
  */
-#define PSIDPD_ABI_VERSION 1
+#define PSIDPD_ABI_VERSION 2
 
 /**
  * For psidpd_settings: pairs in double precision.
@@ -84,7 +84,7 @@
 #define PSIDPD_WANT_PARTICLE_VIRIAL 8
 
 /**
- * For `want` of a psidpd_request: sum every density of the model, also those that no force needs.
+ * For `want`: sum every density of the model, also those that no force needs.
  */
 #define PSIDPD_WANT_DENSITIES 16
 
@@ -126,7 +126,7 @@ enum psidpd_status
    */
   PSIDPD_STATUS_CALL_ORDER = 6,
   /**
-   * An internal error of this library. psidpd_engine_densities makes the engine usable again.
+   * An internal error of this library. The next evaluation makes the engine usable again.
    */
   PSIDPD_STATUS_PANIC = 255,
 };
@@ -175,9 +175,27 @@ typedef struct psidpd_engine psidpd_engine;
 typedef struct psidpd_model psidpd_model;
 
 /**
+ * What a model file says of the model.
+ */
+typedef struct psidpd_model_facts {
+  /**
+   * The title; valid until the model is freed.
+   */
+  const char *title;
+  /**
+   * The number of dimensions of space, 2 or 3.
+   */
+  size_t dimensions;
+  /**
+   * The number of species; psidpd_model_species_name has their names.
+   */
+  size_t species;
+} psidpd_model_facts;
+
+/**
  * The settings of an engine. Results depend on the precision; instruction sets change them by rounding
  * errors only, and the number of threads does not change a bit. All bytes zero and one thread are the
- * settings of psidpd_engine_new.
+ * settings that NULL stands for.
  */
 typedef struct psidpd_settings {
   /**
@@ -193,6 +211,90 @@ typedef struct psidpd_settings {
    */
   size_t threads;
 } psidpd_settings;
+
+/**
+ * What a host needs to know of an engine.
+ */
+typedef struct psidpd_engine_facts {
+  /**
+   * The longest range of any force: ghosts are needed this far from owned particles.
+   */
+  double cutoff;
+  /**
+   * The range of the random force, zero if there is none. Periodic boxes must be at least twice as long, or two images
+   * of a pair would share their noise.
+   */
+  double noise_range;
+  /**
+   * How many numbers per particle psidpd_engine_slopes has, to be forwarded to ghosts; zero if there are none.
+   */
+  size_t slope_width;
+  /**
+   * 1 if there is a thermostat, so that a request with a step needs velocities, of ghosts too; 0 if not.
+   */
+  int32_t needs_velocities;
+  /**
+   * How the engine computes, with the instruction set in use.
+   */
+  struct psidpd_settings settings;
+  /**
+   * A description of the computation, in lines; valid until the engine is freed.
+   */
+  const char *plan;
+} psidpd_engine_facts;
+
+/**
+ * Arrays of the last evaluation, of which an engine keeps those that were asked for; valid until the next evaluation
+ * with the engine, and until it is freed.
+ */
+typedef struct psidpd_results {
+  /**
+   * Local densities of owned particles: of each particle those of the first density, one for each species, then those
+   * of the second ... Not corrected. None unless the evaluation was asked for PSIDPD_WANT_DENSITIES.
+   */
+  const double *density;
+  /**
+   * How many numbers `density` has.
+   */
+  size_t densities;
+  /**
+   * Energies of particles and ghosts: none unless the evaluation was asked for PSIDPD_WANT_PARTICLE_ENERGY. With
+   * `newton` 1 those of ghosts belong to their owners.
+   */
+  const double *energy;
+  /**
+   * How many numbers `energy` has.
+   */
+  size_t energies;
+  /**
+   * Virials of particles and ghosts, six numbers each: none unless the evaluation was asked for
+   * PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
+   */
+  const double *virial;
+  /**
+   * How many numbers `virial` has.
+   */
+  size_t virials;
+} psidpd_results;
+
+/**
+ * A box: a corner, the three edges from there, and which of them are periods.
+ */
+typedef struct psidpd_box {
+  /**
+   * Position of the box's corner.
+   */
+  double origin[3];
+  /**
+   * The edges: x, y, z of the first, of the second, of the third. The first should be along x and the second in the
+   * plane of x and y; others are slower. In two dimensions the third is (0, 0, 1).
+   */
+  double edges[9];
+  /**
+   * For each edge 1 if the box is periodic along it, and 0 if it is open.
+   */
+  int32_t periodic[3];
+} psidpd_box;
 
 /**
  * Particles of one host or rank: owned particles first, then ghosts.
@@ -239,6 +341,29 @@ typedef struct psidpd_step {
 } psidpd_step;
 
 /**
+ * The input of an evaluation, and the results that it should compute.
+ */
+typedef struct psidpd_request {
+  /**
+   * Owned particles and ghosts.
+   */
+  struct psidpd_particles particles;
+  /**
+   * Velocities, `3 * particles.all`; may be NULL without a step, or if there is no thermostat (see
+   * psidpd_engine_facts).
+   */
+  const double *v;
+  /**
+   * Seed, number and length of the time step, for the thermostat; NULL for conservative forces only.
+   */
+  const struct psidpd_step *step;
+  /**
+   * 0, or PSIDPD_WANT_... joined by `|`.
+   */
+  uint32_t want;
+} psidpd_request;
+
+/**
  * Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
  *
  * Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are unspecified.
@@ -261,48 +386,6 @@ typedef struct psidpd_tally {
    */
   double thermostat_virial[6];
 } psidpd_tally;
-
-/**
- * A box: a corner, the three edges from there, and which of them are periods.
- */
-typedef struct psidpd_box {
-  /**
-   * Position of the box's corner.
-   */
-  double origin[3];
-  /**
-   * The edges: x, y, z of the first, of the second, of the third. The first should be along x and the second in the
-   * plane of x and y; others are slower. In two dimensions the third is (0, 0, 1).
-   */
-  double edges[9];
-  /**
-   * For each edge 1 if the box is periodic along it, and 0 if it is open.
-   */
-  int32_t periodic[3];
-} psidpd_box;
-
-/**
- * The input of an evaluation, and the results that it should compute.
- */
-typedef struct psidpd_request {
-  /**
-   * Owned particles and ghosts.
-   */
-  struct psidpd_particles particles;
-  /**
-   * Velocities, `3 * particles.all`; may be NULL without a step, or if there is no thermostat (see
-   * psidpd_engine_needs_velocities).
-   */
-  const double *v;
-  /**
-   * Seed, number and length of the time step, for the thermostat; NULL for conservative forces only.
-   */
-  const struct psidpd_step *step;
-  /**
-   * 0, or PSIDPD_WANT_... joined by `|`.
-   */
-  uint32_t want;
-} psidpd_request;
 
 /**
  * Pairs that the host lists: at least all within the cut-off, those of two owned particles once, those of an owned
@@ -386,37 +469,16 @@ psidpd_status psidpd_model_parse(const char *name, const char *text, struct psid
 void psidpd_model_free(struct psidpd_model *model);
 
 /**
- * Puts in `*title` the model's title; valid until the model is freed.
+ * Puts in `*facts` what the model file says of the model.
  *
  * # Errors
  * PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
- * `model` is NULL or a model that has not been freed; `title` can be written to.
+ * `model` is NULL or a model that has not been freed; `facts` can be written to.
  */
-psidpd_status psidpd_model_title(const struct psidpd_model *model, const char **title);
-
-/**
- * Puts in `*dimensions` the number of dimensions of space, 2 or 3.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `model` is NULL or a model that has not been freed; `dimensions` can be written to.
- */
-psidpd_status psidpd_model_dimensions(const struct psidpd_model *model, size_t *dimensions);
-
-/**
- * Puts in `*count` the number of species.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `model` is NULL or a model that has not been freed; `count` can be written to.
- */
-psidpd_status psidpd_model_species_count(const struct psidpd_model *model, size_t *count);
+psidpd_status psidpd_model_describe(const struct psidpd_model *model,
+                                    struct psidpd_model_facts *facts);
 
 /**
  * Puts in `*name` the name of species `index`, from 0; valid until the model is freed.
@@ -436,45 +498,32 @@ psidpd_status psidpd_model_species_name(const struct psidpd_model *model,
  * `*engine`, to be freed with psidpd_engine_free. If it fails, `*engine` is left alone. The engine
  * does not need the model any more.
  *
- * The engine computes in double precision on one thread, with the best instruction set of the
- * processor; see psidpd_engine_new_with.
+ * With `settings` NULL the engine computes in double precision on one thread, with the best instruction set of the
+ * processor.
  *
  * # Errors
  * PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
- * PSIDPD_STATUS_NULL_POINTER.
+ * PSIDPD_STATUS_INVALID_ARGUMENT for invalid settings. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
- * `model` is NULL or a model that has not been freed; `engine` can be written to.
+ * `model` is NULL or a model that has not been freed; `settings` is NULL or at settings; `engine` can be written to.
  */
 psidpd_status psidpd_engine_new(const struct psidpd_model *model,
                                 double kt,
+                                const struct psidpd_settings *settings,
                                 struct psidpd_engine **engine);
 
 /**
- * As psidpd_engine_new, with the host's settings.
- *
- * # Errors
- * As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for invalid settings.
- *
- * # Safety
- * As psidpd_engine_new; `settings` is NULL or at settings.
- */
-psidpd_status psidpd_engine_new_with(const struct psidpd_model *model,
-                                     double kt,
-                                     const struct psidpd_settings *settings,
-                                     struct psidpd_engine **engine);
-
-/**
- * Puts in `*settings` how the engine computes, with the instruction set in use.
+ * Puts in `*facts` what a host needs to know of the engine.
  *
  * # Errors
  * PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
- * `engine` is NULL or an engine that has not been freed; `settings` can be written to.
+ * `engine` is NULL or an engine that has not been freed; `facts` can be written to.
  */
-psidpd_status psidpd_engine_settings(const struct psidpd_engine *engine,
-                                     struct psidpd_settings *settings);
+psidpd_status psidpd_engine_describe(const struct psidpd_engine *engine,
+                                     struct psidpd_engine_facts *facts);
 
 /**
  * Puts in `*path` the path that the last evaluation took, a psidpd_path, and in `*text` its description with
@@ -499,66 +548,6 @@ psidpd_status psidpd_engine_path(struct psidpd_engine *engine,
 void psidpd_engine_free(struct psidpd_engine *engine);
 
 /**
- * Puts in `*cutoff` the longest range of any force: ghosts are needed this far from owned particles.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `cutoff` can be written to.
- */
-psidpd_status psidpd_engine_cutoff(const struct psidpd_engine *engine,
-                                   double *cutoff);
-
-/**
- * Puts in `*width` how many numbers per particle psidpd_engine_slopes has, to be forwarded to ghosts;
- * zero if there is nothing to forward.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `width` can be written to.
- */
-psidpd_status psidpd_engine_slope_width(const struct psidpd_engine *engine,
-                                        size_t *width);
-
-/**
- * Puts in `*needs` 1 if there is a thermostat, so that psidpd_engine_forces with a step needs
- * velocities, of ghosts too; 0 if not.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `needs` can be written to.
- */
-psidpd_status psidpd_engine_needs_velocities(const struct psidpd_engine *engine, int32_t *needs);
-
-/**
- * Puts in `*range` the range of the random force, zero if there is none. Periodic boxes must be at
- * least twice as long, or two images of a pair would share their noise.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `range` can be written to.
- */
-psidpd_status psidpd_engine_noise_range(const struct psidpd_engine *engine, double *range);
-
-/**
- * Puts in `*text` a description of the computation, in lines; valid until the engine is freed.
- *
- * # Errors
- * PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `text` can be written to.
- */
-psidpd_status psidpd_engine_plan_text(const struct psidpd_engine *engine, const char **text);
-
-/**
  * Maps the host's types to species, from the next evaluation on: `species[kind]` is the
  * species index of type `kind`, negative for particles that take no part. `species` is copied.
  *
@@ -573,51 +562,14 @@ psidpd_status psidpd_engine_map_kinds(struct psidpd_engine *engine,
                                       size_t length);
 
 /**
- * Sets whether psidpd_engine_densities sums every density of the model (1) or only those
- * that forces need (0, the default).
- *
- * # Errors
- * PSIDPD_STATUS_INVALID_ARGUMENT if `all` is neither. PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed.
- */
-psidpd_status psidpd_engine_sum_all_densities(struct psidpd_engine *engine, int32_t all);
-
-/**
- * First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
- * owned particles.
- *
- * The call does not say what psidpd_engine_forces will be asked for, so it uses the reference path, on
- * one thread. psidpd_engine_evaluate and psidpd_engine_first, which are told at once, can be faster.
- *
- * With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
- * ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
- * forces.
- *
- * # Errors
- * PSIDPD_STATUS_ENGINE for a position or psi that is not finite, a tag below 1, a type that is not
- * mapped. PSIDPD_STATUS_INVALID_ARGUMENT for numbers of particles that cannot be or another `newton`.
- * PSIDPD_STATUS_NULL_POINTER; arrays may be NULL if there are no particles. After an error there are
- * no densities and slopes.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `particles` is NULL or at a structure whose
- * arrays are as long as it says. Nothing is kept of them.
- */
-psidpd_status psidpd_engine_densities(struct psidpd_engine *engine,
-                                      const struct psidpd_particles *particles,
-                                      int32_t newton);
-
-/**
  * Puts in `*slopes` the place of the derivatives of psi, and in `*length` how many there are: of each
- * owned particle psidpd_engine_slope_width numbers, then as many of each ghost. Those of ghosts mean nothing; the host
- * must fill them in with their owners' before psidpd_engine_forces or psidpd_engine_second.
+ * owned particle `slope_width` numbers, then as many of each ghost. Those of ghosts mean nothing; the host
+ * must fill them in with their owners' before psidpd_engine_second.
  *
  * Valid until the next evaluation with this engine, and until the engine is freed.
  *
  * # Errors
- * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities or psidpd_engine_first. PSIDPD_STATUS_NULL_POINTER.
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_first. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
  * `engine` is NULL or an engine that has not been freed; `slopes` and `length` can be written to.
@@ -627,84 +579,16 @@ psidpd_status psidpd_engine_slopes(struct psidpd_engine *engine,
                                    size_t *length);
 
 /**
- * Second half of an evaluation: adds to `force`, `3 * all` numbers, the forces on `particles`, the
- * same as in psidpd_engine_densities, and puts in `*tally` the sums that `want` asks for, which is 0
- * or PSIDPD_WANT_... joined by `|`.
- *
- * `v` has the velocities, `3 * all`, and `step` what the thermostat needs. With `step` NULL only
- * conservative forces are computed, and `v` may be NULL; so it may if there is no thermostat (see
- * psidpd_engine_needs_velocities). `tally` may be NULL.
- *
- * # Errors
- * PSIDPD_STATUS_ENGINE for a force that is not finite; `force` has been added to nevertheless.
- * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_INVALID_ARGUMENT for other
- * numbers of particles than there, unknown bits in `want`, a `dt` that is not positive, or if `force`
- * overlaps `x` or `v`. PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `particles` is NULL or at a structure whose
- * arrays are as long as it says; `v` is NULL or has `3 * all` numbers, and so has `force`, which must
- * overlap none of the others, nor what the engine has given out; `step` is NULL or a step; `tally` is
- * NULL or can be written to. Nothing is kept of them.
- */
-psidpd_status psidpd_engine_forces(struct psidpd_engine *engine,
-                                   const struct psidpd_particles *particles,
-                                   const double *v,
-                                   const struct psidpd_step *step,
-                                   uint32_t want,
-                                   double *force,
-                                   struct psidpd_tally *tally);
-
-/**
- * Puts in `*densities` the place of the local densities of owned particles, and in `*length` how many
- * numbers that is: of each particle those of the first density, one for each species, then those of
- * the second ... Not corrected. After psidpd_engine_densities those that forces do not need are zero unless
- * psidpd_engine_sum_all_densities; otherwise there are none unless PSIDPD_WANT_DENSITIES.
- *
- * Valid until the next evaluation with this engine, and until the engine is freed.
+ * Puts in `*results` the places of the arrays of the last evaluation.
  *
  * # Errors
  * PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
- * `engine` is NULL or an engine that has not been freed; `densities` and `length` can be written to.
+ * `engine` is NULL or an engine that has not been freed; `results` can be written to.
  */
-psidpd_status psidpd_engine_local_densities(const struct psidpd_engine *engine,
-                                            const double **densities,
-                                            size_t *length);
-
-/**
- * Puts in `*energies` the place of the energies of particles and ghosts, and in `*length` how many
- * there are: none unless the last evaluation was asked for PSIDPD_WANT_PARTICLE_ENERGY.
- * With `newton` 1 those of ghosts belong to their owners.
- *
- * Valid until the next evaluation with this engine, and until the engine is freed.
- *
- * # Errors
- * PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `energies` and `length` can be written to.
- */
-psidpd_status psidpd_engine_particle_energy(const struct psidpd_engine *engine,
-                                            const double **energies,
-                                            size_t *length);
-
-/**
- * Puts in `*virials` the place of the virials of particles and ghosts, and in `*length` how many
- * numbers that is, six each: none unless the last evaluation was asked for PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
- *
- * Valid until the next evaluation with this engine, and until the engine is freed.
- *
- * # Errors
- * PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
- *
- * # Safety
- * `engine` is NULL or an engine that has not been freed; `virials` and `length` can be written to.
- */
-psidpd_status psidpd_engine_particle_virial(const struct psidpd_engine *engine,
-                                            const double **virials,
-                                            size_t *length);
+psidpd_status psidpd_engine_results(const struct psidpd_engine *engine,
+                                    struct psidpd_results *results);
 
 /**
  * All forces on particles in a box of their own, without ghosts: adds them to `force`, `3 * particles.all` numbers, and

@@ -1,9 +1,7 @@
 //! Evaluations whose request states at once what to compute.
 
 use crate::arguments::{Output, array, copied, exclusive, flag};
-use crate::engine::{
-    Engine, Particles, State, Step, Tally, WANT_ALL, arrays_of, particles_of, step_of, want_of,
-};
+use crate::engine::{Engine, Particles, State, Step, Tally, arrays_of, particles_of, step_of, want_of};
 use crate::status::{Failure, Status, guard};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::{self, Around, DomainError, Newton, PairsOfHost, PeriodicBox, Surroundings};
@@ -28,7 +26,7 @@ pub struct Request {
     /// Owned particles and ghosts.
     pub particles: Particles,
     /// Velocities, `3 * particles.all`; may be NULL without a step, or if there is no thermostat (see
-    /// psidpd_engine_needs_velocities).
+    /// psidpd_engine_facts).
     pub v: *const f64,
     /// Seed, number and length of the time step, for the thermostat; NULL for conservative forces only.
     pub step: *const Step,
@@ -83,7 +81,7 @@ impl Request {
             // SAFETY: the caller promises `3 * all` numbers at `v`; a vector is three consecutive numbers.
             unsafe { array(self.v.cast::<[f64; 3]>(), self.particles.all, "request.v")? }
         };
-        Ok(engine::Request { particles, v, step, want: want_of(self.want, WANT_ALL)? })
+        Ok(engine::Request { particles, v, step, want: want_of(self.want)? })
     }
 
     fn step(&self) -> Result<Option<engine::Step>, Failure> {
@@ -120,26 +118,13 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
 ) -> Status {
     guard(|| {
         // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
-        let (engine, domain, given, out) = unsafe {
-            (
-                exclusive(engine, "engine")?,
-                copied(r#box, "box")?.domain()?,
-                copied(request, "request")?,
-                optional(tally)?,
-            )
-        };
-        let want = want_of(given.want, WANT_ALL)?;
-        let step = given.step()?;
-        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
-        let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
-        let request = engine::Request { particles, v, step, want };
-        engine.state = State::Nothing;
-        let sums = engine.engine.forces(&domain, &request, force, true)?;
-        engine.state = State::Whole;
-        if let Some(out) = out {
-            out.put(Tally::of(&sums));
+        unsafe {
+            let engine = exclusive(engine, "engine")?;
+            let domain = copied(r#box, "box")?.domain()?;
+            complete(engine, request, force, tally, |engine, request, force| {
+                engine.forces(&domain, request, force, true)
+            })
         }
-        Ok(())
     })
 }
 
@@ -238,22 +223,44 @@ pub unsafe extern "C" fn psidpd_engine_second(
 ) -> Status {
     guard(|| {
         // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
-        let (engine, given, out) =
-            unsafe { (exclusive(engine, "engine")?, copied(request, "request")?, optional(tally)?) };
-        engine.require(&[State::First], "psidpd_engine_first")?;
-        let want = want_of(given.want, WANT_ALL)?;
-        let step = given.step()?;
-        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
-        let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
-        let request = engine::Request { particles, v, step, want };
-        engine.state = State::Nothing;
-        let sums = engine.engine.second(&request, force, true)?;
-        engine.state = State::Whole;
-        if let Some(out) = out {
-            out.put(Tally::of(&sums));
+        unsafe {
+            let engine = exclusive(engine, "engine")?;
+            engine.require(&[State::First], "psidpd_engine_first")?;
+            complete(engine, request, force, tally, |engine, request, force| {
+                engine.second(request, force, true)
+            })
         }
-        Ok(())
     })
+}
+
+/// Adds to `force` the forces that `work` computes, and puts their sums in `*tally`.
+///
+/// # Safety
+/// `request` is null or at a request, whose arrays are as long as it says; `force` is null or has three numbers for each
+/// particle and overlaps none of them; `tally` is null or can be written to.
+unsafe fn complete(
+    engine: &mut Engine,
+    request: *const Request,
+    force: *mut f64,
+    tally: *mut Tally,
+    work: impl FnOnce(
+        &mut engine::Engine,
+        &engine::Request,
+        &mut [[f64; 3]],
+    ) -> Result<engine::Tally, engine::EngineError>,
+) -> Result<(), Failure> {
+    // SAFETY: the caller promises that the pointers are null or valid.
+    let (given, out) = unsafe { (copied(request, "request")?, optional(tally)?) };
+    let (want, step) = (want_of(given.want)?, given.step()?);
+    // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
+    let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
+    engine.state = State::Nothing;
+    let sums = work(&mut engine.engine, &engine::Request { particles, v, step, want }, force)?;
+    engine.state = State::Whole;
+    if let Some(out) = out {
+        out.put(Tally::of(&sums));
+    }
+    Ok(())
 }
 
 fn first(engine: &mut Engine, surroundings: Surroundings, request: &engine::Request) -> Result<(), Failure> {

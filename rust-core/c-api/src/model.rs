@@ -93,53 +93,35 @@ pub unsafe extern "C" fn psidpd_model_free(model: *mut Model) {
     });
 }
 
-/// Puts in `*title` the model's title; valid until the model is freed.
-///
-/// # Errors
-/// PSIDPD_STATUS_NULL_POINTER.
-///
-/// # Safety
-/// `model` is NULL or a model that has not been freed; `title` can be written to.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn psidpd_model_title(model: *const Model, title: *mut *const c_char) -> Status {
-    guard(|| {
-        // SAFETY: the caller promises that `model` is null or not freed and that `title` can be written to.
-        let (model, out) = unsafe { (shared(model, "model")?, Output::new(title, "title")?) };
-        out.put(model.title.as_ptr());
-        Ok(())
-    })
+/// What a model file says of the model.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct ModelFacts {
+    /// The title; valid until the model is freed.
+    pub title: *const c_char,
+    /// The number of dimensions of space, 2 or 3.
+    pub dimensions: usize,
+    /// The number of species; psidpd_model_species_name has their names.
+    pub species: usize,
 }
 
-/// Puts in `*dimensions` the number of dimensions of space, 2 or 3.
+/// Puts in `*facts` what the model file says of the model.
 ///
 /// # Errors
 /// PSIDPD_STATUS_NULL_POINTER.
 ///
 /// # Safety
-/// `model` is NULL or a model that has not been freed; `dimensions` can be written to.
+/// `model` is NULL or a model that has not been freed; `facts` can be written to.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn psidpd_model_dimensions(model: *const Model, dimensions: *mut usize) -> Status {
+pub unsafe extern "C" fn psidpd_model_describe(model: *const Model, facts: *mut ModelFacts) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `model` is null or not freed and that `dimensions` can be written to.
-        let (model, out) = unsafe { (shared(model, "model")?, Output::new(dimensions, "dimensions")?) };
-        out.put(model.model.dimensions());
-        Ok(())
-    })
-}
-
-/// Puts in `*count` the number of species.
-///
-/// # Errors
-/// PSIDPD_STATUS_NULL_POINTER.
-///
-/// # Safety
-/// `model` is NULL or a model that has not been freed; `count` can be written to.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn psidpd_model_species_count(model: *const Model, count: *mut usize) -> Status {
-    guard(|| {
-        // SAFETY: the caller promises that `model` is null or not freed and that `count` can be written to.
-        let (model, out) = unsafe { (shared(model, "model")?, Output::new(count, "count")?) };
-        out.put(model.species.len());
+        // SAFETY: the caller promises that `model` is null or not freed and that `facts` can be written to.
+        let (model, out) = unsafe { (shared(model, "model")?, Output::new(facts, "facts")?) };
+        out.put(ModelFacts {
+            title: model.title.as_ptr(),
+            dimensions: model.model.dimensions(),
+            species: model.species.len(),
+        });
         Ok(())
     })
 }

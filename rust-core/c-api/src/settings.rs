@@ -21,7 +21,7 @@ pub const PSIDPD_INSTRUCTIONS_AVX512_VBMI2: i32 = 4;
 
 /// The settings of an engine. Results depend on the precision; instruction sets change them by rounding
 /// errors only, and the number of threads does not change a bit. All bytes zero and one thread are the
-/// settings of psidpd_engine_new.
+/// settings that NULL stands for.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {

@@ -28,7 +28,7 @@ pub enum Status {
     Engine = 5,
     /// A call that must precede this one has not been made, or has failed.
     CallOrder = 6,
-    /// An internal error of this library. psidpd_engine_densities makes the engine usable again.
+    /// An internal error of this library. The next evaluation makes the engine usable again.
     Panic = 255,
 }
 
