@@ -107,7 +107,7 @@ pub fn estimate(series: &Bound<PyAny>) -> PyResult<(f64, f64)> {
     let values = series.as_slice()?;
     match observe::estimate(values) {
         Ok(found) => Ok((found.mean, found.error)),
-        Err(observe::StatisticsError::TooFew { found }) if found > 0 => {
+        Err(observe::ObserveError::TooFew { found, .. }) if found > 0 => {
             Ok((values.iter().sum::<f64>() / found as f64, f64::NAN))
         }
         Err(error) => Err(exception(error)),

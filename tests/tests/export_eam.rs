@@ -1,8 +1,9 @@
 //! Tables for LAMMPS's `eam/alloy`, written from a model, agree with the plugin's `dpd/psi` and the same
 //! model: the test compares one configuration in one LAMMPS.
 
-use psidpd::export::eam::{EamError, Grid, write};
+use psidpd::export::eam::{Grid, write};
 use psidpd::lammps::Lammps;
+use psidpd::lammps::LammpsError;
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_tests::{lammps, root};
@@ -116,12 +117,12 @@ fn fluids_beyond_a_table_are_refused() {
         let masses = vec![1.0; fluid.species.len()];
         write(&fluid, &masses, Grid::default(), &folder.path().join("fluid")).unwrap_err()
     };
-    assert!(matches!(refusal(&text("van-der-waals-2d"), 1.0), EamError::Flat));
-    assert!(matches!(refusal(&text("van-der-waals-3d"), 2.5), EamError::Bounds(_)));
+    assert!(matches!(refusal(&text("van-der-waals-2d"), 1.0), LammpsError::Flat));
+    assert!(matches!(refusal(&text("van-der-waals-3d"), 2.5), LammpsError::Bounds(_)));
     let pole = without(&text("van-der-waals-3d"), "bounds");
-    assert!(matches!(refusal(&pole, 2.5), EamError::Singular { .. }));
-    assert!(matches!(refusal(&text("lennard-jones"), 1.0), EamError::Bounds(_)));
-    assert!(matches!(refusal(&text("power-law-k3-corrected"), 1.0), EamError::Correction(_)));
+    assert!(matches!(refusal(&pole, 2.5), LammpsError::Singular { .. }));
+    assert!(matches!(refusal(&text("lennard-jones"), 1.0), LammpsError::Bounds(_)));
+    assert!(matches!(refusal(&text("power-law-k3-corrected"), 1.0), LammpsError::Correction(_)));
     let partial = without(&text("huggins"), "correction");
-    assert!(matches!(refusal(&partial, 1.0), EamError::PartialDensities { .. }));
+    assert!(matches!(refusal(&partial, 1.0), LammpsError::PartialDensities { .. }));
 }

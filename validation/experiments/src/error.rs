@@ -2,12 +2,11 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::EngineError;
 use psidpd_core::model::PresetError;
 use psidpd_core::model::expression::TooLarge;
+use psidpd_core::theory::TheoryError;
 use psidpd_dynamics::run::RunError;
 use psidpd_formats::files::WriteError;
 use psidpd_lammps_host::LammpsError;
-use psidpd_lammps_host::export::eam::EamError;
-use psidpd_lammps_host::export::lammps::DeckError;
-use psidpd_observe::{DriftError, ProfileError, StatisticsError, TensionError};
+use psidpd_observe::ObserveError;
 use psidpd_report::ReportError;
 use std::path::PathBuf;
 
@@ -33,18 +32,12 @@ pub enum ExperimentError {
     Engine(#[from] EngineError),
     #[error(transparent)]
     Formula(#[from] TooLarge),
-    #[error(transparent)]
-    Eam(#[from] EamError),
-    #[error(transparent)]
-    Deck(#[from] DeckError),
     #[error("{what}: {source}")]
-    Statistics { what: String, source: StatisticsError },
+    Statistics { what: String, source: ObserveError },
     #[error(transparent)]
-    Profile(#[from] ProfileError),
+    Observe(#[from] ObserveError),
     #[error(transparent)]
-    Tension(#[from] TensionError),
-    #[error(transparent)]
-    Drift(#[from] DriftError),
+    Theory(#[from] TheoryError),
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
     /// A file that LAMMPS wrote is not as it should be.
@@ -73,6 +66,41 @@ pub enum ExperimentError {
          tension by surface_tension or drop, and viscosities by viscosity or poiseuille, in its [observe]"
     )]
     Unmeasured(String),
+    #[error("the file has no {0}")]
+    Parameter(String),
+    #[error("the model file cannot be edited: {0}")]
+    Edit(#[from] toml_edit::TomlError),
+    #[error("the model has no [density.{0}]")]
+    NoSuchDensity(String),
+    #[error("the model has several densities ({0}): name the one to calibrate with --name")]
+    WhichDensity(String),
+    #[error("{0}")]
+    Conditions(String),
+    #[error("the wanted pressure at density {0} is not a finite number: choose another range of densities")]
+    NoTarget(f64),
+    #[error(
+        "{}: no correction could be measured at densities {low} to {high} ({failed}): use a smaller --dt, or a narrower --density range",
+        model.display()
+    )]
+    NoCorrection { model: PathBuf, low: f64, high: f64, failed: String },
+    #[error("no folder for the runs: {0}")]
+    Folder(std::io::Error),
+    #[error("{points} runs are more than the {most} that a sweep may have: use fewer values")]
+    TooManyRuns { points: usize, most: usize },
+    #[error(
+        "{} has the run {row}, which is none of this sweep and would be lost from the table: choose another folder, sweep over \
+         values with the old ones among them, or replace the table with --overwrite", path.display()
+    )]
+    OtherGrid { path: PathBuf, row: String },
+    #[cfg(not(feature = "eos"))]
+    #[error("this psidpd was built without equations of state: cargo build --release --features eos")]
+    NotBuilt,
+    #[error("no parameters for {0}: there are {1}")]
+    Substance(String, String),
+    #[error("the equation of state: {0}")]
+    Equation(String),
+    #[error("{given} densities for {species} species")]
+    Densities { given: usize, species: usize },
 }
 
 impl ExperimentError {

@@ -1,5 +1,6 @@
 //! Errors between psidpd and LAMMPS.
 
+use psidpd_dynamics::integrator::Integrator;
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Duration;
@@ -86,6 +87,60 @@ pub enum LammpsError {
     PluginMismatch { plugin: PathBuf, built: String, host: String },
     #[error(transparent)]
     Format(#[from] psidpd_formats::FormatError),
+    #[error(transparent)]
+    Memory(#[from] psidpd_formats::memory::MemoryError),
+    #[error(transparent)]
+    File(#[from] psidpd_core::document::FileError),
+    #[error(transparent)]
+    Native(#[from] psidpd_dynamics::run::RunError),
+    #[error(transparent)]
+    TooLarge(#[from] psidpd_core::model::expression::TooLarge),
+    #[error(
+        "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
+         velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage, force-gradient and aboba with \
+         thermostat_step = \"midpoint\""
+    )]
+    Integrator { stage: String, name: &'static str, integrator: Integrator },
+    #[error("the seed must be at least 1 for the pair style, is {0}")]
+    Seed(u64),
+    #[error("stage \"{stage}\": {steps} steps are more than one run of LAMMPS takes, {most}")]
+    Steps { stage: String, steps: u64, most: u64 },
+    #[error("reversed_along has no counterpart in a deck for a box with tilt")]
+    Tilt,
+    #[error("{found} body forces need more groups than LAMMPS has: at most {most} can be written")]
+    BodyForces { found: usize, most: usize },
+    #[error(
+        "{}: cannot remove the thermostat for the stages without one; write it as [[thermostat]] sections",
+        model.display()
+    )]
+    Thermostat { model: PathBuf },
+    #[error("{}: the copy in the deck is not the same fluid: the names of its tables are ambiguous", model.display())]
+    Copy { model: PathBuf },
+    #[error("{}: two tables would both become {} in the deck", model.display(), table.display())]
+    Tables { model: PathBuf, table: PathBuf },
+    #[error("psi is not linear in {0} and {1}: eam/alloy has one density only")]
+    TwoDensities(String, String),
+    #[error(
+        "psi of {species} depends on the partial densities of {density}, not on their sum alone: eam/alloy has one \
+         density that does not tell species apart"
+    )]
+    PartialDensities { species: String, density: String },
+    #[error("the correction of {0} is not the identity: eam/alloy has uncorrected densities")]
+    Correction(String),
+    #[error("{0} has bounds, and a table cannot represent how psi continues beyond them: remove the bounds")]
+    Bounds(String),
+    #[error("eam/alloy is tabulated for three dimensions here, the model has two")]
+    Flat,
+    #[error("the force law of this model has no potential")]
+    NotConservative,
+    #[error("psi of {species} is not finite at density {density}: lower the largest density")]
+    Singular { species: String, density: f64 },
+    #[error("the spacing, the largest density and the number of densities must be positive")]
+    Grid,
+    #[error(
+        "the tables would have {numbers:.3e} numbers, more than the limit of {most}: take a larger spacing or fewer densities"
+    )]
+    TooFine { numbers: f64, most: u32 },
 }
 
 impl LammpsError {

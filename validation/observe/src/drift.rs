@@ -3,17 +3,8 @@
 use psidpd_core::maximum::largest;
 use serde::Serialize;
 
-use super::statistics::{StatisticsError, estimate};
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum DriftError {
-    #[error("{times} times but {values} values")]
-    Lengths { times: usize, values: usize },
-    #[error("time {index} is not a finite number later than the one before")]
-    Times { index: usize },
-    #[error(transparent)]
-    Values(#[from] StatisticsError),
-}
+use super::error::ObserveError;
+use super::statistics::estimate;
 
 /// The straight-line drift of a series in time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -40,15 +31,15 @@ pub struct Drift {
 ///
 /// The function fails for slices of different lengths, for times that do not increase, and for every series that
 /// [`estimate`] refuses.
-pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
+pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, ObserveError> {
     if times.len() != values.len() {
-        return Err(DriftError::Lengths { times: times.len(), values: values.len() });
+        return Err(ObserveError::Times { times: times.len(), values: values.len() });
     }
     let mean = estimate(values)?.mean;
     let mut before = f64::NEG_INFINITY;
     for (index, &t) in times.iter().enumerate() {
         if !t.is_finite() || t <= before {
-            return Err(DriftError::Times { index });
+            return Err(ObserveError::Time { index });
         }
         before = t;
     }
@@ -64,7 +55,7 @@ pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
     let residuals: Vec<f64> =
         times.iter().zip(values).map(|(t, x)| (x - mean) - slope * (t - middle)).collect();
     if !(tt.is_finite() && slope.is_finite() && residuals.iter().all(|r| r.is_finite())) {
-        return Err(StatisticsError::Overflow.into());
+        return Err(ObserveError::Overflow);
     }
     let tau = estimate(&residuals)?.tau.max(0.5);
     let variance = residuals.iter().map(|r| r * r).sum::<f64>() / (n - 2.0);
@@ -119,9 +110,9 @@ mod tests {
     #[test]
     fn bad_series_are_refused() {
         let times: Vec<f64> = (0..10).map(f64::from).collect();
-        assert_eq!(drift(&times, &[0.0; 9]), Err(DriftError::Lengths { times: 10, values: 9 }));
-        assert_eq!(drift(&[0.0; 10], &[0.0; 10]), Err(DriftError::Times { index: 1 }));
-        assert!(matches!(drift(&times, &[f64::NAN; 10]), Err(DriftError::Values(_))));
+        assert_eq!(drift(&times, &[0.0; 9]), Err(ObserveError::Times { times: 10, values: 9 }));
+        assert_eq!(drift(&[0.0; 10], &[0.0; 10]), Err(ObserveError::Time { index: 1 }));
+        assert!(matches!(drift(&times, &[f64::NAN; 10]), Err(ObserveError::NonFinite { index: 0 })));
         assert!(drift(&[], &[]).is_err());
         let huge: Vec<f64> = times.iter().map(|t| t * 1e200).collect();
         assert!(drift(&huge, &times).is_err());

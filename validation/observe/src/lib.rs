@@ -8,6 +8,7 @@
 pub mod configurational;
 pub mod drift;
 pub mod edges;
+mod error;
 pub mod flux;
 pub mod frame;
 pub mod keys;
@@ -23,15 +24,16 @@ pub mod statistics;
 pub mod surface_tension;
 pub mod young_laplace;
 
-pub use drift::{Drift, DriftError, drift};
+pub use drift::{Drift, drift};
+pub use error::ObserveError;
 pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
 pub use observers::Observers;
 pub use options::{Drive, StageNames};
-pub use profile::{DensityProfile, ProfileAccumulator, ProfileError, interface_width};
+pub use profile::{DensityProfile, ProfileAccumulator, interface_width};
 pub use request::{Observe, Request, read};
 pub use series::{Measured, Series};
-pub use statistics::{Comparison, Estimate, StatisticsError, difference, estimate, threshold};
-pub use surface_tension::{TensionError, tension_series};
+pub use statistics::{Comparison, Estimate, difference, estimate, threshold};
+pub use surface_tension::tension_series;
 
 #[cfg(test)]
 mod tests {

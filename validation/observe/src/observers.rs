@@ -1,5 +1,6 @@
 //! The observables of a run while it is going.
 
+use super::error::ObserveError;
 use super::frame::{Frame, View};
 use super::meter::AnyMeter;
 use super::observation::Observation;
@@ -20,17 +21,6 @@ pub struct Observers {
     start: u64,
     #[serde(skip)]
     fluid: Option<(f64, Evaluator)>,
-}
-
-/// The reasons why [`Observers::restore`] fails.
-#[derive(Debug, thiserror::Error)]
-pub enum RestoreError {
-    /// The bytes are not the output of [`Observers::to_bytes`].
-    #[error(transparent)]
-    Bytes(#[from] postcard::Error),
-    /// The bytes belong to another list of observables or to other settings.
-    #[error("the observables are not those of the scene")]
-    Others,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -145,14 +135,14 @@ impl Observers {
     ///
     /// # Errors
     /// The function fails for other bytes and for bytes of other observables.
-    pub fn restore(&self, bytes: &[u8]) -> Result<Observers, RestoreError> {
+    pub fn restore(&self, bytes: &[u8]) -> Result<Observers, ObserveError> {
         let restored: Observers = postcard::from_bytes(bytes)?;
         let mut forgetful = restored.observers.clone();
         for sampled in forgetful.iter_mut().flat_map(|o| &mut o.stages) {
             sampled.left_out = 0;
             sampled.meter.forget();
         }
-        if forgetful == self.observers { Ok(restored) } else { Err(RestoreError::Others) }
+        if forgetful == self.observers { Ok(restored) } else { Err(ObserveError::OtherObservables) }
     }
 
     /// The results of all observables.

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use super::edges::{Edges, edges};
-use super::statistics::{MINIMUM_SAMPLES, StatisticsError, estimate};
+use super::error::ObserveError;
+use super::statistics::{MINIMUM_SAMPLES, estimate};
 use crate::least_squares::least_squares;
 
 /// The largest number of bins of a profile.
@@ -16,22 +17,6 @@ const LEAST_RESULTANT: f64 = 1e-10;
 
 /// The smallest number of bins to which a flank is fitted.
 const FLANK_BINS: usize = 6;
-
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ProfileError {
-    #[error("box length {length} and area {area} must be positive numbers")]
-    Box { length: f64, area: f64 },
-    #[error("{0} bins; a profile has between 1 and {MAXIMUM_BINS}")]
-    Bins(usize),
-    #[error("coordinate {index} of the frame is not a finite number")]
-    NonFinite { index: usize },
-    #[error("the frame has no slab to be centred on")]
-    NoSlab,
-    #[error("no frames")]
-    NoFrames,
-    #[error(transparent)]
-    Statistics(#[from] StatisticsError),
-}
 
 /// Collects histograms of particle positions across a slab. Each frame is centred on its own slab so that drift does not
 /// smear the profile.
@@ -62,13 +47,13 @@ impl ProfileAccumulator {
     ///
     /// The function fails for a length or area that is not a positive number, for no bins, and for more than
     /// [`MAXIMUM_BINS`].
-    pub fn new(length: f64, bins: usize, area: f64) -> Result<Self, ProfileError> {
+    pub fn new(length: f64, bins: usize, area: f64) -> Result<Self, ObserveError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if !(positive(length) && positive(area) && positive(length * area)) {
-            return Err(ProfileError::Box { length, area });
+            return Err(ObserveError::Box { length, area });
         }
         if bins == 0 || bins > MAXIMUM_BINS {
-            return Err(ProfileError::Bins(bins));
+            return Err(ObserveError::Bins { found: bins, most: MAXIMUM_BINS });
         }
         Ok(Self { length, bins, area, frames: Vec::new() })
     }
@@ -81,9 +66,9 @@ impl ProfileAccumulator {
     /// # Errors
     ///
     /// The function fails for a coordinate that is not finite, and for particles without a centre. Then the frame is left out.
-    pub fn add(&mut self, z: &[f64]) -> Result<(), ProfileError> {
+    pub fn add(&mut self, z: &[f64]) -> Result<(), ObserveError> {
         if let Some(index) = z.iter().position(|z| !z.is_finite()) {
-            return Err(ProfileError::NonFinite { index });
+            return Err(ObserveError::Coordinate { index });
         }
         let (mut sine, mut cosine) = (0.0, 0.0);
         for z in z {
@@ -92,7 +77,7 @@ impl ProfileAccumulator {
             cosine += c;
         }
         if z.is_empty() || f64::hypot(sine, cosine) / (z.len() as f64) < LEAST_RESULTANT {
-            return Err(ProfileError::NoSlab);
+            return Err(ObserveError::NoSlab);
         }
         let centre = sine.atan2(cosine) / TAU;
         let mut counts = vec![0_u32; self.bins];
@@ -119,9 +104,9 @@ impl ProfileAccumulator {
     /// # Errors
     ///
     /// The function fails without frames, and for densities too large to be averaged.
-    pub fn finish(&self) -> Result<DensityProfile, ProfileError> {
+    pub fn finish(&self) -> Result<DensityProfile, ObserveError> {
         if self.frames.is_empty() {
-            return Err(ProfileError::NoFrames);
+            return Err(ObserveError::NoFrames);
         }
         let height = self.length / self.bins as f64;
         let volume = self.area * height;
@@ -185,7 +170,7 @@ impl ProfileAccumulator {
     }
 }
 
-fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), StatisticsError> {
+fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), ObserveError> {
     let frames = counts.len() as f64;
     if counts.len() >= MINIMUM_SAMPLES {
         let e = estimate(counts)?;
@@ -469,12 +454,15 @@ mod tests {
     fn bad_input_is_refused() {
         assert!(ProfileAccumulator::new(0.0, 10, 1.0).is_err());
         assert!(ProfileAccumulator::new(1.0, 10, f64::NAN).is_err());
-        assert_eq!(ProfileAccumulator::new(1.0, 0, 1.0).err(), Some(ProfileError::Bins(0)));
+        assert_eq!(
+            ProfileAccumulator::new(1.0, 0, 1.0).err(),
+            Some(ObserveError::Bins { found: 0, most: MAXIMUM_BINS })
+        );
         let mut accumulator = ProfileAccumulator::new(4.0, 8, 1.0).unwrap();
-        assert_eq!(accumulator.finish(), Err(ProfileError::NoFrames));
-        assert_eq!(accumulator.add(&[]), Err(ProfileError::NoSlab));
-        assert_eq!(accumulator.add(&[0.0, 2.0]), Err(ProfileError::NoSlab));
-        assert_eq!(accumulator.add(&[0.0, f64::INFINITY]), Err(ProfileError::NonFinite { index: 1 }));
+        assert_eq!(accumulator.finish(), Err(ObserveError::NoFrames));
+        assert_eq!(accumulator.add(&[]), Err(ObserveError::NoSlab));
+        assert_eq!(accumulator.add(&[0.0, 2.0]), Err(ObserveError::NoSlab));
+        assert_eq!(accumulator.add(&[0.0, f64::INFINITY]), Err(ObserveError::Coordinate { index: 1 }));
         assert_eq!(accumulator.frames(), 0);
         accumulator.add(&[1e300, -1e300, 0.3, 0.4]).unwrap();
         assert!(accumulator.liquid_density(0.0).is_empty());

@@ -1,5 +1,6 @@
 //! Means of correlated series, their error bars, and comparisons of means.
 
+use super::error::ObserveError;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
@@ -17,16 +18,6 @@ const FEWEST_BLOCKS: usize = 24;
 
 /// With more degrees of freedom Student's t equals the normal distribution to more digits than an error bar has.
 const NORMAL_DEGREES: f64 = 1e5;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum StatisticsError {
-    #[error("{found} samples, but an error bar needs at least {MINIMUM_SAMPLES}")]
-    TooFew { found: usize },
-    #[error("sample {index} is not a finite number")]
-    NonFinite { index: usize },
-    #[error("the samples are too large to be averaged")]
-    Overflow,
-}
 
 /// The mean of a stationary, possibly correlated series with its error bar.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,13 +61,13 @@ impl Estimate {
 ///
 /// The function fails for fewer than [`MINIMUM_SAMPLES`] samples, for a sample that is not finite, and for samples so
 /// large that their sums overflow.
-pub fn estimate(series: &[f64]) -> Result<Estimate, StatisticsError> {
+pub fn estimate(series: &[f64]) -> Result<Estimate, ObserveError> {
     let deviations = Deviations::of(series)?;
     let n = series.len() as f64;
     let variance = sum_of_squares(&deviations.values) / (n - 1.0);
     let error = error_by_blocks(&deviations.values).max(variance.sqrt() / n);
     if !(error.is_finite() && variance.is_finite()) {
-        return Err(StatisticsError::Overflow);
+        return Err(ObserveError::Overflow);
     }
     let tau = if variance > 0.0 { 0.5 * n * error * error / variance } else { 0.5 };
     Ok(Estimate { mean: deviations.mean, error, samples: series.len(), tau })
@@ -153,19 +144,19 @@ struct Deviations {
 }
 
 impl Deviations {
-    fn of(series: &[f64]) -> Result<Self, StatisticsError> {
+    fn of(series: &[f64]) -> Result<Self, ObserveError> {
         if series.len() < MINIMUM_SAMPLES {
-            return Err(StatisticsError::TooFew { found: series.len() });
+            return Err(ObserveError::TooFew { found: series.len(), least: MINIMUM_SAMPLES });
         }
         if let Some(index) = series.iter().position(|x| !x.is_finite()) {
-            return Err(StatisticsError::NonFinite { index });
+            return Err(ObserveError::NonFinite { index });
         }
         // With the first sample as origin, a constant series has deviations of exactly 0.
         let origin = series[0];
         let mut values: Vec<f64> = series.iter().map(|x| x - origin).collect();
         let shift = values.iter().sum::<f64>() / values.len() as f64;
         if !shift.is_finite() {
-            return Err(StatisticsError::Overflow);
+            return Err(ObserveError::Overflow);
         }
         for value in &mut values {
             *value -= shift;
@@ -406,12 +397,12 @@ mod tests {
 
     #[test]
     fn bad_series_are_refused() {
-        assert_eq!(estimate(&[1.0; 7]), Err(StatisticsError::TooFew { found: 7 }));
+        assert_eq!(estimate(&[1.0; 7]), Err(ObserveError::TooFew { found: 7, least: 8 }));
         let mut series = [1.0; 20];
         series[3] = f64::NAN;
-        assert_eq!(estimate(&series), Err(StatisticsError::NonFinite { index: 3 }));
+        assert_eq!(estimate(&series), Err(ObserveError::NonFinite { index: 3 }));
         series[3] = f64::MAX;
-        assert_eq!(estimate(&series), Err(StatisticsError::Overflow));
+        assert_eq!(estimate(&series), Err(ObserveError::Overflow));
         let poisoned = Estimate { mean: f64::NAN, error: 1.0, samples: 0, tau: f64::NAN };
         let comparison = difference(&poisoned, &poisoned);
         assert!(comparison.p_value.is_nan() && comparison.exceeds(1, 0.05));

@@ -1,12 +1,6 @@
 //! Surface tension of a slab from the pressure tensor.
 
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum TensionError {
-    #[error("the pressure components differ in length: {xx} xx, {yy} yy, {zz} zz")]
-    Lengths { xx: usize, yy: usize, zz: usize },
-    #[error("the box length {0} along z is not a positive number")]
-    BoxLength(f64),
-}
+use super::error::ObserveError;
 
 /// The surface tension at each sample, γ = (L_z/2) [P_zz − (P_xx + P_yy)/2], energy per area (k_B T / r_c²).
 ///
@@ -16,12 +10,12 @@ pub enum TensionError {
 /// # Errors
 ///
 /// The function fails for components of different lengths, and for an `lz` that is not a positive number.
-pub fn tension_series(lz: f64, pxx: &[f64], pyy: &[f64], pzz: &[f64]) -> Result<Vec<f64>, TensionError> {
+pub fn tension_series(lz: f64, pxx: &[f64], pyy: &[f64], pzz: &[f64]) -> Result<Vec<f64>, ObserveError> {
     if !(lz.is_finite() && lz > 0.0) {
-        return Err(TensionError::BoxLength(lz));
+        return Err(ObserveError::BoxLength(lz));
     }
     if pxx.len() != pyy.len() || pyy.len() != pzz.len() {
-        return Err(TensionError::Lengths { xx: pxx.len(), yy: pyy.len(), zz: pzz.len() });
+        return Err(ObserveError::Pressures { xx: pxx.len(), yy: pyy.len(), zz: pzz.len() });
     }
     Ok(pxx.iter().zip(pyy).zip(pzz).map(|((xx, yy), zz)| 0.5 * lz * (zz - 0.5 * (xx + yy))).collect())
 }
@@ -41,9 +35,9 @@ mod tests {
     fn bad_records_are_refused() {
         assert_eq!(
             tension_series(1.0, &[0.0], &[], &[0.0]),
-            Err(TensionError::Lengths { xx: 1, yy: 0, zz: 1 })
+            Err(ObserveError::Pressures { xx: 1, yy: 0, zz: 1 })
         );
-        assert_eq!(tension_series(0.0, &[], &[], &[]), Err(TensionError::BoxLength(0.0)));
+        assert_eq!(tension_series(0.0, &[], &[], &[]), Err(ObserveError::BoxLength(0.0)));
         assert!(tension_series(f64::NAN, &[], &[], &[]).is_err());
     }
 }

@@ -1,4 +1,5 @@
 use psidpd_formats::files::WriteError;
+use std::path::PathBuf;
 
 /// An error while a report is made or written.
 #[derive(Debug, thiserror::Error)]
@@ -9,4 +10,6 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
     #[error(transparent)]
     Write(#[from] WriteError),
+    #[error("{} is not the folder of a run: it has none of the files {files}", folder.display())]
+    NoRun { folder: PathBuf, files: String },
 }

@@ -22,5 +22,5 @@ pub use html::{Item, Report, Section};
 pub use plot::{Plot, Series, Style};
 pub use progress::{Bar, Progress};
 pub use results::{Check, Results};
-pub use run::{Headline, HeadlineValue, RunReportError, headline, run_report, write_run_report};
+pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};

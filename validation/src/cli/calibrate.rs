@@ -4,8 +4,9 @@ use super::say::{self, say};
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
 use psidpd_core::model::Model;
+use psidpd_experiments::ExperimentError;
 use psidpd_experiments::bulk::Sampling;
-use psidpd_experiments::calibrate::{CalibrateError, Options, calibrate, shown, spaced};
+use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
 use psidpd_formats::files::write_atomically;
 use psidpd_report::Table;
 use std::num::NonZeroUsize;
@@ -80,7 +81,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let a = arguments;
-    let bad = |message: String| Failure::from(CalibrateError::Conditions(message));
+    let bad = |message: String| Failure::from(ExperimentError::Conditions(message));
     if !(a.tolerance > 0.0 && a.dt > 0.0 && a.tolerance.is_finite() && a.dt.is_finite()) {
         return Err(bad("tolerance and time step must be positive numbers".into()));
     }

@@ -6,10 +6,8 @@ use psidpd_core::document::{FileError, printable};
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::RunError;
 use psidpd_experiments::ExperimentError;
-use psidpd_experiments::calibrate::CalibrateError;
-use psidpd_experiments::from_eos::FromEosError;
-use psidpd_experiments::sweep::SweepError;
 use psidpd_formats::files::WriteError;
+use psidpd_lammps_host::LammpsError;
 use std::path::PathBuf;
 
 /// The longest line, in bytes, that is shown with an error.
@@ -100,20 +98,12 @@ fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::
     match error.downcast_ref() {
         Some(ExperimentError::File(found)) => return found,
         Some(ExperimentError::Run(found)) => return found,
-        _ => {}
-    }
-    if let Some(SweepError::File(found)) = error.downcast_ref() {
-        return found;
-    }
-    match error.downcast_ref() {
-        Some(FromEosError::File(found)) => return found,
-        Some(FromEosError::Run(found)) => return found,
-        Some(FromEosError::Calibrate(found)) => return unwrapped(found),
+        Some(ExperimentError::Lammps(found)) => return unwrapped(found),
         _ => {}
     }
     match error.downcast_ref() {
-        Some(CalibrateError::File(found)) => found,
-        Some(CalibrateError::Run(found)) => found,
+        Some(LammpsError::File(found)) => found,
+        Some(LammpsError::Native(found)) => found,
         _ => error,
     }
 }

@@ -1,8 +1,9 @@
 use super::run::threads_at_once;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
+use psidpd_experiments::ExperimentError;
 use psidpd_experiments::bulk::Sampling;
-use psidpd_experiments::from_eos::{FromEosError, Options, Substance, from_eos};
+use psidpd_experiments::from_eos::{Options, Substance, from_eos};
 use psidpd_formats::files::write_atomically;
 use psidpd_report::Table;
 use std::num::NonZeroUsize;
@@ -59,7 +60,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     let numbers = [a.temperature, a.molecules, a.density, a.tolerance, a.dt, a.range, 1.0 - a.range];
     if !numbers.into_iter().all(|x| x > 0.0 && x.is_finite()) {
         let message = "numbers must be positive, and the range below 1";
-        return Err(FromEosError::Conditions(message.into()).into());
+        return Err(ExperimentError::Conditions(message.into()).into());
     }
     let options = Options {
         temperature: a.temperature,

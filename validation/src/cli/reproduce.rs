@@ -2,7 +2,8 @@ use super::run::threads_at_once;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::Fault;
-use psidpd_experiments::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
+use psidpd_experiments::ExperimentError;
+use psidpd_experiments::papers::{Case, Compared, Context, Outcome, Size, cases};
 use psidpd_formats::files::write_atomically;
 use psidpd_report::Table;
 use serde_json::{Value, json};
@@ -73,7 +74,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 write_plots(&outcome, &folder)?;
                 result(case, &outcome)
             }
-            Err(PaperError::Run(why)) if why.is_stop() => {
+            Err(ExperimentError::Run(why)) if why.is_stop() => {
                 say!("  stopped: {why}");
                 good = false;
                 json!({ "id": case.id, "values": [], "pass": false, "stopped": why.to_string() })
@@ -150,7 +151,7 @@ fn show(outcome: &Outcome) {
 fn write_plots(outcome: &Outcome, folder: &Path) -> Result<(), Failure> {
     for (name, plot) in &outcome.plots {
         let svg = plot.render()?;
-        let io = |source| Failure::from(PaperError::Io { path: folder.to_owned(), source });
+        let io = |source| Failure::from(ExperimentError::Io { path: folder.to_owned(), source });
         std::fs::create_dir_all(folder).map_err(io)?;
         write_atomically(folder.join(format!("{name}.svg")), svg.as_bytes())?;
     }

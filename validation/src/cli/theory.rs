@@ -146,7 +146,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     let densities = per_species(&arguments.density, species)
         .unwrap_or_else(|| vec![prediction.as_ref().map_or(3.0, |p| p.density) / species as f64; species]);
     if densities.len() != species {
-        let error = psidpd_experiments::check::CheckError::Densities { given: densities.len(), species };
+        let error = psidpd_experiments::ExperimentError::Densities { given: densities.len(), species };
         return Err(error.into());
     }
     let [low, high] = arguments.search[..] else {

@@ -23,44 +23,14 @@ pub use point::Point;
 pub use search::{Batch, DUMMY_SLOPE, Failed, Goal, Round, Trial, Wish, search};
 pub use text::with_correction;
 
+use crate::ExperimentError;
 use crate::bulk::{Bulk, Sampling};
-use psidpd_core::document::FileError;
 use psidpd_core::model::{Model, Polynomial};
-use psidpd_core::theory::{MeanField, TheoryError};
+use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
 use serde::Serialize;
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
-
-/// Why a model cannot be calibrated. A tolerance that is not met is no error.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CalibrateError {
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    Theory(#[from] TheoryError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    #[error("the model file cannot be edited: {0}")]
-    Edit(#[from] toml_edit::TomlError),
-    #[error("the model has no [density.{0}]")]
-    NoSuchDensity(String),
-    #[error("the model has several densities ({0}): name the one to calibrate with --name")]
-    WhichDensity(String),
-    #[error("{0}")]
-    Conditions(String),
-    #[error("the wanted pressure at density {0} is not a finite number: choose another range of densities")]
-    NoTarget(f64),
-    #[error(
-        "{}: no correction could be measured at densities {low} to {high} ({}): use a smaller --dt, or a narrower --density range",
-        model.display(),
-        sentences(failed)
-    )]
-    Nothing { model: PathBuf, low: f64, high: f64, failed: Vec<Failed> },
-    #[error("no folder for the runs: {0}")]
-    Folder(#[from] std::io::Error),
-}
+use std::path::Path;
 
 /// What to calibrate.
 #[derive(Debug, Clone)]
@@ -159,28 +129,28 @@ const SLOPE_SHARE: f64 = 0.1;
 /// Calibrates the model in the file `path`; `command` goes into its comment.
 ///
 /// # Errors
-/// See [`CalibrateError`].
+/// See [`ExperimentError`].
 pub fn calibrate(
     path: &Path,
     options: &Options,
     command: &str,
     told: &mut dyn FnMut(&str),
-) -> Result<Calibration, CalibrateError> {
+) -> Result<Calibration, ExperimentError> {
     let model = Model::open(path)?;
     let fluid = model.at(options.kt)?;
     let names: Vec<String> = fluid.densities.iter().map(|d| d.name.clone()).collect();
     let name = match (&options.name, &names[..]) {
-        (Some(name), _) if !names.contains(name) => return Err(CalibrateError::NoSuchDensity(name.clone())),
+        (Some(name), _) if !names.contains(name) => return Err(ExperimentError::NoSuchDensity(name.clone())),
         (Some(name), _) => name.clone(),
         (None, [one]) => one.clone(),
-        (None, []) => return Err(CalibrateError::NoSuchDensity("n".into())),
-        (None, several) => return Err(CalibrateError::WhichDensity(several.join(", "))),
+        (None, []) => return Err(ExperimentError::NoSuchDensity("n".into())),
+        (None, several) => return Err(ExperimentError::WhichDensity(several.join(", "))),
     };
     let species = model.species();
     if options.composition.len() != species.len() {
         let message =
             format!("a composition of {} shares for {} species", options.composition.len(), species.len());
-        return Err(CalibrateError::Conditions(message));
+        return Err(ExperimentError::Conditions(message));
     }
     let text = model.source().text().to_owned();
     // ψ at the bulk density itself, whatever the file has for a correction or a self term.
@@ -204,15 +174,15 @@ pub fn calibrate(
             let finite = wanted.is_finite() && scale.is_finite() && scale > 0.0;
             finite
                 .then_some(Target { wanted, base: wanted - slopes, scale })
-                .ok_or(CalibrateError::NoTarget(*total))
+                .ok_or(ExperimentError::NoTarget(*total))
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let folder = tempfile::tempdir()?;
+    let folder = tempfile::tempdir().map_err(ExperimentError::Folder)?;
     let observe = format!("local_density = {{ density = \"{name}\", bins = 1000 }}");
     let told = RefCell::new(told);
     told.borrow_mut()("measuring with rho~ = rho");
     let mut all_failed: Vec<Failed> = Vec::new();
-    let mut measure = |trial: Trial| -> Result<Batch, CalibrateError> {
+    let mut measure = |trial: Trial| -> Result<Batch, ExperimentError> {
         let mut batch = Batch::default();
         for (k, total) in options.densities.iter().enumerate() {
             let rho = per_species(*total);
@@ -277,10 +247,15 @@ pub fn calibrate(
     };
     let Some((chosen, best)) = rounds.iter().enumerate().min_by(|(_, a), (_, b)| better(a, b)) else {
         if all_failed.is_empty() {
-            return Err(CalibrateError::Conditions("too few densities for a fit".into()));
+            return Err(ExperimentError::Conditions("too few densities for a fit".into()));
         }
         let [low, high] = [options.densities[0], options.densities[asked - 1]];
-        return Err(CalibrateError::Nothing { model: path.to_owned(), low, high, failed: all_failed });
+        return Err(ExperimentError::NoCorrection {
+            model: path.to_owned(),
+            low,
+            high,
+            failed: sentences(&all_failed),
+        });
     };
     let last = rounds.len() - 1;
     let converged = rounds[last].meets(options.tolerance);

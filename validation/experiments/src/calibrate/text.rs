@@ -1,6 +1,6 @@
 //! Model files with another correction or another ψ: everything else, comments too, stays as it is.
 
-use super::CalibrateError;
+use crate::ExperimentError;
 use psidpd_core::model::Polynomial;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
 
@@ -14,7 +14,7 @@ pub fn with_correction(
     species: &[String],
     polynomials: &[Polynomial],
     note: &str,
-) -> Result<String, CalibrateError> {
+) -> Result<String, ExperimentError> {
     let mut document: DocumentMut = text.parse()?;
     let coefficients = |p: &Polynomial| p.0.iter().copied().collect::<Array>();
     let value = match polynomials {
@@ -32,7 +32,7 @@ pub fn with_correction(
     let lines = entry.as_ref().is_some_and(|entry| entry.is_table());
     let entry = entry
         .and_then(Item::as_table_like_mut)
-        .ok_or_else(|| CalibrateError::NoSuchDensity(density.to_owned()))?;
+        .ok_or_else(|| ExperimentError::NoSuchDensity(density.to_owned()))?;
     entry.insert("correction", Item::Value(value));
     // Within braces there are no comments.
     if lines && let Some(mut key) = entry.key_mut("correction") {
@@ -51,7 +51,7 @@ pub fn with_slopes(
     species: &[String],
     variables: &[String],
     slopes: &[Vec<f64>],
-) -> Result<String, CalibrateError> {
+) -> Result<String, ExperimentError> {
     let mut document: DocumentMut = text.parse()?;
     let mut excess = Table::new();
     for (name, slopes) in species.iter().zip(slopes) {
@@ -89,7 +89,7 @@ mod tests {
         assert_eq!(again.matches("correction").count(), 1, "{again}");
         assert!(matches!(
             with_correction(MODEL, "m", &["F".into()], &[fitted], ""),
-            Err(CalibrateError::NoSuchDensity(_))
+            Err(ExperimentError::NoSuchDensity(_))
         ));
     }
 

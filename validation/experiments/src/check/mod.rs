@@ -11,6 +11,7 @@ pub use cost::{Cost, cost};
 pub use findings::{Findings, Severity, Warning};
 pub use timestep::{StepEstimate, estimates};
 
+use crate::ExperimentError;
 use psidpd_core::engine::Plan;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
@@ -25,30 +26,16 @@ pub struct Conditions {
     pub densities: Option<Vec<f64>>,
 }
 
-/// Why a model cannot be checked.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CheckError {
-    #[error(transparent)]
-    File(#[from] psidpd_core::document::FileError),
-    #[error(transparent)]
-    TooLarge(#[from] psidpd_core::model::expression::TooLarge),
-    #[error(transparent)]
-    Theory(#[from] TheoryError),
-    #[error("{given} densities for {species} species")]
-    Densities { given: usize, species: usize },
-}
-
 /// Looks at `model` under `conditions`.
 ///
 /// # Errors
-/// See [`CheckError`]; what is found is in the [`Findings`].
-pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckError> {
+/// See [`ExperimentError`]; what is found is in the [`Findings`].
+pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, ExperimentError> {
     let fluid: Fluid = model.at(conditions.kt)?;
     if let Some(densities) = &conditions.densities
         && densities.len() != fluid.species.len()
     {
-        return Err(CheckError::Densities { given: densities.len(), species: fluid.species.len() });
+        return Err(ExperimentError::Densities { given: densities.len(), species: fluid.species.len() });
     }
     let plan = Plan::new(&fluid)?;
     // Mean field starts from a free energy, which a law of stated slopes does not have, and from integrals of the pair

@@ -1,8 +1,8 @@
 //! The checks, one function each.
 
-use super::CheckError;
 use super::calibration;
 use super::findings::{Severity, Warning};
+use crate::ExperimentError;
 use psidpd_core::maximum::largest;
 use psidpd_core::model::kernel::KernelKind;
 use psidpd_core::model::pair::PairForm;
@@ -25,7 +25,7 @@ pub struct State<'a> {
 }
 
 /// All warnings, the most severe first.
-pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, CheckError> {
+pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, ExperimentError> {
     let mut found = Vec::new();
     found.extend(not_conservative(fluid));
     if let Some(species) = fluid.stated_slopes() {
@@ -93,7 +93,7 @@ fn no_free_energy(species: &str) -> Warning {
     }
 }
 
-fn collapse(fluid: &Fluid) -> Result<Option<Warning>, CheckError> {
+fn collapse(fluid: &Fluid) -> Result<Option<Warning>, ExperimentError> {
     let Err(limit) = thermodynamic_limit(fluid)? else {
         return Ok(None);
     };
@@ -114,7 +114,7 @@ fn collapse(fluid: &Fluid) -> Result<Option<Warning>, CheckError> {
 /// How far beyond the mean density a particle's local density goes in a run, with a random start.
 const REACH: f64 = 3.0;
 
-fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, CheckError> {
+fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, ExperimentError> {
     let count = fluid.species.len();
     let (composition, total) = match densities {
         Some(rho) if rho.iter().sum::<f64>() > 0.0 => (rho.to_vec(), rho.iter().sum()),

@@ -1,7 +1,8 @@
 //! The equation of state: PC-SAFT by FeOs (P. Rehner, G. Bauer, J. Gross, Ind. Eng. Chem. Res. 62, 5347 (2023)), its tension
 //! by density functional theory. Only with the feature `eos`.
 
-use super::{FromEosError, Substance};
+use super::Substance;
+use crate::ExperimentError;
 
 /// A saturated liquid, in SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,8 +25,8 @@ pub struct Liquid {
 /// # Errors
 /// There is none, or the feature is off.
 #[cfg(not(feature = "eos"))]
-pub fn liquid(_: &Substance, _: f64) -> Result<Liquid, FromEosError> {
-    Err(FromEosError::NotBuilt)
+pub fn liquid(_: &Substance, _: f64) -> Result<Liquid, ExperimentError> {
+    Err(ExperimentError::NotBuilt)
 }
 
 /// The saturated liquid of a substance at a temperature in K.
@@ -33,14 +34,14 @@ pub fn liquid(_: &Substance, _: f64) -> Result<Liquid, FromEosError> {
 /// # Errors
 /// There is none, or the feature is off.
 #[cfg(feature = "eos")]
-pub fn liquid(substance: &Substance, temperature: f64) -> Result<Liquid, FromEosError> {
+pub fn liquid(substance: &Substance, temperature: f64) -> Result<Liquid, ExperimentError> {
     use feos::core::parameter::PureRecord;
     use feos::core::{Contributions, PhaseEquilibrium, SolverOptions, State};
     use feos::dft::interface::PlanarInterface;
     use feos::pcsaft::{PcSaftAssociationRecord, PcSaftFunctional, PcSaftParameters, PcSaftRecord};
     use quantity::{KELVIN, METER, MOL, NEWTON, PASCAL};
 
-    let failed = |why: &dyn std::fmt::Display| FromEosError::Equation(why.to_string());
+    let failed = |why: &dyn std::fmt::Display| ExperimentError::Equation(why.to_string());
     let mut record = serde_json::json!({
         "identifier": { "name": substance.name },
         "molarweight": 1e3 * substance.molar_mass,

@@ -1,6 +1,7 @@
 //! Warren's fluid with the pressures of a liquid.
 
-use super::{FromEosError, Liquid, Options, Substance, Units};
+use super::{Liquid, Options, Substance, Units};
+use crate::ExperimentError;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
@@ -11,11 +12,11 @@ pub fn coefficients(
     units: &Units,
     density: f64,
     attraction: f64,
-) -> Result<[f64; 3], FromEosError> {
+) -> Result<[f64; 3], ExperimentError> {
     let rest = |x: f64, p: f64| p - x - PI / 30.0 * attraction * x * x;
     let slope = 1.0 / (liquid.compressibility * units.pressure * density);
     let Some((compressed, p)) = liquid.compressed.last() else {
-        return Err(FromEosError::Equation("no pressures of the compressed liquid".into()));
+        return Err(ExperimentError::Equation("no pressures of the compressed liquid".into()));
     };
     let x = density * compressed / liquid.density;
     let row = |x: f64| [x.powi(3), x.powi(4), x.powi(5)];
@@ -30,7 +31,7 @@ pub fn coefficients(
     let found = matrix.lu().solve(&wanted).filter(|b| b.iter().all(|b| b.is_finite()));
     found
         .map(|b| [b[0], b[1], b[2]])
-        .ok_or_else(|| FromEosError::Equation("its pressures cannot be fitted".into()))
+        .ok_or_else(|| ExperimentError::Equation("its pressures cannot be fitted".into()))
 }
 
 /// The model file, without corrected density.
@@ -44,7 +45,7 @@ pub fn model(
     options: &Options,
     attraction: f64,
     command: &str,
-) -> Result<String, FromEosError> {
+) -> Result<String, ExperimentError> {
     let [b1, b2, b3] = coefficients(liquid, units, options.density, attraction)?;
     Ok(format!(
         "# {name} at {t} K, {molecules} molecules to a particle, by\n#   {command}\n\

@@ -19,36 +19,12 @@ pub use equation::Liquid;
 pub use substance::Substance;
 pub use units::Units;
 
+use crate::ExperimentError;
 use crate::bulk::{Bulk, Sampling};
-use crate::calibrate::{CalibrateError, Options as Calibrate, Value, calibrate, spaced};
-use psidpd_core::document::FileError;
+use crate::calibrate::{Options as Calibrate, Value, calibrate, spaced};
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::RunError;
 use psidpd_observe::Measured;
 use serde::Serialize;
-
-/// Why there is no model.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FromEosError {
-    #[cfg(not(feature = "eos"))]
-    #[error("this psidpd was built without equations of state: cargo build --release --features eos")]
-    NotBuilt,
-    #[error("no parameters for {0}: there are {1}")]
-    Substance(String, String),
-    #[error("the equation of state: {0}")]
-    Equation(String),
-    #[error("{0}")]
-    Conditions(String),
-    #[error(transparent)]
-    Calibrate(#[from] CalibrateError),
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    #[error("no folder for the runs: {0}")]
-    Folder(#[from] std::io::Error),
-}
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -117,13 +93,13 @@ const TRIALS: usize = 5;
 /// Makes a model of `substance`.
 ///
 /// # Errors
-/// See [`FromEosError`]; a tolerance that is not met is none.
+/// See [`ExperimentError`]; a tolerance that is not met is none.
 pub fn from_eos(
     substance: &Substance,
     options: &Options,
     command: &str,
     told: &mut dyn FnMut(&str),
-) -> Result<Found, FromEosError> {
+) -> Result<Found, ExperimentError> {
     let liquid = equation::liquid(substance, options.temperature)?;
     let units = Units::new(substance, &liquid, options);
     let wanted = liquid.tension / units.tension;
@@ -133,14 +109,14 @@ pub fn from_eos(
         units.length * 1e9,
         1.0 / (liquid.compressibility * units.pressure * options.density),
     ));
-    let folder = tempfile::tempdir()?;
+    let folder = tempfile::tempdir().map_err(ExperimentError::Folder)?;
     let path = folder.path().join("trial.toml");
     let mut trials: Vec<Trial> = Vec::new();
     // Between these the tension of Warren's fluids is 5 to 15.
     let mut attraction = -40.0;
     loop {
         let text = fluid::model(substance, &liquid, &units, options, attraction, command)?;
-        std::fs::write(&path, &text)?;
+        std::fs::write(&path, &text).map_err(ExperimentError::io(&path))?;
         let calibration = calibrate(
             &path,
             &Calibrate {
@@ -154,7 +130,7 @@ pub fn from_eos(
             command,
             &mut |_| {},
         )?;
-        std::fs::write(&path, &calibration.text)?;
+        std::fs::write(&path, &calibration.text).map_err(ExperimentError::io(&path))?;
         let slab = slab::measure(&path, options, folder.path())?;
         told(&format!(
             "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",
@@ -224,15 +200,15 @@ fn compressibility(
     options: &Options,
     units: &Units,
     folder: &std::path::Path,
-) -> Result<(Measured, f64), FromEosError> {
+) -> Result<(Measured, f64), ExperimentError> {
     let model = Model::open(path)?;
-    let pressure = |rho: f64| -> Result<Measured, FromEosError> {
+    let pressure = |rho: f64| -> Result<Measured, ExperimentError> {
         let sampling = Sampling { steps: 3 * options.sampling.steps, ..options.sampling };
         let bulk = Bulk { model: &model, kt: 1.0, densities: &[rho], observe: "", sampling };
         Ok(bulk.run(path, &folder.join("bulk"))?.pressure())
     };
     let Some((denser, compressed)) = liquid.compressed.first() else {
-        return Err(FromEosError::Equation("no pressures of the compressed liquid".into()));
+        return Err(ExperimentError::Equation("no pressures of the compressed liquid".into()));
     };
     let factor = denser / liquid.density;
     let (a, b) = (pressure(options.density)?, pressure(factor * options.density)?);

@@ -1,4 +1,5 @@
-use super::{FromEosError, Options};
+use super::Options;
+use crate::ExperimentError;
 use crate::bulk;
 use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::Scene;
@@ -17,7 +18,7 @@ pub struct Slab {
 ///
 /// # Errors
 /// The run stops.
-pub fn measure(path: &Path, options: &Options, folder: &Path) -> Result<Slab, FromEosError> {
+pub fn measure(path: &Path, options: &Options, folder: &Path) -> Result<Slab, ExperimentError> {
     let dt = options.sampling.dt;
     let text = format!(
         "title = \"slab\"\nmodel = \"trial.toml\"\nkT = 1.0\nseed = {}\nbox = [7.0, 7.0, 18.0]\ndt = {dt:?}\nequilibrate = {}\n\

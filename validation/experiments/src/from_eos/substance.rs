@@ -1,4 +1,4 @@
-use super::FromEosError;
+use crate::ExperimentError;
 use serde::Deserialize;
 
 /// PC-SAFT parameters of a pure substance.
@@ -44,11 +44,11 @@ impl Substance {
     ///
     /// # Errors
     /// There is none.
-    pub fn find(name: &str) -> Result<Substance, FromEosError> {
+    pub fn find(name: &str) -> Result<Substance, ExperimentError> {
         all()
             .into_iter()
             .find(|s| s.name == name)
-            .ok_or_else(|| FromEosError::Substance(name.to_owned(), names()))
+            .ok_or_else(|| ExperimentError::Substance(name.to_owned(), names()))
     }
 }
 

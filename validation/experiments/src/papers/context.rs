@@ -1,9 +1,9 @@
+use crate::ExperimentError;
 use crate::bulk::{self, Bulk, Observed, Sampling};
-use psidpd_core::document::FileError;
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
-use psidpd_core::theory::{MeanField, TheoryError};
-use psidpd_dynamics::run::{Begin, RunError};
+use psidpd_core::theory::MeanField;
+use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::Scene;
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -18,22 +18,6 @@ pub enum Size {
     Quick,
     /// Those of the papers. Runs that were interrupted go on.
     Full,
-}
-
-/// Why a case cannot be carried out.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PaperError {
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    #[error(transparent)]
-    Theory(#[from] TheoryError),
-    #[error("{path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
-    #[error("the file has no {0}")]
-    Parameter(String),
 }
 
 /// Where and how a case runs.
@@ -82,16 +66,16 @@ impl Context {
         if fresh { self.pick(Begin::Overwrite, Begin::Resume) } else { Begin::Resume }
     }
 
-    fn write(&self, name: &str, model: &str) -> Result<PathBuf, PaperError> {
+    fn write(&self, name: &str, model: &str) -> Result<PathBuf, ExperimentError> {
         let path = self.folder.join(format!("{name}.model.toml"));
         std::fs::create_dir_all(&self.folder)
             .and_then(|()| std::fs::write(&path, model))
-            .map_err(|source| PaperError::Io { path: path.clone(), source })?;
+            .map_err(ExperimentError::io(&path))?;
         Ok(path)
     }
 
     /// Measures a homogeneous fluid at partial densities.
-    pub fn bulk(&self, name: &str, fluid: &Fluid, densities: &[f64]) -> Result<Observed, PaperError> {
+    pub fn bulk(&self, name: &str, fluid: &Fluid, densities: &[f64]) -> Result<Observed, ExperimentError> {
         let path = self.write(name, fluid.model)?;
         let model = Model::open(&path)?;
         let total: f64 = densities.iter().sum();
@@ -111,7 +95,7 @@ impl Context {
     }
 
     /// Runs a scene, the text of which does not name its model.
-    pub fn scene(&self, name: &str, model: &str, scene: &str) -> Result<Observed, PaperError> {
+    pub fn scene(&self, name: &str, model: &str, scene: &str) -> Result<Observed, ExperimentError> {
         let path = self.write(name, model)?;
         let text = format!("model = \"{name}.model.toml\"\n{scene}");
         let scene =
@@ -127,7 +111,7 @@ impl Context {
         model: &str,
         scene: &str,
         changes: &[Change],
-    ) -> Result<Observed, PaperError> {
+    ) -> Result<Observed, ExperimentError> {
         self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
     }
 
@@ -142,9 +126,9 @@ impl Context {
         &self,
         name: &str,
         columns: [&str; N],
-    ) -> Result<Vec<[f64; N]>, PaperError> {
+    ) -> Result<Vec<[f64; N]>, ExperimentError> {
         let path = self.folder.join(name).join("thermo.csv");
-        let text = std::fs::read_to_string(&path).map_err(|source| PaperError::Io { path, source })?;
+        let text = std::fs::read_to_string(&path).map_err(ExperimentError::io(&path))?;
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
         let at = columns.map(|c| header.iter().position(|h| *h == c).unwrap_or(usize::MAX));
@@ -157,8 +141,8 @@ impl Context {
 }
 
 /// A scene without its model and with other values.
-fn edited(scene: &str, changes: &[Change]) -> Result<String, PaperError> {
-    let missing = |name: &str| PaperError::Parameter(name.to_owned());
+fn edited(scene: &str, changes: &[Change]) -> Result<String, ExperimentError> {
+    let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
     let mut document: toml_edit::DocumentMut = scene.parse().map_err(|_| missing("scene"))?;
     document.remove("model");
     for (path, value) in changes {
@@ -175,13 +159,13 @@ fn edited(scene: &str, changes: &[Change]) -> Result<String, PaperError> {
 }
 
 /// Mean field of a model file.
-pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, PaperError> {
+pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
     Ok(MeanField::new(&Model::parse("model.toml", model)?.at(kt)?)?)
 }
 
 /// A model file with other parameters.
-pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, PaperError> {
-    let missing = |name: &str| PaperError::Parameter(name.to_owned());
+pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, ExperimentError> {
+    let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
     let mut document: toml_edit::DocumentMut = model.parse().map_err(|_| missing("parameters"))?;
     for (name, value) in parameters {
         let entry = document.get_mut("parameters").and_then(|table| table.get_mut(name));

@@ -15,8 +15,9 @@ mod trofimov;
 mod wang;
 mod warren;
 
+use crate::ExperimentError;
 pub use case::{Compared, Outcome, Rule};
-pub use context::{Context, PaperError, Size};
+pub use context::{Context, Size};
 
 /// A figure or table.
 #[derive(Debug, Clone, Copy)]
@@ -31,14 +32,14 @@ pub struct Case {
 }
 
 /// What carries a case out.
-type Run = fn(&Context) -> Result<Outcome, PaperError>;
+type Run = fn(&Context) -> Result<Outcome, ExperimentError>;
 
 impl Case {
     /// Runs the case.
     ///
     /// # Errors
     /// A run stops, or a file cannot be written. A value that does not agree is no error.
-    pub fn run(&self, context: &Context) -> Result<Outcome, PaperError> {
+    pub fn run(&self, context: &Context) -> Result<Outcome, ExperimentError> {
         (self.run)(context)
     }
 }

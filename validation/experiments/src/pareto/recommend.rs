@@ -5,7 +5,8 @@ use super::setting::{Physics, Setting};
 use psidpd_core::engine::noise::Law;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::scene::{Scene, Stage};
-use psidpd_lammps_host::export::lammps::{self as deck, DeckError, Script};
+use psidpd_lammps_host::LammpsError;
+use psidpd_lammps_host::export::lammps::{self as deck, Script};
 use std::fmt::Write;
 
 /// The lines of a scene.
@@ -55,7 +56,7 @@ pub fn scene_of(origin: &Origin, physics: &Physics, steps: &[u64]) -> Scene {
 ///
 /// # Errors
 /// LAMMPS cannot express them.
-pub fn lammps_lines(origin: &Origin, physics: &Physics) -> Result<String, DeckError> {
+pub fn lammps_lines(origin: &Origin, physics: &Physics) -> Result<String, LammpsError> {
     let script = deck::script_of(&scene_of(origin, physics, &[origin.stage.steps]), Script::default())?;
     let wanted = ["comm_modify", "pair_style", "pair_coeff", "fix ", "fix_modify", "timestep", "run_style"];
     let lines = script.lines().filter(|line| wanted.iter().any(|word| line.starts_with(word)));

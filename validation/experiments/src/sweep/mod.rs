@@ -6,11 +6,11 @@ mod page;
 pub use axis::Axis;
 pub use page::{page, table};
 
-use psidpd_core::document::FileError;
+use crate::ExperimentError;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
 use psidpd_dynamics::scene::{Edit, Scene};
-use psidpd_formats::files::write_atomically;
+use psidpd_formats::files::{WriteError, write_atomically};
 use psidpd_report::{Headline, headline};
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -35,24 +35,6 @@ pub struct Options {
     pub threads: NonZeroUsize,
     /// Whether runs that are there are replaced; else they go on, and finished ones are taken as they are.
     pub overwrite: bool,
-}
-
-/// Why there is no sweep.
-#[derive(Debug, thiserror::Error)]
-pub enum SweepError {
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error("{points} runs are more than the {most} that a sweep may have: use fewer values")]
-    TooMany { points: usize, most: usize },
-    #[error(
-        "{} has the run {row}, which is none of this sweep and would be lost from the table: choose another folder, sweep over \
-         values with the old ones among them, or replace the table with --overwrite", path.display()
-    )]
-    OtherGrid { path: PathBuf, row: String },
-    #[error("{} cannot be written: {source}", path.display())]
-    Output { path: PathBuf, source: std::io::Error },
-    #[error(transparent)]
-    Report(#[from] psidpd_report::ReportError),
 }
 
 /// One run of a sweep.
@@ -91,13 +73,12 @@ pub fn run(
     options: &Options,
     stop: &AtomicUsize,
     tell: &(dyn Fn(&Point, usize) + Sync),
-) -> Result<Vec<Point>, SweepError> {
+) -> Result<Vec<Point>, ExperimentError> {
     let points = combinations(&options.axes)?;
     // What is wrong with the scene itself is said at once, and not once for each run.
     Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
     refuse_other_grid(options, &points)?;
-    std::fs::create_dir_all(&options.out)
-        .map_err(|source| SweepError::Output { path: options.out.clone(), source })?;
+    std::fs::create_dir_all(&options.out).map_err(WriteError::at(&options.out))?;
     let (next, ended) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let done: Mutex<Vec<Option<Point>>> = Mutex::new(vec![None; points.len()]);
     let work = || {
@@ -120,10 +101,10 @@ pub fn run(
 }
 
 /// Every value of every axis with every value of the others, the last axis fastest.
-fn combinations(axes: &[Axis]) -> Result<Vec<Vec<Edit>>, SweepError> {
+fn combinations(axes: &[Axis]) -> Result<Vec<Vec<Edit>>, ExperimentError> {
     let points = axes.iter().fold(1usize, |n, axis| n.saturating_mul(axis.edits.len()));
     if points > MOST {
-        return Err(SweepError::TooMany { points, most: MOST });
+        return Err(ExperimentError::TooManyRuns { points, most: MOST });
     }
     let mut all = vec![Vec::new()];
     for axis in axes {
@@ -138,13 +119,13 @@ fn combinations(axes: &[Axis]) -> Result<Vec<Vec<Edit>>, SweepError> {
 }
 
 /// A table of other runs is not replaced: every row must be a point of this sweep. Rows end with their folders.
-fn refuse_other_grid(options: &Options, points: &[Vec<Edit>]) -> Result<(), SweepError> {
+fn refuse_other_grid(options: &Options, points: &[Vec<Edit>]) -> Result<(), ExperimentError> {
     let path = options.out.join(TABLE);
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(()) };
     let ends: Vec<String> = points.iter().map(|p| format!(",{}", page::quoted(&name(p)))).collect();
     let stranger = text.lines().skip(1).find(|row| !ends.iter().any(|end| row.ends_with(end)));
     match stranger.filter(|_| !options.overwrite) {
-        Some(row) => Err(SweepError::OtherGrid { path, row: row.to_owned() }),
+        Some(row) => Err(ExperimentError::OtherGrid { path, row: row.to_owned() }),
         None => Ok(()),
     }
 }
@@ -198,14 +179,10 @@ fn attempt(options: &Options, edits: &[Edit], folder: &Path, stop: &AtomicUsize)
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write(options: &Options, title: &str, points: &[Point]) -> Result<(), SweepError> {
-    let to = |name: &str, text: String| {
-        let path = options.out.join(name);
-        write_atomically(&path, text.as_bytes())
-            .map_err(|e| SweepError::Output { path, source: std::io::Error::other(e) })
-    };
+pub fn write(options: &Options, title: &str, points: &[Point]) -> Result<(), ExperimentError> {
+    let to = |name: &str, text: String| write_atomically(options.out.join(name), text.as_bytes());
     to(TABLE, page::csv(&options.axes, points))?;
-    to("report.html", page(title, &options.axes, points)?.render())
+    Ok(to("report.html", page(title, &options.axes, points)?.render())?)
 }
 
 #[cfg(test)]

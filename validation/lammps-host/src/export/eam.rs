@@ -4,11 +4,11 @@
 //! kernel depends on the neighbour's species alone. ψ becomes `F` and the kernel becomes `f`. Densities in
 //! which every ψ is linear are pair potentials and go into `φ`, with the pair terms of the model.
 
+use crate::LammpsError;
 use psidpd_core::engine::Plan;
-use psidpd_core::model::expression::{Formula, TooLarge};
+use psidpd_core::model::expression::Formula;
 use psidpd_core::model::pair::PairForm;
 use psidpd_core::model::{ExcessFreeEnergy, Fluid};
-use psidpd_formats::FormatError;
 use psidpd_formats::setfl::{Element, Setfl};
 use std::path::Path;
 
@@ -32,52 +32,19 @@ impl Default for Grid {
 /// Largest number of values in a file, which has then half a gigabyte.
 const MOST: u32 = 20_000_000;
 
-/// The reason why a fluid has no form as `eam/alloy`.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EamError {
-    #[error("psi is not linear in {0} and {1}: eam/alloy has one density only")]
-    TwoDensities(String, String),
-    #[error(
-        "psi of {species} depends on the partial densities of {density}, not on their sum alone: eam/alloy has one \
-         density that does not tell species apart"
-    )]
-    PartialDensities { species: String, density: String },
-    #[error("the correction of {0} is not the identity: eam/alloy has uncorrected densities")]
-    Correction(String),
-    #[error("{0} has bounds, and a table cannot represent how psi continues beyond them: remove the bounds")]
-    Bounds(String),
-    #[error("eam/alloy is tabulated for three dimensions here, the model has two")]
-    Flat,
-    #[error("the force law of this model has no potential")]
-    NotConservative,
-    #[error("psi of {species} is not finite at density {density}: lower the largest density")]
-    Singular { species: String, density: f64 },
-    #[error("the spacing, the largest density and the number of densities must be positive")]
-    Grid,
-    #[error(
-        "the tables would have {0:.3e} numbers, more than the limit of {MOST}: take a larger spacing or fewer densities"
-    )]
-    TooFine(f64),
-    #[error(transparent)]
-    TooLarge(#[from] TooLarge),
-    #[error(transparent)]
-    File(#[from] FormatError),
-}
-
 /// Writes the tables of `fluid`; `mass` holds the masses of its species, which become elements.
 ///
 /// # Errors
-/// `eam/alloy` cannot represent the fluid, or the file cannot be written; see [`EamError`].
-pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(), EamError> {
+/// `eam/alloy` cannot represent the fluid, or the file cannot be written; see [`LammpsError`].
+pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(), LammpsError> {
     if fluid.dimensions != 3 {
-        return Err(EamError::Flat);
+        return Err(LammpsError::Flat);
     }
     if !fluid.is_conservative() {
-        return Err(EamError::NotConservative);
+        return Err(LammpsError::NotConservative);
     }
     if !(grid.spacing > 0.0 && grid.largest_density > 0.0 && grid.densities > 4) {
-        return Err(EamError::Grid);
+        return Err(LammpsError::Grid);
     }
     let plan = Plan::new(fluid)?;
     let pass = match plan.density_passes() {
@@ -85,7 +52,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
         [d] => Some(*d),
         [a, b, ..] => {
             let name = |d: &usize| fluid.densities[*d].name.clone();
-            return Err(EamError::TwoDensities(name(a), name(b)));
+            return Err(LammpsError::TwoDensities(name(a), name(b)));
         }
     };
     if let Some(d) = pass {
@@ -95,7 +62,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     let rows = cutoff / grid.spacing;
     let numbers = species * (grid.densities as f64 + rows) + 0.5 * species * (species + 1.0) * rows;
     if numbers.is_nan() || numbers > f64::from(MOST) {
-        return Err(EamError::TooFine(numbers));
+        return Err(LammpsError::TooFine { numbers, most: MOST });
     }
     let drho = grid.largest_density / (grid.densities - 1) as f64;
     let embedding = |alpha: usize, n: f64| embedding(fluid, alpha, pass, n);
@@ -104,7 +71,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
             let density = k as f64 * drho;
             // The table begins at n = 0, an isolated particle, and a spline needs finite values.
             if !embedding(alpha, density).is_finite() {
-                return Err(EamError::Singular { species: species.clone(), density });
+                return Err(LammpsError::Singular { species: species.clone(), density });
             }
         }
     }
@@ -136,14 +103,14 @@ fn potential_range(fluid: &Fluid) -> f64 {
     densities.chain(pairs).fold(f64::MIN_POSITIVE, f64::max)
 }
 
-fn check_density(fluid: &Fluid, d: usize) -> Result<(), EamError> {
+fn check_density(fluid: &Fluid, d: usize) -> Result<(), LammpsError> {
     let density = &fluid.densities[d];
     let count = fluid.species.len();
     if density.correction.iter().any(|p| *p != psidpd_core::model::Polynomial::identity()) {
-        return Err(EamError::Correction(density.name.clone()));
+        return Err(LammpsError::Correction(density.name.clone()));
     }
     if density.bounds.is_some() {
-        return Err(EamError::Bounds(density.name.clone()));
+        return Err(LammpsError::Bounds(density.name.clone()));
     }
     for (alpha, excess) in fluid.excess.iter().enumerate() {
         // A curve is a function of the summed density by definition.
@@ -151,7 +118,7 @@ fn check_density(fluid: &Fluid, d: usize) -> Result<(), EamError> {
         let slopes =
             (0..count).map(|b| psi.derivative(d * count + b)).collect::<Result<Vec<Formula>, _>>()?;
         if slopes.windows(2).any(|pair| pair[0] != pair[1]) {
-            return Err(EamError::PartialDensities {
+            return Err(LammpsError::PartialDensities {
                 species: fluid.species[alpha].clone(),
                 density: density.name.clone(),
             });

@@ -6,13 +6,13 @@
 
 mod physics;
 
+use crate::LammpsError;
 use physics::Physics;
 use psidpd_core::document::{Document, FileError};
 use psidpd_core::engine::noise::Law;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_dynamics::integrator::{Counterpart, Integrator};
 use psidpd_dynamics::particles::State;
-use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::{Scene, Stage};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
@@ -34,43 +34,6 @@ const MOST_STEPS: u64 = i32::MAX as u64;
 
 /// Largest number of body forces: each may need three of LAMMPS's 32 groups.
 const MOST_BODY_FORCES: usize = 9;
-
-/// The reason why a scene has no deck.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DeckError {
-    #[error(transparent)]
-    Memory(#[from] psidpd_formats::memory::MemoryError),
-    #[error(
-        "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
-         velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage, force-gradient and aboba with \
-         thermostat_step = \"midpoint\""
-    )]
-    Integrator { stage: String, name: &'static str, integrator: Integrator },
-    #[error("the seed must be at least 1 for the pair style, is {0}")]
-    Seed(u64),
-    #[error("stage \"{stage}\": {steps} steps are more than one run of LAMMPS takes, {MOST_STEPS}")]
-    Steps { stage: String, steps: u64 },
-    #[error("reversed_along has no counterpart in a deck for a box with tilt")]
-    Tilt,
-    #[error("{0} body forces need more groups than LAMMPS has: at most {MOST_BODY_FORCES} can be written")]
-    BodyForces(usize),
-    #[error(
-        "{}: cannot remove the thermostat for the stages without one; write it as [[thermostat]] sections",
-        model.display()
-    )]
-    Thermostat { model: PathBuf },
-    #[error("{}: the copy in the deck is not the same fluid: the names of its tables are ambiguous", model.display())]
-    Copy { model: PathBuf },
-    #[error("{}: two tables would both become {} in the deck", model.display(), table.display())]
-    Tables { model: PathBuf, table: PathBuf },
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    #[error("{} cannot be written: {source}", path.display())]
-    Output { path: PathBuf, source: std::io::Error },
-}
 
 /// What a script has beside what its scene says: by default it is the script of the plugin for the whole scene.
 #[derive(Debug, Clone, Copy)]
@@ -94,8 +57,8 @@ impl Default for Script<'_> {
 /// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
 ///
 /// # Errors
-/// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`DeckError`].
-pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
+/// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`LammpsError`].
+pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
     let script = script_of(scene, Script::default())?;
     psidpd_formats::memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
     let mut files = vec![PathBuf::from(SCRIPT)];
@@ -108,30 +71,30 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
-    std::fs::create_dir_all(out).map_err(output(out))?;
+pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
+    std::fs::create_dir_all(out).map_err(LammpsError::io("write", out))?;
     let mut files = vec![PathBuf::from(START), PathBuf::from(MODEL)];
     let (text, tables) = copy_of_model(scene)?;
     for (from, to) in tables {
         let path = out.join(&to);
         if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(output(parent))?;
+            std::fs::create_dir_all(parent).map_err(LammpsError::io("write", parent))?;
         }
         // Copying a file onto itself would empty it.
         if !path.canonicalize().is_ok_and(|there| from.canonicalize().is_ok_and(|here| here == there)) {
-            std::fs::copy(&from, &path).map_err(output(&path))?;
+            std::fs::copy(&from, &path).map_err(LammpsError::io("write", &path))?;
         }
         files.push(to);
     }
     save(&out.join(MODEL), &text)?;
     compare(scene, &out.join(MODEL), true).and_then(|same| {
-        if same { Ok(()) } else { Err(DeckError::Copy { model: scene.model_path.clone() }) }
+        if same { Ok(()) } else { Err(LammpsError::Copy { model: scene.model_path.clone() }) }
     })?;
     if scene.stages.iter().any(|s| !s.thermostat) {
         let path = out.join(MODEL_WITHOUT_THERMOSTAT);
         save(&path, &without_thermostat(&text))?;
         if !compare(scene, &path, false).unwrap_or(false) {
-            return Err(DeckError::Thermostat { model: scene.model_path.clone() });
+            return Err(LammpsError::Thermostat { model: scene.model_path.clone() });
         }
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
@@ -140,25 +103,29 @@ pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<Path
     Ok(files)
 }
 
-fn check(scene: &Scene) -> Result<(), DeckError> {
+fn check(scene: &Scene) -> Result<(), LammpsError> {
     if scene.seed == 0 {
-        return Err(DeckError::Seed(scene.seed));
+        return Err(LammpsError::Seed(scene.seed));
     }
     let reversed = scene.body_forces.iter().any(|b| b.reversed_along.is_some());
     let orthogonal = (0..3).all(|k| (0..3).all(|c| c == k || scene.domain.edge(k)[c] == 0.0));
     if reversed && !orthogonal {
-        return Err(DeckError::Tilt);
+        return Err(LammpsError::Tilt);
     }
     if scene.body_forces.len() > MOST_BODY_FORCES {
-        return Err(DeckError::BodyForces(scene.body_forces.len()));
+        return Err(LammpsError::BodyForces { found: scene.body_forces.len(), most: MOST_BODY_FORCES });
     }
     for stage in &scene.stages {
         if stage.steps > MOST_STEPS {
-            return Err(DeckError::Steps { stage: stage.name.clone(), steps: stage.steps });
+            return Err(LammpsError::Steps {
+                stage: stage.name.clone(),
+                steps: stage.steps,
+                most: MOST_STEPS,
+            });
         }
         let integrator = stage.integrator;
         if integrator.properties().lammps == Counterpart::None {
-            return Err(DeckError::Integrator {
+            return Err(LammpsError::Integrator {
                 stage: stage.name.clone(),
                 name: integrator.name(),
                 integrator,
@@ -169,7 +136,7 @@ fn check(scene: &Scene) -> Result<(), DeckError> {
 }
 
 /// The text of the model with its tables in the same folder, and the source and target of each copied table.
-fn copy_of_model(scene: &Scene) -> Result<(String, Vec<(PathBuf, PathBuf)>), DeckError> {
+fn copy_of_model(scene: &Scene) -> Result<(String, Vec<(PathBuf, PathBuf)>), LammpsError> {
     let source = scene.model.source();
     let mut text = source.text().to_owned();
     let directory = scene.model_path.parent().unwrap_or(Path::new(""));
@@ -191,7 +158,7 @@ fn copy_of_model(scene: &Scene) -> Result<(String, Vec<(PathBuf, PathBuf)>), Dec
         match copies.iter().find(|(_, other)| *other == to) {
             None => copies.push((from, to)),
             Some((other, _)) if *other == from => {}
-            Some(_) => return Err(DeckError::Tables { model: scene.model_path.clone(), table: to }),
+            Some(_) => return Err(LammpsError::Tables { model: scene.model_path.clone(), table: to }),
         }
     }
     Ok((text, copies))
@@ -234,7 +201,7 @@ fn without_thermostat(text: &str) -> String {
 }
 
 /// Whether the model at `path` equals the fluids of the scene, without their thermostat if `thermostat` is false.
-fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckError> {
+fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, LammpsError> {
     let copy = Model::open(path)?;
     let same = |a: &Fluid, b: &Fluid| {
         let thermostats = match thermostat {
@@ -257,7 +224,7 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckErr
 }
 
 /// Writes a state as the initial state of a deck; fails if the file cannot be written.
-fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
+fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), LammpsError> {
     let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
     if scene.model.dimensions() == 2 {
@@ -268,14 +235,14 @@ fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckErro
             (atom.x[2], atom.image[2]) = (0.0, 0);
         }
     }
-    data.write(path).map_err(|e| DeckError::Run(e.into()))
+    data.write(path).map_err(|e| LammpsError::Native(e.into()))
 }
 
 /// A script of the scene.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS.
-pub fn script_of(scene: &Scene, script: Script) -> Result<String, DeckError> {
+pub fn script_of(scene: &Scene, script: Script) -> Result<String, LammpsError> {
     check(scene)?;
     let mut s = String::new();
     // Writing to a String cannot fail.
@@ -390,12 +357,8 @@ fn one_line(text: &str) -> String {
     text.chars().map(plain).collect()
 }
 
-fn save(path: &Path, text: &str) -> Result<(), DeckError> {
-    std::fs::write(path, text).map_err(output(path))
-}
-
-fn output(path: &Path) -> impl FnOnce(std::io::Error) -> DeckError + '_ {
-    move |source| DeckError::Output { path: path.to_owned(), source }
+fn save(path: &Path, text: &str) -> Result<(), LammpsError> {
+    std::fs::write(path, text).map_err(LammpsError::io("write", path))
 }
 
 #[cfg(test)]

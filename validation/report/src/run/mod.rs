@@ -19,15 +19,6 @@ pub use headline::{Headline, HeadlineValue, headline};
 pub use observables::{Observable, ObservableAxis, ObservableColumn};
 pub use series::Table as SeriesTable;
 
-/// The reasons why a folder has no report.
-#[derive(Debug, thiserror::Error)]
-pub enum RunReportError {
-    #[error("{} is not the folder of a run: it has none of the files {files}", folder.display())]
-    NoRun { folder: PathBuf, files: String },
-    #[error(transparent)]
-    Report(#[from] ReportError),
-}
-
 /// The files that a report is made from, with their descriptions.
 const FILES: [(&str, &str); 10] = [
     ("about.json", "description of the run: species, stages, units, columns of thermo.csv"),
@@ -47,10 +38,10 @@ const FILES: [(&str, &str); 10] = [
 /// # Errors
 /// The function fails if the folder has none of the files, and if the page cannot be written. A file with invalid content is
 /// not an error: the page says what is wrong with it.
-pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
+pub fn write_run_report(folder: &Path) -> Result<PathBuf, ReportError> {
     let page = run_report(folder)?.render();
     let path = folder.join("report.html");
-    write_atomically(&path, page.as_bytes()).map_err(ReportError::from)?;
+    write_atomically(&path, page.as_bytes())?;
     Ok(path)
 }
 
@@ -58,10 +49,10 @@ pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
 ///
 /// # Errors
 /// The function fails if the folder has none of the files of a run.
-pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
+pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
     if !FILES.iter().any(|(name, _)| folder.join(name).exists()) {
         let files: Vec<&str> = FILES.iter().map(|f| f.0).collect();
-        return Err(RunReportError::NoRun { folder: folder.to_owned(), files: files.join(", ") });
+        return Err(ReportError::NoRun { folder: folder.to_owned(), files: files.join(", ") });
     }
     let mut notes = Vec::new();
     let about = keep(About::read(folder), &mut notes).flatten();

@@ -149,7 +149,7 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
 #[test]
 fn what_is_not_there_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(write_run_report(folder.path()), Err(RunReportError::NoRun { .. })));
+    assert!(matches!(write_run_report(folder.path()), Err(ReportError::NoRun { .. })));
     assert!(write_run_report(&folder.path().join("none")).is_err());
     std::fs::write(folder.path().join("final.data"), DATA).unwrap();
     let (texts, _) = page(folder.path());

@@ -1,13 +1,14 @@
 //! Section 11.4: two liquids that do not mix, and drops that meet.
 
 use super::IMMISCIBLE;
+use crate::ExperimentError;
 use crate::papers::case::{Outcome, bare, exact, profile};
-use crate::papers::context::{Change, Context, PaperError};
+use crate::papers::context::{Change, Context};
 
 const SMALL: &str = include_str!("../../../../scenes/drop-collision.toml");
 const FULL: &str = include_str!("../../../../scenes/full/drop-collision.toml");
 
-pub fn tension(context: &Context) -> Result<Outcome, PaperError> {
+pub fn tension(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let [edge, height] = context.pick([6.0, 12.0], [10.0, 20.0]);
     let scene = format!(
@@ -28,7 +29,7 @@ pub fn tension(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn merge(context: &Context) -> Result<Outcome, PaperError> {
+pub fn merge(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[])?;
     let series = |column| profile(&observed, "clusters_series", column);
@@ -48,7 +49,7 @@ pub fn merge(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn size(context: &Context) -> Result<Outcome, PaperError> {
+pub fn size(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let box_: toml_edit::Value =
         [60.0, 60.0, 104.1667].into_iter().map(|l| l / 100_f64.cbrt()).collect::<toml_edit::Array>().into();
@@ -64,7 +65,8 @@ pub fn size(context: &Context) -> Result<Outcome, PaperError> {
     let particles = context.pick(3.75e4, 3.75e6);
     // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.
     let status = std::path::PathBuf::from("/proc/self/status");
-    let text = std::fs::read_to_string(&status).map_err(|source| PaperError::Io { path: status, source })?;
+    let text =
+        std::fs::read_to_string(&status).map_err(|source| ExperimentError::Io { path: status, source })?;
     let peak = text
         .lines()
         .find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<f64>().ok());

@@ -1,14 +1,15 @@
 //! Section 11.2: pressure and compressibility of standard DPD.
 
 use super::fluid;
+use crate::ExperimentError;
 use crate::papers::case::{Outcome, line};
-use crate::papers::context::{Context, PaperError};
+use crate::papers::context::Context;
 use psidpd_observe::Measured;
 
 /// a r_c⁴ of the model.
 const A: f64 = 25.0;
 
-pub fn alpha(context: &Context) -> Result<Outcome, PaperError> {
+pub fn alpha(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
     for rho in [4.0, 6.0, 8.0] {
@@ -30,7 +31,7 @@ pub fn alpha(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn water(context: &Context) -> Result<Outcome, PaperError> {
+pub fn water(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let [low, high] = [2.5, 3.5];
     let a = context.bulk("below", &fluid(), &[low])?.pressure();

@@ -1,11 +1,12 @@
 //! Section 11.3: Lowe's thermostat beside drag and noise.
 
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::STANDARD;
 use crate::papers::case::{Outcome, exact};
-use crate::papers::context::{Context, PaperError};
+use crate::papers::context::Context;
 
-fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, PaperError> {
+fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, ExperimentError> {
     let scene = format!(
         "kT = 1.0\nseed = 1\nbox = {:?}\ndensity = 3.0\ndt = {dt:?}\nintegrator = \"{integrator}\"\nequilibrate = {}\nsteps = {}\n\
          [initial]\nkind = \"lattice\"\n[output]\nthermo = 0\n[observe]\nevery = 10\ntemperature = true\npressure = true\n",
@@ -16,7 +17,7 @@ fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, PaperEr
     context.scene(&format!("{integrator}-{dt}"), STANDARD, &scene)
 }
 
-pub fn compare(context: &Context) -> Result<Outcome, PaperError> {
+pub fn compare(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let fine = [run(context, "lowe-andersen", 0.01)?, run(context, "velocity-verlet", 0.01)?];
     outcome.equal("kinetic temperature", fine[0].temperature(), 1.0, 0.0);

@@ -1,9 +1,10 @@
 //! Figures 10 and 11: the binary mixture at half of its critical temperature, from phases apart.
 
 use super::BINARY;
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::papers::case::{Outcome, bare, exact, layers, profile, ratio};
-use crate::papers::context::{Context, PaperError, mean_field};
+use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 
 const SCENE: &str = include_str!("../../../../scenes/full/binary-2d.toml");
@@ -18,7 +19,7 @@ const RHO: f64 = 10.0;
 /// Widths of the box along the interface: that of the scene, and that which the paper's other slabs have.
 const BOXES: [f64; 2] = [10.0, 3.0];
 
-fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, PaperError> {
+fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, ExperimentError> {
     let changes: &[crate::papers::context::Change] = &[
         (&["equilibrate"], 3000.into()),
         (&["steps"], 40_000.into()),
@@ -28,12 +29,12 @@ fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, PaperErro
     context.shared("pagonabarraga-binary").shipped(name, BINARY, scene, changes)
 }
 
-fn mixture(context: &Context) -> Result<Observed, PaperError> {
+fn mixture(context: &Context) -> Result<Observed, ExperimentError> {
     run(context, RUN, &format!("{SCENE}msd = {{ length = {} }}\n", context.pick(300, 2000)))
 }
 
 /// The tension by the stress of the layers, at half of the critical temperature of mean field and above.
-pub fn tensions(context: &Context) -> Result<Vec<(f64, Measured)>, PaperError> {
+pub fn tensions(context: &Context) -> Result<Vec<(f64, Measured)>, ExperimentError> {
     // Of two interfaces.
     let tension = |o: &Observed| o.scalar("stress_profile_integral", "integral").times(0.5);
     let mut all = vec![(KT, tension(&mixture(context)?))];
@@ -104,7 +105,7 @@ fn without_waves([wide, narrow]: [Measured; 2]) -> Measured {
     Measured { value, error: (0.5 * error / value).min(error.sqrt()) }
 }
 
-pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = mixture(context)?;
     outcome.equal("kinetic temperature", observed.temperature(), KT, 0.05);
@@ -133,7 +134,7 @@ pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig11(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig11(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = mixture(context)?;
     let layers = composition(&observed);

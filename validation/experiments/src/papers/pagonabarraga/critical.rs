@@ -1,8 +1,9 @@
 //! Figures 1 and 2: the van der Waals fluid in mean field.
 
+use crate::ExperimentError;
 use crate::models::VAN_DER_WAALS;
 use crate::papers::case::{Outcome, exact, line};
-use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
+use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_core::model::Model;
 use psidpd_core::theory::critical_point_of_model;
 
@@ -17,7 +18,7 @@ fn critical(alpha: f64) -> [f64; 2] {
     [x, x * (2.0 + 3.0 * alpha * x) * (1.0 - x).powi(2)]
 }
 
-pub fn fig1(_: &Context) -> Result<Outcome, PaperError> {
+pub fn fig1(_: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let (b, a) = (0.016, 1.9 * 0.016);
     let mut hot = Vec::new();
@@ -29,7 +30,7 @@ pub fn fig1(_: &Context) -> Result<Outcome, PaperError> {
         let found = critical_point_of_model(&Model::parse("model.toml", &text)?, [0.2 * kt, 3.0 * kt])?;
         outcome.equal(format!("kT_c b/a, alpha_3 = {alpha}"), exact(found.parameter * b / a), t, 1e-6 * t);
         outcome.equal(format!("b rho_c, alpha_3 = {alpha}"), exact(found.density * b), x, 1e-4 * x);
-        let inverse = |share: f64, rho: f64| -> Result<f64, PaperError> {
+        let inverse = |share: f64, rho: f64| -> Result<f64, ExperimentError> {
             Ok(rho * mean_field(&text, share * kt)?.pressure_slope(&[rho]))
         };
         let cold = 1.0 / inverse(0.8, rho)?;
@@ -45,7 +46,11 @@ pub fn fig1(_: &Context) -> Result<Outcome, PaperError> {
 }
 
 /// Where a quantity that rises with temperature changes its sign, by bisection.
-fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, PaperError>) -> Result<f64, PaperError> {
+fn root(
+    mut low: f64,
+    mut high: f64,
+    f: impl Fn(f64) -> Result<f64, ExperimentError>,
+) -> Result<f64, ExperimentError> {
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
         if f(middle)? > 0.0 { high = middle } else { low = middle }
@@ -53,7 +58,7 @@ fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, PaperError>)
     Ok(0.5 * (low + high))
 }
 
-pub fn fig2(_: &Context) -> Result<Outcome, PaperError> {
+pub fn fig2(_: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let (b, a) = (0.016, 1.9 * 0.016);
     let mut lines = Vec::new();

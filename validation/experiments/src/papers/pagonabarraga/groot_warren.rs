@@ -1,10 +1,11 @@
 //! Figures 3 to 5: the Groot–Warren fluid by ψ, with two kernels.
 
 use super::QUADRATIC;
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{LINEAR, STANDARD};
 use crate::papers::case::{Outcome, bare, difference, line, profile};
-use crate::papers::context::{Context, Fluid, PaperError, with_parameters};
+use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
 /// The box has edge 6 in the paper.
@@ -14,12 +15,12 @@ pub fn groot_warren(
     model: &str,
     rho: f64,
     observe: &str,
-) -> Result<Observed, PaperError> {
+) -> Result<Observed, ExperimentError> {
     let fluid = Fluid { model, kt: 1.0, dt: 0.01, edge: 6.0, observe };
     context.bulk(&format!("{name}-{rho}"), &fluid, &[rho])
 }
 
-pub fn fig3(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     // ψ = α a n with the quadratic kernel is the pair force of strength a′ = 30 α a/π, 3.5 % less than a.
     let a = 25.0 * 0.101 * 30.0 / std::f64::consts::PI;
@@ -63,7 +64,7 @@ fn structure(observed: &Observed) -> (Measured, Vec<(f64, f64)>) {
     (Measured { value: sum, error: variance.sqrt() }, bare(&g))
 }
 
-fn compared(context: &Context, rho: f64) -> Result<(Outcome, Measured), PaperError> {
+fn compared(context: &Context, rho: f64) -> Result<(Outcome, Measured), ExperimentError> {
     let mut outcome = Outcome::default();
     let rdf = "rdf = { range = 1.5, bins = 75 }";
     let (linear, g) = structure(&groot_warren(context, "linear", LINEAR, rho, rdf)?);
@@ -75,13 +76,13 @@ fn compared(context: &Context, rho: f64) -> Result<(Outcome, Measured), PaperErr
 
 const WHAT: &str = "integral of (g - 1)^2, linear minus quadratic";
 
-pub fn fig4(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
     let (mut outcome, difference) = compared(context, 3.0)?;
     outcome.at_most(WHAT, difference, 0.0);
     Ok(outcome)
 }
 
-pub fn fig5(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
     let (mut outcome, difference) = compared(context, 14.0)?;
     outcome.at_least(WHAT, difference, 0.0);
     Ok(outcome)

@@ -1,9 +1,10 @@
 //! Figures 7 to 9: a slab of liquid beside its gas, in two dimensions.
 
 use super::SLAB;
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::papers::case::{Outcome, bare, difference, exact, profile, ratio};
-use crate::papers::context::{Context, PaperError, mean_field};
+use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 
 const SCENE: &str = include_str!("../../../../scenes/full/van-der-waals-2d-slab.toml");
@@ -12,7 +13,7 @@ const RUN: &str = "slab";
 /// kT of the figures.
 const KT: f64 = 0.75;
 
-fn slab(context: &Context) -> Result<(Context, Observed), PaperError> {
+fn slab(context: &Context) -> Result<(Context, Observed), ExperimentError> {
     let context = context.shared("pagonabarraga-slab");
     let changes: &[crate::papers::context::Change] = &[
         (&["equilibrate"], 2000.into()),
@@ -25,7 +26,7 @@ fn slab(context: &Context) -> Result<(Context, Observed), PaperError> {
     Ok((context, observed))
 }
 
-pub fn fig7(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig7(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let (context, observed) = slab(context)?;
     // "Does not shift, and corresponds to its nominally assigned value": the last digit of that.
@@ -46,7 +47,7 @@ pub fn fig7(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let (_, observed) = slab(context)?;
     let shape = |column| observed.scalar("interface_width", column);
@@ -79,7 +80,7 @@ pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig9(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig9(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let (_, observed) = slab(context)?;
     let free_energy = observed.scalar("surface_tension", "free_energy");

@@ -2,13 +2,14 @@
 
 use super::QUADRATIC;
 use super::groot_warren::groot_warren;
+use crate::ExperimentError;
 use crate::models::LINEAR;
 use crate::papers::case::{Outcome, bare, difference, exact, profile};
-use crate::papers::context::{Context, PaperError, mean_field};
+use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 use std::f64::consts::PI;
 
-pub fn minimum(context: &Context) -> Result<Outcome, PaperError> {
+pub fn minimum(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut lines = Vec::new();
     for (kernel, model) in [("quadratic", QUADRATIC), ("linear", LINEAR)] {

@@ -1,16 +1,17 @@
 //! Figure 12: the tension of the binary mixture, in mean field and measured.
 
 use super::{BINARY, binary};
+use crate::ExperimentError;
 use crate::papers::case::{Outcome, exact};
-use crate::papers::context::{Context, PaperError, mean_field};
+use crate::papers::context::{Context, mean_field};
 use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 
-pub fn fig12(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig12(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     // kT_c = rho (lambda - lambda_A) = 10 · 0.8.
     let model = Model::parse("model.toml", BINARY)?;
-    let tension = |kt: f64| -> Result<f64, PaperError> {
+    let tension = |kt: f64| -> Result<f64, ExperimentError> {
         Ok(mean_field(BINARY, kt)?.composition_interface(10.0, 400)?.tension)
     };
     let critical =

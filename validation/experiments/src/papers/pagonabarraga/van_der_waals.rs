@@ -1,10 +1,11 @@
 //! Figure 6: the homogeneous van der Waals fluid.
 
+use crate::ExperimentError;
 use crate::models::VAN_DER_WAALS;
 use crate::papers::case::{Outcome, line};
-use crate::papers::context::{Context, Fluid, PaperError};
+use crate::papers::context::{Context, Fluid};
 
-pub fn fig6(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     // The equation of state with the printed parameters: a = 1.9 b, alpha_3 = 5.
     let (kt, b) = (2.5, 0.016);

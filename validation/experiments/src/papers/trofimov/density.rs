@@ -1,12 +1,13 @@
 //! Figures 4, 5 and 8: the mean local density.
 
 use super::{FIT_DENSITIES, K2, K3, K4, fluid, point};
+use crate::ExperimentError;
 use crate::calibrate::{Fit, Point, fit_density};
 use crate::papers::case::{Outcome, difference, line, ratio};
-use crate::papers::context::{Context, Fluid, PaperError, with_parameters};
+use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
-pub fn fig4(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     for (k, model) in [(3, K3), (4, K4)] {
         for rho in [4.0, 8.0] {
@@ -43,7 +44,7 @@ pub fn compare_line(outcome: &mut Outcome, points: &[Point], offset: f64, slope:
     );
 }
 
-pub fn fig5(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
     for rho in FIT_DENSITIES {
@@ -54,7 +55,7 @@ pub fn fig5(context: &Context) -> Result<Outcome, PaperError> {
 }
 
 /// ⟨n⟩ of standard DPD, `p = ρkT + Aρ²`.
-pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let strengths = [(0.0, "A = 0"), (5.0, "A = 5"), (20.0, "A = 20"), (100.0, "A = 100")];
     let mut curves: Vec<(&str, Vec<(f64, Measured)>)> = Vec::new();

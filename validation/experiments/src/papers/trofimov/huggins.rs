@@ -1,14 +1,15 @@
 //! Section V: two compressible Huggins fluids, mixing (Table III) and demixing (Figures 9 and 10).
 
 use super::{DEMIXING, fluid};
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::calibrate::Point;
 use crate::models::HUGGINS;
 use crate::papers::case::{Outcome, bare, exact, layers, profile};
-use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
+use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_observe::Measured;
 
-pub fn table3(context: &Context) -> Result<Outcome, PaperError> {
+pub fn table3(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = context.bulk("e1.6", &fluid(HUGGINS), &[8.0, 8.0])?;
     // One digit after the point is printed, and no error.
@@ -39,7 +40,7 @@ pub fn table3(context: &Context) -> Result<Outcome, PaperError> {
 const SCENE: &str = include_str!("../../../../scenes/full/huggins-demixing.toml");
 
 /// Two layers across z, which are there from the start in small runs.
-fn demixed(context: &Context, strength: f64) -> Result<Observed, PaperError> {
+fn demixed(context: &Context, strength: f64) -> Result<Observed, ExperimentError> {
     let context = context.shared("trofimov-demixing");
     let model = with_parameters(DEMIXING, &[("e_AA", strength)])?;
     let scene = context.pick(
@@ -60,12 +61,12 @@ fn phases(observed: &Observed) -> [Measured; 2] {
 }
 
 /// Compositions of coexisting phases in mean field at the density of the mixture, as the paper has its critical point.
-fn binodal(strength: f64) -> Result<[f64; 2], PaperError> {
+fn binodal(strength: f64) -> Result<[f64; 2], ExperimentError> {
     let theory = mean_field(&with_parameters(DEMIXING, &[("e_AA", strength)])?, 1.0)?;
     Ok(theory.composition_binodal(16.0)?.composition)
 }
 
-pub fn fig9(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig9(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = demixed(context, 1.9)?;
     let density = profile(&observed, "density_profile", "density");
@@ -89,7 +90,7 @@ pub fn fig9(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let strengths = context.pick(&[1.9, 2.1, 2.3][..], &[1.8, 1.9, 2.0, 2.1, 2.2, 2.3][..]);
     let mut points = Vec::new();

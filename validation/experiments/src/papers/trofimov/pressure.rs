@@ -2,9 +2,10 @@
 
 use super::density::compare_line;
 use super::{FIT_DENSITIES, K2, K3, K3_CORRECTED, K4, LENNARD_JONES, fluid, point};
+use crate::ExperimentError;
 use crate::calibrate::DUMMY_SLOPE;
 use crate::papers::case::{Outcome, line};
-use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
+use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_observe::Measured;
 
 /// p/p_theory at several densities, with the plot of both.
@@ -13,7 +14,7 @@ fn pressures(
     outcome: &mut Outcome,
     model: &str,
     densities: &[f64],
-) -> Result<Vec<(f64, Measured)>, PaperError> {
+) -> Result<Vec<(f64, Measured)>, ExperimentError> {
     let theory = mean_field(model, 1.0)?;
     let mut points = Vec::new();
     let mut shares = Vec::new();
@@ -34,7 +35,7 @@ fn pressures(
     Ok(shares)
 }
 
-fn too_low(context: &Context, model: &str, share: f64) -> Result<Outcome, PaperError> {
+fn too_low(context: &Context, model: &str, share: f64) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     for (rho, p) in pressures(context, &mut outcome, model, &[3.0, 6.0, 10.0])? {
         let missing = Measured { value: 1.0 - p.value, error: p.error };
@@ -43,15 +44,15 @@ fn too_low(context: &Context, model: &str, share: f64) -> Result<Outcome, PaperE
     Ok(outcome)
 }
 
-pub fn fig2(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig2(context: &Context) -> Result<Outcome, ExperimentError> {
     too_low(context, K3, 0.20)
 }
 
-pub fn fig3(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
     too_low(context, K4, 0.40)
 }
 
-fn agrees(context: &Context, outcome: &mut Outcome, model: &str) -> Result<(), PaperError> {
+fn agrees(context: &Context, outcome: &mut Outcome, model: &str) -> Result<(), ExperimentError> {
     for (rho, p) in pressures(context, outcome, model, &[4.0, 6.0, 8.0, 10.0])? {
         // The paper states an error of 1 % of the pressure.
         outcome.equal(format!("pressure over the wanted one at density {rho}"), p, 1.0, 0.01);
@@ -59,13 +60,13 @@ fn agrees(context: &Context, outcome: &mut Outcome, model: &str) -> Result<(), P
     Ok(())
 }
 
-pub fn fig6(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     agrees(context, &mut outcome, K3_CORRECTED)?;
     Ok(outcome)
 }
 
-pub fn fig7(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig7(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     // The first guess rho~ = rho: at each density the power law k = 2 of the strength 1.05 psi'(rho).
     let theory = mean_field(LENNARD_JONES, 1.0)?;

@@ -1,12 +1,13 @@
 //! Figure 1: what the quadratic equation of state cannot have.
 
 use super::{K2, K4};
+use crate::ExperimentError;
 use crate::papers::case::{Outcome, exact};
-use crate::papers::context::{Context, PaperError, mean_field};
+use crate::papers::context::{Context, mean_field};
 
-pub fn fig1(_: &Context) -> Result<Outcome, PaperError> {
+pub fn fig1(_: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
-    let ratio = |model: &str, rho: f64| -> Result<f64, PaperError> {
+    let ratio = |model: &str, rho: f64| -> Result<f64, ExperimentError> {
         let theory = mean_field(model, 1.0)?;
         Ok(rho * theory.pressure_slope(&[rho]) / theory.pressure(&[rho]))
     };

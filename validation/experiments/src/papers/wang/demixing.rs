@@ -1,9 +1,10 @@
 //! Figures 3 and 4, and which potential has a thermodynamic limit.
 
 use super::{STRONG, WEAK};
+use crate::ExperimentError;
 use crate::models::SPLINE;
 use crate::papers::case::{Outcome, bare, exact, profile};
-use crate::papers::context::{Change, Context, PaperError};
+use crate::papers::context::{Change, Context};
 use psidpd_core::model::Model;
 use psidpd_core::theory::thermodynamic_limit;
 
@@ -16,7 +17,7 @@ fn gathered(
     context: &Context,
     model: &str,
     scene: &str,
-) -> Result<(Outcome, psidpd_observe::Measured), PaperError> {
+) -> Result<(Outcome, psidpd_observe::Measured), ExperimentError> {
     let changes: &[Change] = &[
         (&["box"], 10.0.into()),
         (&["steps"], 2500.into()),
@@ -36,19 +37,19 @@ fn gathered(
 /// half of N.
 const APART: f64 = 0.05;
 
-pub fn fig3(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
     let (mut outcome, first) = gathered(context, WEAK, WEAK_SCENE)?;
     outcome.at_most("S/N at the longest wave, B = 0.8", first, APART);
     Ok(outcome)
 }
 
-pub fn fig4(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
     let (mut outcome, first) = gathered(context, STRONG, STRONG_SCENE)?;
     outcome.at_least("S/N at the longest wave, B = 1.0", first, APART);
     Ok(outcome)
 }
 
-pub fn limit(_: &Context) -> Result<Outcome, PaperError> {
+pub fn limit(_: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     for (first, stable) in [(17.0, 0.0), (19.0, 1.0)] {
         // a A = 9.5 · A.

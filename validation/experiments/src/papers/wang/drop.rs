@@ -1,9 +1,10 @@
 //! Figures 6 to 11: drops in their vapour. (5 is a picture of one; 7 and 9 are taken from other papers.)
 
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::SPLINE;
 use crate::papers::case::{Outcome, bare, profile, ratio};
-use crate::papers::context::{Change, Context, PaperError};
+use crate::papers::context::{Change, Context};
 use psidpd_observe::Measured;
 
 const SCENES: [(usize, &str); 7] = [
@@ -21,7 +22,7 @@ const LAPLACE: [f64; 2] = [3.245, 0.0005];
 /// The density of the liquid, "about 12.5".
 const LIQUID: [f64; 2] = [12.5, 0.05];
 
-fn drop(context: &Context, which: usize) -> Result<Observed, PaperError> {
+fn drop(context: &Context, which: usize) -> Result<Observed, ExperimentError> {
     let context = context.shared("wang-drop");
     let (count, scene) = SCENES[which];
     // Smaller drops come to rest sooner, and need more samples for the same error.
@@ -35,7 +36,7 @@ fn drop(context: &Context, which: usize) -> Result<Observed, PaperError> {
     context.shipped(&format!("drop-{count}"), SPLINE, scene, changes)
 }
 
-pub fn fig6(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = drop(context, 3)?;
     let [liquid, vapour, tension] =
@@ -68,7 +69,7 @@ fn mean(observed: &Observed, from: f64, to: f64, f: impl Fn(f64, f64) -> f64) ->
     Measured { value: sum / weight, error: variance.sqrt() / weight }
 }
 
-pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = drop(context, 3)?;
     let radius = observed.scalar("drop", "radius").value;
@@ -96,7 +97,7 @@ pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = drop(context, 3)?;
     let (inside, outside) = (observed.scalar("drop", "inside"), observed.scalar("drop", "outside"));
@@ -123,7 +124,7 @@ pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig11(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig11(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let which: &[usize] = context.pick(&[0, 3], &[0, 1, 2, 3, 4, 5, 6]);
     let mut points = Vec::new();

@@ -1,14 +1,15 @@
 //! Figure 2: the equation of state.
 
 use super::EOS;
+use crate::ExperimentError;
 use crate::papers::case::{Outcome, line};
-use crate::papers::context::{Context, Fluid, PaperError};
+use crate::papers::context::{Context, Fluid};
 use psidpd_observe::Measured;
 
 /// How far the fluid of half the potential is from the fit at most; that of the potential as printed is 12 to 28 %.
 const NEAR: f64 = 0.025;
 
-pub fn fig2(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig2(context: &Context) -> Result<Outcome, ExperimentError> {
     let fluid = Fluid { model: EOS, kt: 1.0, dt: 0.01, edge: 8.0, observe: "" };
     let published = |rho: f64| rho / (1.0 - 0.0134 * rho) - 0.0333 * rho * rho;
     let mut outcome = Outcome::default();

@@ -1,9 +1,10 @@
 //! Table 2, Figures 3 to 5: the interface between liquid and vapour.
 
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
 use crate::papers::case::{Outcome, bare, difference, profile};
-use crate::papers::context::{Context, Fluid, PaperError};
+use crate::papers::context::{Context, Fluid};
 use psidpd_observe::Measured;
 
 /// Bins of the density profile.
@@ -20,7 +21,12 @@ const SETS: [Set; 2] = [
 ];
 
 /// The slab of a set at a temperature.
-fn of_set(context: &Context, set: &str, model: &str, (kt, rho): (f64, f64)) -> Result<Observed, PaperError> {
+fn of_set(
+    context: &Context,
+    set: &str,
+    model: &str,
+    (kt, rho): (f64, f64),
+) -> Result<Observed, ExperimentError> {
     slab(context, &format!("{}-kT{kt}", set.replace(' ', "")), model, kt, rho)
 }
 
@@ -44,7 +50,7 @@ fn width_by_bins(observed: &Observed) -> Measured {
 }
 
 /// A slab between two surfaces; figures and the table share the runs.
-fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result<Observed, PaperError> {
+fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-slab");
     let [edge, height] = context.pick([7.0, 18.0], [10.0, 30.0]);
     let scene = format!(
@@ -60,7 +66,7 @@ fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result
     context.scene(name, model, &scene)
 }
 
-pub fn table2(context: &Context) -> Result<Outcome, PaperError> {
+pub fn table2(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let printed = [
         ("set 5", SET5, [5.08, 0.01], [0.78, 0.05], [4.95, 0.03], [49.0, 2.0]),
@@ -89,7 +95,7 @@ pub fn table2(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig3(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut plotted = Vec::new();
     for (set, model, states) in SETS {
@@ -116,7 +122,7 @@ pub fn fig3(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig4(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     for (set, model, states) in SETS {
         let mut lines = Vec::new();
@@ -148,7 +154,7 @@ pub fn fig4(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn fig5(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut plotted = Vec::new();
     for (set, model, states) in SETS {

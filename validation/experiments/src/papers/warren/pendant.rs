@@ -1,9 +1,10 @@
 //! Figure 6 and Table 3: drops that hang from a support.
 
+use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
 use crate::papers::case::{Outcome, bare, profile};
-use crate::papers::context::{Change, Context, PaperError};
+use crate::papers::context::{Change, Context};
 
 /// Name, model, scene, tension from the shape with its error, and from the planar interface.
 type Drop = (&'static str, &'static str, &'static str, [f64; 2], [f64; 2]);
@@ -15,14 +16,14 @@ const DROPS: [Drop; 4] = [
     ("6g", SET6, include_str!("../../../../scenes/full/pendant-drop-6g.toml"), [6.6, 0.5], [7.45, 0.04]),
 ];
 
-fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, PaperError> {
+fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-pendant");
     // As the paper has them, at the small size too: twenty seconds each. With a longer step the drop of set 5 falls.
     let changes: &[Change] = &[(&["output", "dump"], 0.into())];
     context.shipped(name, model, scene, changes)
 }
 
-pub fn fig6(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let observed = hang(context, DROPS[2])?;
     // The curve of the figure goes through its circles, whose size is about this.
@@ -42,7 +43,7 @@ pub fn fig6(context: &Context) -> Result<Outcome, PaperError> {
     Ok(outcome)
 }
 
-pub fn table3(context: &Context) -> Result<Outcome, PaperError> {
+pub fn table3(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     for drop in DROPS {
         let (name, _, _, shape, planar) = drop;

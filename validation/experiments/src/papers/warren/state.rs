@@ -1,12 +1,13 @@
 //! Table 1, Figures 1 and 2: the equation of state.
 
 use super::ALPHA;
+use crate::ExperimentError;
 use crate::models::{SET5, SET6, STANDARD};
 use crate::papers::case::{Outcome, line};
-use crate::papers::context::{Context, Fluid, PaperError, with_parameters};
+use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
-pub fn table1(context: &Context) -> Result<Outcome, PaperError> {
+pub fn table1(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
     let printed: [(f64, f64, f64); 5] =
@@ -64,7 +65,7 @@ pub fn table1(context: &Context) -> Result<Outcome, PaperError> {
 /// c as the paper finds it: Groot and Warren's integrator with λ = ½ and a step of 0.05, A from 0 to 50, B r_d⁴ from 1 to 10, and
 /// only runs whose kinetic temperature is within 10 % of kT. Its noise is not printed: σ = 3. How many runs are
 /// kept comes along, and of how many.
-fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), PaperError> {
+fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), ExperimentError> {
     let (mut kept, mut all) = (Vec::new(), 0);
     for a in [0.0, 25.0, 50.0] {
         for many in [1.0, 2.5, 5.0, 10.0] {
@@ -81,7 +82,7 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), P
                 all += 1;
                 let observed =
                     match context.scene(&format!("protocol-rd{rd}-A{a}-B{many}-{rho}"), &model, &scene) {
-                        Err(PaperError::Run(why)) if why.is_stop() => continue,
+                        Err(ExperimentError::Run(why)) if why.is_stop() => continue,
                         other => other?,
                     };
                 if (observed.temperature().value - 1.0).abs() < 0.1 {
@@ -104,7 +105,7 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), P
     Ok((Measured { value: c, error: (scatter * (n - 1.0) / n).sqrt() }, kept.len(), all))
 }
 
-pub fn fig1(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig1(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
     for a in [10.0, 25.0, 50.0] {
@@ -175,7 +176,7 @@ fn eq18(a: f64, b: f64, rho: f64) -> Measured {
     Measured { value, error }
 }
 
-pub fn fig2(context: &Context) -> Result<Outcome, PaperError> {
+pub fn fig2(context: &Context) -> Result<Outcome, ExperimentError> {
     let mut outcome = Outcome::default();
     for (set, model, b, densities) in
         [("set 5", SET5, 40.0, [5.5, 6.5, 7.5]), ("set 6", SET6, 25.0, [6.5, 7.0, 7.5])]
