@@ -30,19 +30,6 @@ impl MeanField {
         self.kernels.iter().map(|w| [w.moment(2), w.moment(4)]).collect()
     }
 
-    /// The length on which local structure develops where gradients are favoured,
-    /// `l₀ = 2π √([r⁴w] / (2(d+2)[r²w]))`, for each density: the minimum of `ŵ(k)` cut after `k⁴`.
-    ///
-    /// Pagonabarraga–Frenkel eq. (31), which has 12 in place of `2(d+2)`, 8 in two and 10 in three
-    /// dimensions; they claim the order of magnitude only.
-    pub fn characteristic_lengths(&self) -> Vec<f64> {
-        let factor = 2.0 * (self.dimensions as f64 + 2.0);
-        self.kernel_moments()
-            .iter()
-            .map(|[second, fourth]| 2.0 * PI * (fourth / (factor * second)).sqrt())
-            .collect()
-    }
-
     /// The matrix `κ_st` of `F = ∫ f + ½ Σ_st κ_st ∇ρ_s·∇ρ_t`, row-major:
     ///
     /// ```text

@@ -133,32 +133,19 @@ impl ProfileAccumulator {
     /// no densities.
     #[must_use]
     pub fn liquid_density(&self, half_width: f64) -> Vec<f64> {
-        if half_width > 0.0 { self.densities(0.0, half_width) } else { Vec::new() }
-    }
-
-    /// The number density (r_c⁻³) of each frame farther than `distance` (r_c) from the centre of the slab,
-    /// N(|z| > distance) / (A (L − 2 distance)).
-    ///
-    /// A bin that the limit cuts counts in proportion. A negative `distance` counts as 0; NaN, and a distance beyond the box,
-    /// give no densities.
-    #[must_use]
-    pub fn vapour_density(&self, distance: f64) -> Vec<f64> {
-        if distance < 0.5 * self.length { self.densities(distance, 0.5 * self.length) } else { Vec::new() }
-    }
-
-    /// The density of each frame at inner < |z| < outer.
-    fn densities(&self, inner: f64, outer: f64) -> Vec<f64> {
-        let (inner, outer) = (inner.max(0.0), outer.min(0.5 * self.length));
+        if half_width.is_nan() || half_width <= 0.0 {
+            return Vec::new();
+        }
+        let limit = half_width.min(0.5 * self.length);
         let height = self.length / self.bins as f64;
         let weights: Vec<f64> = (0..self.bins)
             .map(|bin| {
                 let low = bin as f64 * height - 0.5 * self.length;
                 let high = low + height;
-                let overlap = |a: f64, b: f64| (high.min(b) - low.max(a)).max(0.0);
-                (overlap(inner, outer) + overlap(-outer, -inner)) / height
+                (high.min(limit) - low.max(-limit)).max(0.0) / height
             })
             .collect();
-        // The sum of the weights has the same rounding as the counts; outer − inner does not.
+        // The sum of the weights has the same rounding as the counts; the limits do not.
         let volume = self.area * height * weights.iter().sum::<f64>();
         self.frames
             .iter()
@@ -369,15 +356,13 @@ mod tests {
         accumulator
     }
 
-    /// Each density is within five of its own errors, a false alarm in 10⁶.
+    /// The density is within five of its own errors, a false alarm in 10⁶.
     #[test]
     fn drift_does_not_smear() {
         let accumulator = drifting(200);
         let liquid = estimate(&accumulator.liquid_density(2.5)).unwrap();
-        let vapour = estimate(&accumulator.vapour_density(6.3)).unwrap();
         assert!((liquid.mean - 6.0).abs() < 5.0 * liquid.error, "{liquid:?}");
-        assert!((vapour.mean - 0.5).abs() < 5.0 * vapour.error, "{vapour:?}");
-        assert!(liquid.error < 0.03 && vapour.error < 0.01);
+        assert!(liquid.error < 0.03);
         let profile = accumulator.finish().unwrap();
         let mean = profile.density.iter().sum::<f64>() / 100.0;
         let particles = accumulator.liquid_density(LENGTH);
@@ -467,10 +452,7 @@ mod tests {
         accumulator.add(&[1e300, -1e300, 0.3, 0.4]).unwrap();
         assert!(accumulator.liquid_density(0.0).is_empty());
         assert!(accumulator.liquid_density(f64::NAN).is_empty());
-        assert!(accumulator.vapour_density(2.0).is_empty());
-        assert!(accumulator.vapour_density(f64::NAN).is_empty());
         assert_eq!(accumulator.liquid_density(9.0), vec![1.0]);
-        assert_eq!(accumulator.vapour_density(-1.0), vec![1.0]);
     }
 
     proptest::proptest! {
@@ -493,7 +475,7 @@ mod tests {
                     let _ = accumulator.add(&z);
                 }
                 let _ = accumulator.finish().map(|p| interface_width(&p));
-                let _ = (accumulator.liquid_density(cut), accumulator.vapour_density(cut));
+                let _ = accumulator.liquid_density(cut);
             }
         }
     }

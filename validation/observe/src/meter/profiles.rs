@@ -9,6 +9,7 @@ use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
 
 const KEYS: &[crate::keys::Key] = &[AXIS, BINS, RECENTRE];
 
@@ -87,11 +88,46 @@ impl Bins {
     }
 }
 
-/// Number densities along an axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DensityProfile(Bins);
+/// A quantity by the sums in bins.
+pub trait Quantity: Sized {
+    const TABLE: Table;
+    /// Whether the sums have the moments of velocities.
+    const MOMENTS: bool;
+    const OF_MOTION: bool = false;
 
-impl Meter for DensityProfile {
+    fn columns(profile: &Profile<Self>) -> Observation;
+}
+
+/// The profile of a quantity along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Profile<Q>(Bins, PhantomData<Q>);
+
+impl<Q: Quantity> Meter for Profile<Q> {
+    const TABLE: Table = Q::TABLE;
+    const OF_MOTION: bool = Q::OF_MOTION;
+
+    fn read(options: &Options) -> Result<Profile<Q>, FileError> {
+        Ok(Profile(Bins::read(options, Q::MOMENTS)?, PhantomData))
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        vec![Q::columns(self)]
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Density;
+
+impl Quantity for Density {
     const TABLE: Table = Table {
         path: "density_profile",
         title: "density along an axis",
@@ -101,20 +137,10 @@ impl Meter for DensityProfile {
         keys: KEYS,
     };
 
-    fn read(options: &Options) -> Result<DensityProfile, FileError> {
-        Ok(DensityProfile(Bins::read(options, false)?))
-    }
+    const MOMENTS: bool = false;
 
-    fn sample(&mut self, frame: &Frame) -> bool {
-        self.0.sample(frame)
-    }
-
-    fn forget(&mut self) {
-        self.0.series.clear();
-    }
-
-    fn finish(&self) -> Vec<Observation> {
-        let (bins, volume) = (&self.0, self.0.across.bin_volume());
+    fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
+        let volume = bins.across.bin_volume();
         let total = bins.linear(|n| n.iter().sum::<f64>() / volume);
         let mut out =
             bins.observation("density_profile", "Density profile").column("density", "1/volume", total);
@@ -123,15 +149,14 @@ impl Meter for DensityProfile {
                 out = out.column(&format!("density_{name}"), "1/volume", bins.linear(|n| n[s] / volume));
             }
         }
-        vec![out]
+        out
     }
 }
 
-/// Number fractions along an axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CompositionProfile(Bins);
+#[derive(Debug, Clone, PartialEq)]
+pub struct Composition;
 
-impl Meter for CompositionProfile {
+impl Quantity for Composition {
     const TABLE: Table = Table {
         path: "composition_profile",
         title: "composition along an axis",
@@ -141,34 +166,22 @@ impl Meter for CompositionProfile {
         keys: KEYS,
     };
 
-    fn read(options: &Options) -> Result<CompositionProfile, FileError> {
-        Ok(CompositionProfile(Bins::read(options, false)?))
-    }
+    const MOMENTS: bool = false;
 
-    fn sample(&mut self, frame: &Frame) -> bool {
-        self.0.sample(frame)
-    }
-
-    fn forget(&mut self) {
-        self.0.series.clear();
-    }
-
-    fn finish(&self) -> Vec<Observation> {
-        let bins = &self.0;
+    fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
         let mut out = bins.observation("composition_profile", "Composition profile");
         for (s, name) in bins.species.iter().enumerate() {
             let fraction = bins.ratio(|n| n[s], |n| n.iter().sum());
             out = out.column(&format!("fraction_{name}"), "1", fraction);
         }
-        vec![out]
+        out
     }
 }
 
-/// The kinetic temperature along an axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TemperatureProfile(Bins);
+#[derive(Debug, Clone, PartialEq)]
+pub struct Temperature;
 
-impl Meter for TemperatureProfile {
+impl Quantity for Temperature {
     const TABLE: Table = Table {
         path: "temperature_profile",
         title: "temperature along an axis",
@@ -179,20 +192,9 @@ impl Meter for TemperatureProfile {
         keys: KEYS,
     };
 
-    fn read(options: &Options) -> Result<TemperatureProfile, FileError> {
-        Ok(TemperatureProfile(Bins::read(options, true)?))
-    }
+    const MOMENTS: bool = true;
 
-    fn sample(&mut self, frame: &Frame) -> bool {
-        self.0.sample(frame)
-    }
-
-    fn forget(&mut self) {
-        self.0.series.clear();
-    }
-
-    fn finish(&self) -> Vec<Observation> {
-        let bins = &self.0;
+    fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
         let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
         let temperature = bins.series.jackknife_many(|means| {
             let of = |at: &[f64]| {
@@ -201,19 +203,15 @@ impl Meter for TemperatureProfile {
             };
             Some(means.chunks_exact(width).map(of).collect())
         });
-        vec![bins.observation("temperature_profile", "Temperature profile").column(
-            "temperature",
-            "energy",
-            temperature,
-        )]
+        let out = bins.observation("temperature_profile", "Temperature profile");
+        out.column("temperature", "energy", temperature)
     }
 }
 
-/// The velocity along an axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct VelocityProfile(Bins);
+#[derive(Debug, Clone, PartialEq)]
+pub struct Velocity;
 
-impl Meter for VelocityProfile {
+impl Quantity for Velocity {
     const TABLE: Table = Table {
         path: "velocity_profile",
         title: "flow velocity along an axis",
@@ -225,26 +223,15 @@ impl Meter for VelocityProfile {
 
     const OF_MOTION: bool = true;
 
-    fn read(options: &Options) -> Result<VelocityProfile, FileError> {
-        Ok(VelocityProfile(Bins::read(options, true)?))
-    }
+    const MOMENTS: bool = true;
 
-    fn sample(&mut self, frame: &Frame) -> bool {
-        self.0.sample(frame)
-    }
-
-    fn forget(&mut self) {
-        self.0.series.clear();
-    }
-
-    fn finish(&self) -> Vec<Observation> {
-        let bins = &self.0;
+    fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
         let count = bins.species.len();
         let mut out = bins.observation("velocity_profile", "Velocity profile");
         for (c, name) in ["x", "y", "z"].iter().enumerate().take(bins.dimensions) {
             let velocity = bins.ratio(|at| at[count + 1 + c], |at| at[count]);
             out = out.column(&format!("velocity_{name}"), "r_c/time", velocity);
         }
-        vec![out]
+        out
     }
 }
