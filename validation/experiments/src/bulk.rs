@@ -16,17 +16,14 @@ use std::sync::atomic::AtomicUsize;
 pub struct Sampling {
     /// About how many particles; more if the box would be narrower than three times the longest range.
     pub particles: usize,
-    /// Time step.
     pub dt: f64,
     /// Steps without measurement.
     pub equilibrate: u64,
-    /// Steps with.
     pub steps: u64,
     /// Steps between samples.
     pub every: u64,
     /// Seed of the start and of the noise.
     pub seed: u64,
-    /// Threads.
     pub threads: NonZeroUsize,
 }
 
@@ -35,9 +32,7 @@ pub struct Sampling {
 pub struct Bulk<'a> {
     /// The fluid. Its file is there: a scene names it.
     pub model: &'a Model,
-    /// kT.
     pub kt: f64,
-    /// Number density of each species.
     pub densities: &'a [f64],
     /// Lines of `[observe]`, beside temperature and pressure.
     pub observe: &'a str,
@@ -131,12 +126,10 @@ pub fn run_with(
     serde_json::from_str(&text).map(Observed).map_err(|e| failed(e.into()))
 }
 
-/// What a run observed.
 #[derive(Debug, Clone)]
 pub struct Observed(pub Vec<Observation>);
 
 impl Observed {
-    /// An observation by its name.
     pub fn get(&self, name: &str) -> Option<&Observation> {
         self.0.iter().find(|o| o.name == name)
     }

@@ -9,15 +9,11 @@ use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab, warren_ab_text}
 pub struct Subject {
     /// In results and file names.
     pub name: &'static str,
-    /// In words.
     pub title: &'static str,
-    /// The model file.
     pub text: &'static str,
     /// Names of the species, as `pair_coeff` wants them.
     pub species: &'static [&'static str],
-    /// Number density.
     pub density: f64,
-    /// Δt.
     pub dt: f64,
 }
 
@@ -57,7 +53,6 @@ pub const FORMULA: Subject = Subject {
     dt: 0.01,
 };
 
-/// All that are timed.
 pub const SUBJECTS: [Subject; 3] = [MDPD, DPD, FORMULA];
 
 impl Subject {

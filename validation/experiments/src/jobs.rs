@@ -3,7 +3,6 @@
 use psidpd_report::Bar;
 use std::sync::Mutex;
 
-/// A run.
 pub type Job<'a, T> = Box<dyn FnOnce() -> T + Send + 'a>;
 
 /// Carries out `jobs` on as many threads as there are cores, but never more than two: the machine

@@ -13,7 +13,6 @@ use std::path::Path;
 pub struct Effort {
     /// Steps that are measured, after a third of them that are not.
     pub steps: u64,
-    /// Time step.
     pub dt: f64,
 }
 

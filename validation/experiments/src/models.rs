@@ -4,7 +4,6 @@
 pub const SET5: &str = include_str!("../../models/warren2003-set5.toml");
 /// Warren's denser liquid.
 pub const SET6: &str = include_str!("../../models/warren2003-set6.toml");
-/// Standard DPD.
 pub const STANDARD: &str = include_str!("../../models/standard-dpd.toml");
 /// The van der Waals fluid in two dimensions.
 pub const VAN_DER_WAALS: &str = include_str!("../../models/van-der-waals-2d.toml");

@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 /// A box and how much of it is filled along z.
 #[derive(Debug, Clone, Copy)]
 pub struct Filling {
-    /// Edges.
     pub lengths: [f64; 3],
     /// Height of the filled part, centred.
     pub thickness: f64,
@@ -91,7 +90,6 @@ fn in_precision(
 /// A state with the data files that LAMMPS reads.
 #[derive(Debug, Clone)]
 pub struct Start {
-    /// The particles.
     pub state: State,
     /// As `atom_style atomic`.
     pub data: PathBuf,

@@ -10,7 +10,6 @@ const TEMPERATURES: usize = 25;
 /// Points of a curve over densities.
 const DENSITIES: usize = 200;
 
-/// What the page is about.
 pub struct Scope<'a> {
     /// The temperatures of the isotherms.
     pub kts: &'a [f64],

@@ -4,7 +4,6 @@ use crate::fluids::{DPD, MDPD, Subject};
 use psidpd_core::engine::{Instructions, Precision, Settings};
 use std::num::NonZeroUsize;
 
-/// A code with its settings.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Code {
     /// LAMMPS's `mdpd/rhosum` and `mdpd`.
@@ -15,7 +14,6 @@ pub enum Code {
     Dpd(Suffix),
     /// The plugin's `dpd/psi`, with these words behind the seed.
     Plugin(String),
-    /// The native runner.
     Native(Settings),
     /// The native runner with the sums over pairs one by one.
     Plain,
@@ -35,7 +33,6 @@ pub enum Suffix {
 /// A code, and on how many MPI ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contender {
-    /// The code.
     pub code: Code,
     /// MPI ranks; 1 for the native runner.
     pub ranks: usize,
@@ -44,7 +41,6 @@ pub struct Contender {
 }
 
 impl Suffix {
-    /// The style.
     pub fn style(self) -> &'static str {
         match self {
             Suffix::None => "dpd",
@@ -79,7 +75,6 @@ impl Contender {
         id
     }
 
-    /// Whether LAMMPS runs it.
     pub fn in_lammps(&self) -> bool {
         !matches!(self.code, Code::Native(_) | Code::Plain)
     }
@@ -165,7 +160,6 @@ pub const FEW_ABOVE: usize = 100_000;
 /// Which contenders a size is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
-    /// All.
     Everyone,
     /// All but the reference, whose cost per particle does not depend on the size.
     AllButPlain,

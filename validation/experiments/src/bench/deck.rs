@@ -20,9 +20,7 @@ const LIMIT: Duration = Duration::from_secs(3600);
 /// LAMMPS with the plugin, and a folder for decks.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// LAMMPS.
     pub lammps: PluginHost,
-    /// The folder.
     pub work: PathBuf,
 }
 

@@ -2,7 +2,6 @@
 
 use super::contender::{Code, Contender};
 
-/// How long a run is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Length {
     /// Steps before the clock starts.

@@ -12,7 +12,6 @@ use std::process::Command;
 /// What a child process tells of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Child {
-    /// Particles.
     pub particles: usize,
     /// The most memory that the process ever had, in bytes.
     pub peak_bytes: u64,
@@ -20,10 +19,8 @@ pub struct Child {
     pub engine_bytes: u64,
 }
 
-/// Memory of one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// Particles.
     pub particles: usize,
     /// Peak of the process in bytes, less that of a small system.
     pub peak_bytes: u64,

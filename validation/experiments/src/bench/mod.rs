@@ -42,7 +42,6 @@ use std::path::{Path, PathBuf};
 pub struct Options {
     /// Particles of the many-body fluid in the boxes.
     pub sizes: Vec<usize>,
-    /// Rounds.
     pub rounds: usize,
     /// Seconds that a timed run may take, if that is enough for the fewest steps.
     pub seconds: f64,
@@ -66,7 +65,6 @@ pub struct Options {
 
 /// Skin of LAMMPS where none is looked for.
 const SKIN: f64 = 0.3;
-/// Skins that are tried.
 const SKINS: [f64; 4] = [0.2, 0.3, 0.4, 0.55];
 
 /// A contender with a fluid and a size, and what was measured so far.
@@ -98,7 +96,6 @@ impl Entry {
     }
 }
 
-/// A fluid at a size.
 struct Case {
     start: Start,
     pairs: f64,
@@ -310,7 +307,6 @@ fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> R
     Ok(pace)
 }
 
-/// The rounds.
 fn time(
     rounds: usize,
     cases: &Cases,

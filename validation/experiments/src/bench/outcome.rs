@@ -10,30 +10,22 @@ use std::collections::BTreeMap;
 pub struct Outcome {
     /// Changes when fields change their meaning.
     pub format: u32,
-    /// Of psidpd.
     pub version: &'static str,
-    /// The machine.
     pub machine: Machine,
-    /// The LAMMPS.
     pub lammps: LammpsFacts,
-    /// What was asked for.
     pub options: Asked,
-    /// The fluids.
     pub fluids: Vec<FluidFacts>,
     /// Every contender with every fluid and size.
     pub runs: Vec<Run>,
     /// Two ranks against one.
     pub scaling: Vec<Scaling>,
-    /// Memory of the native runner.
     pub memory: Vec<Memory>,
     /// Whether results are the same on 1, 2 and 3 threads, to the last bit: by fluid and precision.
     pub equal_bits: BTreeMap<String, bool>,
 }
 
-/// Where it ran.
 #[derive(Debug, Clone, Serialize)]
 pub struct Machine {
-    /// The processor.
     pub processor: String,
     /// How many cores this process may use.
     pub cores: usize,
@@ -48,21 +40,17 @@ pub struct Machine {
     pub load: Option<f64>,
 }
 
-/// LAMMPS.
 #[derive(Debug, Clone, Serialize)]
 pub struct LammpsFacts {
-    /// In words.
     pub version: String,
     /// Styles that were wanted and that it does not have.
     pub missing: Vec<String>,
 }
 
-/// What was asked for.
 #[derive(Debug, Clone, Serialize)]
 pub struct Asked {
     /// Particles of the many-body fluid in the boxes.
     pub sizes: Vec<usize>,
-    /// Rounds.
     pub rounds: usize,
     /// Seconds that a timed run may take.
     pub seconds: f64,
@@ -76,16 +64,11 @@ pub struct Asked {
     pub seed: u64,
 }
 
-/// A fluid.
 #[derive(Debug, Clone, Serialize)]
 pub struct FluidFacts {
-    /// In `runs`.
     pub name: &'static str,
-    /// In words.
     pub title: &'static str,
-    /// Number density.
     pub density: f64,
-    /// Δt.
     pub dt: f64,
     /// Many-body numbers that a host forwards from a particle to its ghosts.
     pub slope_width: usize,
@@ -94,19 +77,14 @@ pub struct FluidFacts {
 /// One contender with one fluid at one size.
 #[derive(Debug, Clone, Serialize)]
 pub struct Run {
-    /// The name of the fluid.
     pub fluid: &'static str,
     /// Particles of the many-body fluid in the box before it was repeated.
     pub size: usize,
-    /// Who.
     pub code: String,
-    /// Particles.
     pub particles: usize,
     /// Pairs closer than the longest range, per particle.
     pub pairs_per_particle: f64,
-    /// MPI ranks.
     pub ranks: usize,
-    /// Threads of each.
     pub threads: usize,
     /// Of the native runner, and of the plugin where it was told.
     pub precision: Option<String>,
@@ -144,13 +122,11 @@ impl Run {
 /// Two ranks against one.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scaling {
-    /// Who.
     pub code: String,
     /// `strong`: the same box; `weak`: a box for each rank.
     pub kind: &'static str,
     /// Particles of the box of one rank.
     pub size: usize,
-    /// Ranks.
     pub ranks: usize,
     /// Rate over that of one rank.
     pub speed_up: Spread,

@@ -3,11 +3,9 @@ use serde::{Deserialize, Serialize};
 /// The least, the middle and the greatest of measurements of one thing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// The least.
     pub min: f64,
     /// The middle; between two middle ones their mean.
     pub median: f64,
-    /// The greatest.
     pub max: f64,
 }
 

@@ -78,7 +78,6 @@ pub fn fit_density(points: &[Point], pair: usize, degree: usize) -> Option<Fit> 
 /// What is needed of a target equation of state to fit `ρ̃` to it, at one density.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// The pressure that is wanted.
     pub wanted: f64,
     /// What ψ does not contribute to it.
     pub base: f64,

@@ -32,10 +32,8 @@ use serde::Serialize;
 use std::cell::RefCell;
 use std::path::Path;
 
-/// What to calibrate.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// kT.
     pub kt: f64,
     /// Total number densities.
     pub densities: Vec<f64>,
@@ -45,7 +43,6 @@ pub struct Options {
     pub name: Option<String>,
     /// See [`Wish::tolerance`].
     pub tolerance: f64,
-    /// Size and length of the runs.
     pub sampling: Sampling,
 }
 
@@ -60,7 +57,6 @@ pub struct Residual {
     pub mean: Vec<Value>,
     /// ⟨ρ̃⟩ for each (β at α).
     pub corrected: Vec<Value>,
-    /// The pressure that is wanted.
     pub wanted: f64,
     /// The pressure that was measured.
     pub pressure: Value,
@@ -71,7 +67,6 @@ pub struct Residual {
 /// A value and its error, for JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Value {
-    /// The value.
     pub value: f64,
     /// One standard deviation.
     pub error: f64,
@@ -83,28 +78,21 @@ impl From<psidpd_observe::Measured> for Value {
     }
 }
 
-/// How a calibration ended.
 #[derive(Debug, Clone, Serialize)]
 pub struct Calibration {
-    /// Title of the model.
     pub title: String,
-    /// kT.
     pub kt: f64,
     /// The density whose correction it is.
     pub density: String,
     /// Its (α, β): the density of β felt by α, as `"β|α"`, in the order of the coefficients.
     pub pairs: Vec<String>,
-    /// Whether the tolerance is met.
     pub converged: bool,
-    /// The tolerance.
     pub tolerance: f64,
-    /// Size and length of the runs.
     pub sampling: Sampling,
     /// The first guess that was measured: `"constant"` or `"identity"`.
     pub first_guess: &'static str,
     /// Every correction that was tried, in order; the last was chosen, or the best if none meets the tolerance.
     pub rounds: Vec<Round>,
-    /// Which of them was chosen.
     pub chosen: usize,
     /// Densities that stopped under it: residuals and tolerance are about the others.
     pub failed: Vec<Failed>,
@@ -116,7 +104,6 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// The correction that was chosen.
     pub fn fits(&self) -> &[Fit] {
         &self.rounds[self.chosen].fits
     }
@@ -298,7 +285,6 @@ fn cause(error: &RunError) -> &RunError {
     }
 }
 
-/// One sentence for each density.
 fn sentences(failed: &[Failed]) -> String {
     let each: Vec<String> = failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
     each.join("; ")

@@ -2,7 +2,6 @@ use crate::bulk::Observed;
 use psidpd_core::model::Polynomial;
 use psidpd_observe::Measured;
 
-/// What was measured at one density.
 #[derive(Debug, Clone)]
 pub struct Point {
     /// Total number density.

@@ -10,7 +10,6 @@ use serde::Serialize;
 pub enum Trial<'a> {
     /// ρ̃ = ρ, with [`DUMMY_SLOPE`]: at each density a pair force of constant strength.
     Constant,
-    /// These polynomials, for each (β at α).
     Corrected(&'a [Polynomial]),
 }
 
@@ -19,7 +18,6 @@ pub enum Trial<'a> {
 pub struct Failed {
     /// Total number density.
     pub density: f64,
-    /// Why the run stopped.
     pub why: String,
 }
 
@@ -30,7 +28,6 @@ pub struct Batch {
     pub points: Vec<Point>,
     /// Which targets these are.
     pub of: Vec<usize>,
-    /// The other densities.
     pub failed: Vec<Failed>,
 }
 
@@ -54,7 +51,6 @@ pub const DUMMY_SLOPE: f64 = 1.05;
 pub enum Goal {
     /// ⟨ρ̃⟩ = ρ.
     Density,
-    /// The wanted pressure.
     Pressure,
 }
 
@@ -77,7 +73,6 @@ pub struct Round {
     pub failed: Vec<Failed>,
     /// How often it was moved halfway back to the correction before it, because too few densities ran.
     pub halved: usize,
-    /// What was measured under it.
     #[serde(skip)]
     pub batch: Batch,
 }
@@ -92,7 +87,6 @@ impl Round {
     }
 }
 
-/// What is asked for.
 #[derive(Clone, Copy)]
 pub struct Wish<'a> {
     /// Target equation of state at the densities asked for.

@@ -3,16 +3,12 @@ use super::timestep::StepEstimate;
 use psidpd_core::theory::Stability;
 use serde::Serialize;
 
-/// What a check found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Findings {
-    /// Title of the model.
     pub title: String,
-    /// Where it comes from.
     pub reference: Option<String>,
     /// What will be computed.
     pub plan: String,
-    /// kT.
     pub kt: f64,
     /// Number densities of the species.
     pub densities: Option<Vec<f64>>,
@@ -51,7 +47,6 @@ impl From<Stability> for Waves {
     }
 }
 
-/// How bad something is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -68,9 +63,7 @@ pub enum Severity {
 pub struct Warning {
     /// A short name that does not change.
     pub id: &'static str,
-    /// How bad it is.
     pub severity: Severity,
-    /// What, and what to do.
     pub message: String,
 }
 

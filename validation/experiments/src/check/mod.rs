@@ -20,7 +20,6 @@ use psidpd_dynamics::prediction;
 /// The state at which a model is looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditions {
-    /// kT.
     pub kt: f64,
     /// Number density of each species; `None` leaves out what depends on it.
     pub densities: Option<Vec<f64>>,

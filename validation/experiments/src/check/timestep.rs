@@ -40,11 +40,8 @@ const BETWEEN: u64 = 20;
 /// What is estimated of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepEstimate {
-    /// Name of the stage.
     pub stage: String,
-    /// How steps are made.
     pub integrator: String,
-    /// Δt.
     pub dt: f64,
     /// ω.
     pub frequency: f64,
@@ -112,7 +109,6 @@ fn longest(error: impl Fn(f64) -> f64) -> f64 {
     low
 }
 
-/// What is sampled of a fluid.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     /// ω.

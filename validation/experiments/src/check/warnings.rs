@@ -16,9 +16,7 @@ use std::f64::consts::TAU;
 pub struct State<'a> {
     /// Number densities of the species.
     pub densities: Option<&'a [f64]>,
-    /// The pressure there.
     pub pressure: Option<f64>,
-    /// Stability there.
     pub stability: Option<&'a Stability>,
     /// Why there is no mean field, where there should be one.
     pub no_theory: Option<TheoryError>,

@@ -59,7 +59,6 @@ pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ExperimentError>
     })
 }
 
-/// The work in LAMMPS.
 pub fn lammps(context: &Context, code: Code, law: ForceLaw) -> Result<Work, ExperimentError> {
     let setup = Setup { code, set: &SET6, law, gamma: 0.0, ..Setup::new(code, &SET6, law) };
     let instance = super::forces::open(context, &setup, &state_at(0.0)?, &format!("loop-{}", code.slug()))?;

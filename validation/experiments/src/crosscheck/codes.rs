@@ -10,7 +10,6 @@ use psidpd_dynamics::run::State;
 use psidpd_lammps_host::export::eam::{self, Grid};
 use std::path::Path;
 
-/// Who computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Code {
     /// The native runner, in double precision.
@@ -30,7 +29,6 @@ pub enum Code {
 }
 
 impl Code {
-    /// For tables and plots.
     pub fn label(self) -> &'static str {
         match self {
             Code::Native => "native",
@@ -43,7 +41,6 @@ impl Code {
         }
     }
 
-    /// For file names.
     pub fn slug(self) -> &'static str {
         match self {
             Code::Native => "native",
@@ -60,11 +57,8 @@ impl Code {
 /// What a LAMMPS code is to compute.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup<'a> {
-    /// Who computes.
     pub code: Code,
-    /// Which fluid.
     pub set: &'a WarrenSet,
-    /// Which force law.
     pub law: ForceLaw,
     /// Friction; 0 leaves drag and noise out.
     pub gamma: f64,

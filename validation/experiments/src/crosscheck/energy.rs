@@ -21,7 +21,6 @@ const LARGEST_DRIFT: f64 = 1e-4;
 /// Rise of the temperature that counts as heating.
 const HEATING: f64 = 0.1;
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let edge = if context.full { 12.0 } else { 5.2 };
     let filling = Filling::cube(edge);

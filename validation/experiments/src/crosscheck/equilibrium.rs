@@ -66,7 +66,6 @@ fn name(code: Code, law: ForceLaw) -> String {
     }
 }
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let sets = [SET5, SET6];
     // A wide and thin slab: the error of the tension goes with the root of thickness over area.

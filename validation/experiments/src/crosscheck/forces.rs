@@ -32,7 +32,6 @@ pub(super) struct Point {
 pub(super) struct Difference {
     /// Largest over the particles, over the root mean square force.
     pub force: f64,
-    /// Of the energy.
     pub energy: f64,
     /// Over the largest component.
     pub virial: f64,
@@ -62,7 +61,6 @@ fn native(
     point_of(context.simulation(model, 1.0, state, SEED)?, step)
 }
 
-/// What the native runner says.
 pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ExperimentError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
@@ -187,7 +185,6 @@ pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, Experim
     Ok(lammps)
 }
 
-/// What LAMMPS says.
 pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentError> {
     lammps.command("run 0 post no")?;
     let forces = lammps.gather("f", 3)?.as_chunks::<3>().0.to_vec();
@@ -199,7 +196,6 @@ pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentErr
     })
 }
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let lengths = if context.full { [15.0, 15.0, 20.0] } else { [10.0, 10.0, 15.0] };
     let filling = Filling { lengths, thickness: 0.5 * lengths[2] };

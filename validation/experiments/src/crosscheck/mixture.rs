@@ -31,7 +31,6 @@ const COUNT: usize = 1000;
 /// Largest relative difference: a spline's error is proportional to its spacing where w′ or φ′ has a kink.
 const LARGEST: f64 = 1e-5;
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let model = Model::parse("mixture", MODEL)?;
     let state = random_state()?;

@@ -36,13 +36,9 @@ const LOG: &str = "log.lammps";
 /// What every part of the validation works with.
 #[derive(Debug)]
 pub struct Context<'a> {
-    /// LAMMPS with the plugin.
     pub lammps: &'a PluginHost,
-    /// A folder for decks and data.
     pub work: PathBuf,
-    /// Whether long runs are wanted.
     pub full: bool,
-    /// Where progress is shown.
     pub progress: &'a Progress,
     /// What is wrong with the native engine: for tests that checks tell of it.
     pub fault: Option<Fault>,
@@ -66,9 +62,7 @@ impl Context<'_> {
 /// Name, checks, and what a part of the validation adds to the report.
 #[derive(Debug, Default)]
 pub struct Part {
-    /// The checks.
     pub checks: Vec<psidpd_report::Check>,
-    /// For the report.
     pub section: psidpd_report::Section,
     /// Named numbers for `results.json`.
     pub values: Vec<(String, serde_json::Value)>,

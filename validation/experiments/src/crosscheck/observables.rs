@@ -29,7 +29,6 @@ const BINS: usize = 40;
 /// Largest relative difference. A pair that is counted in another shell makes 10⁻⁵.
 const LARGEST: f64 = 1e-9;
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let folder = context.work.join("observables");
     std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;

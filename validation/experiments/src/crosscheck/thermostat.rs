@@ -67,7 +67,6 @@ fn deck(
     Ok(Deck { kt, ..Deck::new(&style, SEED, data.display().to_string()) }.text())
 }
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut part = Part::default();
     let mut forces = Table::new(["", "force", "energy", "virial"]);

@@ -15,9 +15,7 @@ use std::time::Duration;
 /// How long a run is and what is kept of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Length {
-    /// Δt.
     pub dt: f64,
-    /// Steps.
     pub steps: u64,
     /// Steps between samples of temperature, energy and pressure.
     pub sample: u64,
@@ -30,7 +28,6 @@ pub struct Length {
 /// Series of a run, sampled every [`Length::sample`] steps, from step 0 unless averaged.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
-    /// Time.
     pub time: Vec<f64>,
     /// Kinetic temperature.
     pub temperature: Vec<f64>,
@@ -44,7 +41,6 @@ pub struct Trace {
     pub conservative: [Vec<f64>; 6],
     /// z of every particle, for each frame.
     pub frames: Vec<Vec<f64>>,
-    /// How many particles.
     pub particles: usize,
 }
 

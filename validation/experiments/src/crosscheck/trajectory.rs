@@ -23,7 +23,6 @@ const DT: f64 = 0.01;
 /// Largest distance of a particle's places in two codes.
 const LARGEST: f64 = 1e-10;
 
-/// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0 };
     let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;

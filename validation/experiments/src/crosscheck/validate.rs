@@ -23,12 +23,9 @@ pub struct Options {
     pub fault: Option<Fault>,
 }
 
-/// What came of it.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Every check and number.
     pub results: Results,
-    /// Where the report is.
     pub report: PathBuf,
 }
 
@@ -101,7 +98,6 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Exper
     Ok(Outcome { results, report })
 }
 
-/// Every check as a table.
 pub fn check_table(results: &Results) -> Table {
     let mut table = Table::new(["", "check", "value", "bound"]);
     for check in &results.checks {

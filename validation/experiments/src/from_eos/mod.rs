@@ -26,7 +26,6 @@ use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 use serde::Serialize;
 
-/// What is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Kelvin.
@@ -39,7 +38,6 @@ pub struct Options {
     pub range: f64,
     /// Largest relative difference of the tension, and of pressures as `calibrate` has it.
     pub tolerance: f64,
-    /// Size and length of the runs.
     pub sampling: Sampling,
 }
 
@@ -68,13 +66,11 @@ pub struct Compared {
 /// The model, and how it compares.
 #[derive(Debug, Clone, Serialize)]
 pub struct Found {
-    /// Name of the substance.
     pub substance: String,
     /// Kelvin.
     pub temperature: f64,
     /// Molecules in a particle.
     pub molecules: f64,
-    /// The units of the model in SI.
     pub units: Units,
     /// Strengths that were tried; the last is that of the model.
     pub trials: Vec<Trial>,
@@ -82,7 +78,6 @@ pub struct Found {
     pub compared: Vec<Compared>,
     /// Whether pressures and tension meet the tolerance.
     pub converged: bool,
-    /// The model file.
     #[serde(skip)]
     pub text: String,
 }

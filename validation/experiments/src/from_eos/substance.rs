@@ -5,7 +5,6 @@ use serde::Deserialize;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Substance {
-    /// Its name.
     pub name: String,
     /// Where the parameters are from.
     pub source: String,
@@ -27,14 +26,12 @@ struct List {
     substance: Vec<Substance>,
 }
 
-/// All that ship.
 fn all() -> Vec<Substance> {
     let list: Result<List, _> = toml::from_str(include_str!("../../../substances/pc-saft.toml"));
     // The file is part of the program, and tested.
     list.map(|list| list.substance).unwrap_or_default()
 }
 
-/// Their names.
 pub fn names() -> String {
     all().iter().map(|s| s.name.clone()).collect::<Vec<_>>().join(", ")
 }

@@ -2,7 +2,6 @@
 
 use psidpd_dynamics::integrator::Integrator;
 
-/// What must happen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Must {
     /// The run ends without a warning, without momentum, and with temperatures that are within this part of kT, and four
@@ -24,7 +23,6 @@ pub enum Must {
 }
 
 impl Must {
-    /// In words.
     pub fn words(self) -> String {
         match self {
             Must::Right(_) => "right".into(),
@@ -38,10 +36,8 @@ impl Must {
     }
 }
 
-/// What did.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Found {
-    /// It ended.
     Ended {
         /// Kinetic and configurational temperature in kT, each with its error, as far as they were measured.
         temperatures: Vec<[f64; 2]>,
@@ -49,10 +45,8 @@ pub enum Found {
         momentum: f64,
         /// Evaluations of ψ below and above bounds.
         counted: [u64; 2],
-        /// What was warned of.
         warnings: Vec<String>,
     },
-    /// It stopped.
     Stopped(String),
     /// It did not begin.
     Refused(String),
@@ -60,40 +54,29 @@ pub enum Found {
     Differs(f64),
     /// Energy per particle in kT, and momentum as above: changes.
     Changed {
-        /// Energy.
         energy: f64,
-        /// Momentum.
         momentum: f64,
     },
 }
 
-/// A run that a case is.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
-    /// The model file.
     pub model: String,
-    /// kT.
     pub kt: f64,
     /// The scene but for model, kT, integrator and stages.
     pub scene: String,
     /// A data file to start from, if there is one.
     pub data: Option<String>,
-    /// Δt.
     pub dt: f64,
     /// Steps without measurement, and with.
     pub steps: [u64; 2],
 }
 
-/// A case.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// The group.
     pub group: &'static str,
-    /// The case, in words.
     pub name: &'static str,
-    /// What is run.
     pub run: Run,
-    /// What must happen.
     pub must: Must,
     /// The same for integrators that keep the Maxwell distribution of an ideal gas at any time step, if that is another.
     pub exact: Option<Must>,

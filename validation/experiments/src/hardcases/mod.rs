@@ -23,7 +23,6 @@ use psidpd_report::{Progress, Table};
 use serde::Serialize;
 use std::path::Path;
 
-/// How much is tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     /// The integrators that are recommended, in mixed precision, and velocity Verlet in double.
@@ -34,28 +33,20 @@ pub enum Extent {
     Full,
 }
 
-/// What came of one case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// The group.
     pub group: &'static str,
-    /// The case.
     pub case: &'static str,
     /// `native` or `plugin`.
     pub host: &'static str,
-    /// The integrator.
     pub integrator: &'static str,
-    /// In what pairs are computed.
     pub precision: String,
-    /// What must happen.
     pub must: String,
-    /// What did.
     pub did: String,
     /// Why that is not what must; nothing if it is.
     pub wrong: Option<String>,
 }
 
-/// All cases.
 fn cases(extent: Extent) -> Vec<Case> {
     let mut all = starts::cases();
     all.extend(singular::cases());
@@ -120,7 +111,6 @@ pub fn run(
     jobs::counted(jobs, &bar).into_iter().collect()
 }
 
-/// Where a case is carried out.
 enum Host<'a> {
     /// Natively; with a fault by a wrong engine.
     Native(Option<Fault>),
@@ -157,7 +147,6 @@ fn one(
     })
 }
 
-/// The results as a table.
 pub fn table(results: &[Verdict]) -> Table {
     let mut table = Table::new(["case", "host", "integrator", "precision", "must be", "was", "verdict"]);
     for r in results {

@@ -14,7 +14,6 @@ use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// LAMMPS with the plugin.
 #[derive(Debug)]
 pub struct Plugin(PluginHost);
 

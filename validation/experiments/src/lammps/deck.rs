@@ -4,18 +4,14 @@ use super::style::PairStyle;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What a run is set up with.
 #[derive(Debug, Clone)]
 pub struct Deck<'a> {
-    /// The pair style.
     pub style: &'a PairStyle,
-    /// kT.
     pub kt: f64,
     /// Seed of the noise.
     pub seed: u64,
     /// The plugin to load, if the style is one of its.
     pub plugin: Option<&'a Path>,
-    /// The data file.
     pub data: String,
     /// Commands for accelerated styles.
     pub acceleration: &'a str,
@@ -27,7 +23,6 @@ pub struct Deck<'a> {
     pub copies: usize,
     /// Skin of the lists.
     pub skin: f64,
-    /// When lists are built.
     pub build: &'a str,
 }
 
@@ -49,7 +44,6 @@ impl<'a> Deck<'a> {
         }
     }
 
-    /// The commands.
     pub fn text(&self) -> String {
         let mut text = format!("units lj\n{}atom_style {}\n", self.acceleration, self.style.atom_style());
         if self.map {

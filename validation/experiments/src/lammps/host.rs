@@ -5,10 +5,8 @@ use psidpd_lammps_host::{Host, LammpsError, plugin};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The name of scripts.
 const SCRIPT: &str = "in.lammps";
 
-/// LAMMPS with the plugin.
 #[derive(Debug, Clone)]
 pub struct PluginHost {
     /// LAMMPS.

@@ -7,9 +7,7 @@ use std::collections::BTreeMap;
 pub struct Loop {
     /// Wall time in seconds.
     pub seconds: f64,
-    /// Steps.
     pub steps: u64,
-    /// Particles.
     pub particles: usize,
     /// Seconds of each part, the mean over ranks: Pair, Neigh, Comm, Output, Modify, Other, in lower case.
     pub parts: BTreeMap<String, f64>,

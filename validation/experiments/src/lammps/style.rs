@@ -22,12 +22,10 @@ pub enum PairStyle {
 pub const GRID: Grid = Grid { spacing: 5e-5, largest_density: 60.0, densities: 6001 };
 
 impl PairStyle {
-    /// The atom style that it needs.
     pub fn atom_style(&self) -> &'static str {
         if let PairStyle::Mdpd(_) = self { "mdpd" } else { "atomic" }
     }
 
-    /// Whether the plugin has it.
     pub fn is_of_the_plugin(&self) -> bool {
         matches!(self, PairStyle::Psi { .. } | PairStyle::MdpdPsi { .. })
     }

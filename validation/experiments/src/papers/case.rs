@@ -11,7 +11,6 @@ pub const LIMIT: f64 = 3.0;
 /// vaguer would agree with anything.
 pub const VAGUE: f64 = 0.1;
 
-/// How a value is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
@@ -26,13 +25,10 @@ pub enum Rule {
 /// A value beside the published one.
 #[derive(Debug, Clone)]
 pub struct Compared {
-    /// What it is.
     pub name: String,
-    /// What was measured.
     pub measured: Measured,
     /// What is published, or follows from it; or is our own.
     pub published: Measured,
-    /// How they are compared.
     pub rule: Rule,
     /// Whether what it is compared with is not published: another run of this program, or its mean field.
     pub own: bool,
@@ -70,7 +66,6 @@ impl Compared {
         self.measured.error > (VAGUE * self.published.value.abs()).max(self.published.error)
     }
 
-    /// For JSON.
     pub fn to_json(&self) -> Value {
         let pair = |m: Measured| json!({ "value": m.value, "error": m.error });
         json!({
@@ -86,10 +81,8 @@ impl Compared {
     }
 }
 
-/// The results of a case.
 #[derive(Debug, Clone, Default)]
 pub struct Outcome {
-    /// The values.
     pub values: Vec<Compared>,
     /// File names without extension, and plots.
     pub plots: Vec<(&'static str, Plot)>,

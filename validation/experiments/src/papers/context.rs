@@ -20,12 +20,9 @@ pub enum Size {
     Full,
 }
 
-/// Where and how a case runs.
 #[derive(Debug, Clone)]
 pub struct Context {
-    /// How large.
     pub size: Size,
-    /// The folder of the case.
     pub folder: PathBuf,
     /// Threads of each run.
     pub threads: NonZeroUsize,
@@ -40,11 +37,8 @@ pub type Change<'a> = (&'a [&'a str], toml_edit::Value);
 
 /// A homogeneous fluid of one species that a case measures.
 pub struct Fluid<'a> {
-    /// The model file.
     pub model: &'a str,
-    /// kT.
     pub kt: f64,
-    /// Time step.
     pub dt: f64,
     /// Edge of the box, at full size.
     pub edge: f64,
@@ -158,7 +152,6 @@ fn edited(scene: &str, changes: &[Change]) -> Result<String, ExperimentError> {
     Ok(document.to_string())
 }
 
-/// Mean field of a model file.
 pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
     Ok(MeanField::new(&Model::parse("model.toml", model)?.at(kt)?)?)
 }

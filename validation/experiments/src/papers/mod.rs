@@ -24,14 +24,11 @@ pub use context::{Context, Size};
 pub struct Case {
     /// `PAPER-figN`, `PAPER-tableN`, or another short name.
     pub id: &'static str,
-    /// Which paper.
     pub paper: &'static str,
-    /// What is compared.
     pub what: &'static str,
     run: Run,
 }
 
-/// What carries a case out.
 type Run = fn(&Context) -> Result<Outcome, ExperimentError>;
 
 impl Case {
@@ -44,7 +41,6 @@ impl Case {
     }
 }
 
-/// Every case, by paper.
 pub fn cases() -> Vec<&'static Case> {
     let papers: [&'static [Case]; 5] =
         [pagonabarraga::CASES, trofimov::CASES, warren::CASES, wang::CASES, berendsen::CASES];

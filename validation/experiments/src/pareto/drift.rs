@@ -10,14 +10,11 @@ use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-/// The drift of one scheme.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EnergyDrift {
     /// The integrator whose steps without thermostat they are.
     pub integrator: String,
-    /// Δt.
     pub dt: f64,
-    /// In what pairs are computed.
     pub precision: String,
     /// Of the energy per particle in kT, for a unit of time; nothing where the run stopped.
     pub slope: Option<f64>,
@@ -25,7 +22,6 @@ pub struct EnergyDrift {
     pub slope_error: Option<f64>,
     /// The largest departure from the first value, in kT per particle.
     pub largest: Option<f64>,
-    /// Why the run stopped.
     pub stopped: Option<String>,
 }
 

@@ -24,7 +24,6 @@ const LIMIT: Duration = Duration::from_secs(3600);
 pub struct Lammps {
     host: PluginHost,
     work: PathBuf,
-    /// Its own style for the fluid.
     pub own: Option<PairStyle>,
 }
 

@@ -49,9 +49,7 @@ use std::time::Duration;
 pub struct Options {
     /// Minutes that all of it may take, roughly.
     pub minutes: f64,
-    /// Which settings.
     pub choice: Choice,
-    /// Thread counts.
     pub threads: Vec<NonZeroUsize>,
     /// Tolerances; one percent of all that is resolved so well if there are none.
     pub tolerances: Vec<Tolerance>,
@@ -177,7 +175,6 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     Ok(outcome)
 }
 
-/// A setting in words.
 fn what(origin: &Origin, physics: &Physics) -> String {
     let integrator = recommend::short(&physics.integrator);
     if !physics.integrator.has_time() {
@@ -199,11 +196,9 @@ fn known(origin: &Origin) -> Result<Known, ExperimentError> {
     })
 }
 
-/// What errors are held against.
 struct References {
     /// Monte Carlo, or why there is none.
     configurations: Result<Sampled, String>,
-    /// Small steps.
     small_steps: Sampled,
 }
 

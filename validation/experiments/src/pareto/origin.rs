@@ -12,9 +12,7 @@ use std::time::{Duration, Instant};
 /// A scene at the stage that is measured.
 #[derive(Debug)]
 pub struct Origin<'a> {
-    /// The scene.
     pub scene: &'a Scene,
-    /// The stage.
     pub stage: &'a Stage,
     /// Particles that have been through the stages before, and a little of this.
     pub state: State,

@@ -7,22 +7,16 @@ use super::tolerance::{self, Tolerance, Worst};
 use crate::bench::Spread;
 use serde::Serialize;
 
-/// Everything that was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// Changes when fields change their meaning.
     pub format: u32,
-    /// Of psidpd.
     pub version: &'static str,
-    /// The processor.
     pub machine: String,
-    /// Title of the scene.
     pub scene: String,
     /// Name of the stage that was measured.
     pub stage: String,
-    /// Particles.
     pub particles: usize,
-    /// kT.
     #[serde(rename = "kT")]
     pub kt: f64,
     /// Δt of the stage.
@@ -37,7 +31,6 @@ pub struct Outcome {
     pub lammps_reference: Option<Reference>,
     /// Why LAMMPS, or one of its styles, is not among the points.
     pub left_out: Vec<String>,
-    /// Every setting.
     pub points: Vec<Point>,
     /// Energy without thermostat.
     pub drifts: Vec<EnergyDrift>,
@@ -55,7 +48,6 @@ pub struct Outcome {
 pub struct Recommended {
     /// Its place among the points.
     pub point: usize,
-    /// The lines of a scene.
     pub scene: String,
     /// The lines of a LAMMPS script: of the same steps, or of the cheapest that LAMMPS can make.
     pub lammps: Option<String>,
@@ -65,14 +57,10 @@ pub struct Recommended {
     pub lammps_refusal: Option<String>,
 }
 
-/// A reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reference {
-    /// In words.
     pub what: String,
-    /// Δt, if it has one.
     pub dt: Option<f64>,
-    /// Samples.
     pub samples: u64,
     /// Simulated time; in Monte Carlo, sweeps.
     pub time: f64,
@@ -102,22 +90,14 @@ impl Cost {
     }
 }
 
-/// One setting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
-    /// Who makes the steps.
     pub code: Host,
-    /// How a step is made.
     pub integrator: String,
-    /// Δt.
     pub dt: f64,
-    /// In what pairs are computed.
     pub precision: String,
-    /// Threads.
     pub threads: usize,
-    /// Nothing where it is unstable.
     pub cost: Option<Cost>,
-    /// Samples.
     pub samples: u64,
     /// Simulated time that errors are from.
     pub time: f64,
@@ -128,11 +108,9 @@ pub struct Point {
     pub worst: Option<Worst>,
     /// Whether the run was made to its end.
     pub stable: bool,
-    /// Why not.
     pub unstable: Option<String>,
     /// Whether nothing is cheaper with a smaller worst error.
     pub front: bool,
-    /// Its setting.
     #[serde(skip)]
     pub setting: Setting,
 }
@@ -153,7 +131,6 @@ impl Point {
             })
     }
 
-    /// In words.
     pub fn name(&self) -> String {
         let who = match self.code {
             Host::Native => "native",

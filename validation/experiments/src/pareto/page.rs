@@ -167,7 +167,6 @@ fn plot_of(outcome: &Outcome, class: Class) -> Option<Plot> {
     (!series.is_empty()).then(|| plot(&title, format!("error of {}, %", class.name()), series, levels))
 }
 
-/// What is recommended, in words.
 pub fn recommendation(outcome: &Outcome) -> String {
     let within: Vec<String> = outcome.tolerances.iter().map(ToString::to_string).collect();
     let within = within.join(", ");
@@ -204,7 +203,6 @@ pub fn recommendation(outcome: &Outcome) -> String {
     text
 }
 
-/// What the table means.
 pub fn explanation(outcome: &Outcome) -> String {
     let temperature = match outcome.temperature_is_known {
         true => "of the temperatures from kT",

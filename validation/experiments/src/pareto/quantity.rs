@@ -3,7 +3,6 @@
 use psidpd_observe::{Measured, Observation};
 use serde::{Serialize, Serializer};
 
-/// Kinds of quantities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Class {
     /// Energy of the particles, in kT for each.
@@ -45,7 +44,6 @@ impl Class {
         ("g", Class::Structure),
     ];
 
-    /// Its name.
     pub fn name(self) -> &'static str {
         Class::ALL.iter().find(|(_, class)| *class == self).map_or("", |found| found.0)
     }
@@ -77,14 +75,10 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     ["u", "T_kin", "p_total", "D", "g"].into_iter().chain(SCALARS.iter().map(|(_, name, ..)| *name))
 }
 
-/// A measured quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// Its kind.
     pub class: Class,
-    /// Its name.
     pub name: String,
-    /// Its value.
     pub measured: Measured,
 }
 
@@ -93,16 +87,12 @@ pub struct Quantity {
 pub struct Structure {
     /// Weight of each shell.
     pub weights: Vec<f64>,
-    /// Values.
     pub g: Vec<f64>,
-    /// Their errors.
     pub errors: Vec<f64>,
 }
 
-/// All that is known of one run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Quantities {
-    /// Numbers.
     pub scalars: Vec<Quantity>,
     /// g(r) of all particles.
     pub structure: Option<Structure>,
@@ -182,9 +172,7 @@ pub struct Known {
 /// The error of a quantity, in the unit of its class, with an error of its own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviation {
-    /// Its kind.
     pub class: Class,
-    /// Of which quantity.
     pub name: String,
     /// What was measured, in the unit of the model.
     pub measured: Measured,

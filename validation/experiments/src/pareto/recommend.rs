@@ -9,7 +9,6 @@ use psidpd_lammps_host::LammpsError;
 use psidpd_lammps_host::export::lammps::{self as deck, Script};
 use std::fmt::Write;
 
-/// The lines of a scene.
 pub fn scene_lines(dt: f64, setting: &Setting) -> String {
     let Physics { mut integrator, precision, .. } = setting.physics;
     let mut s = format!("dt = {}\nintegrator = \"{}\"\n", dt, integrator.name());

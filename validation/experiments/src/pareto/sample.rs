@@ -12,17 +12,14 @@ use psidpd_observe::{Observe, Observers, Request, Series, StageNames, read};
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
-/// How much is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Effort {
     /// As much as the clock allows, of a reference so many times as much.
     Seconds(f64),
-    /// So many samples.
     Samples(u64),
 }
 
 impl Effort {
-    /// The same, `factor` times.
     pub fn times(self, factor: f64) -> Effort {
         match self {
             Effort::Seconds(s) => Effort::Seconds(factor * s),
@@ -39,12 +36,9 @@ impl Effort {
     }
 }
 
-/// What a run came to.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sampled {
-    /// It was made.
     Made {
-        /// What it measured.
         quantities: Box<Quantities>,
         /// Samples of the kinetic temperature.
         samples: u64,

@@ -5,22 +5,17 @@ use psidpd_dynamics::integrator::{Coupling, Integrator};
 use serde::Serialize;
 use std::num::NonZeroUsize;
 
-/// What errors depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Physics {
-    /// How a step is made.
     pub integrator: Integrator,
     /// Δt in units of the scene's own.
     pub multiple: f64,
-    /// In what pairs are computed.
     pub precision: Precision,
 }
 
-/// Who makes the steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Host {
-    /// The native runner.
     Native,
     /// `dpd/psi` in LAMMPS, which takes the same steps.
     Plugin,
@@ -28,14 +23,10 @@ pub enum Host {
     Lammps,
 }
 
-/// What cost depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
-    /// Who.
     pub host: Host,
-    /// Which steps.
     pub physics: Physics,
-    /// Threads.
     pub threads: NonZeroUsize,
 }
 
@@ -98,7 +89,6 @@ fn force_gradient(lambda: f64, every: u64) -> Integrator {
     integrator
 }
 
-/// Which settings are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
     /// Three, for tests.

@@ -11,7 +11,6 @@ use std::time::Instant;
 /// How long everything is timed for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// Rounds.
     pub rounds: usize,
     /// Seconds of a setting in a round, if that is enough for the fewest steps.
     pub seconds: f64,
@@ -19,7 +18,6 @@ pub struct Pace {
 
 /// Whole cycles of what the native runner does at every so many steps.
 const CYCLE: u64 = psidpd_dynamics::run::REORDERING;
-/// Most steps.
 const MOST: u64 = 1 << 16;
 
 /// Wall seconds for a unit of simulated time: of every setting, in every round.
@@ -62,7 +60,6 @@ pub fn time(
     Ok(found)
 }
 
-/// Seconds for a step.
 fn native(origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ExperimentError> {
     let physics = &setting.physics;
     let dt = origin.dt(physics);

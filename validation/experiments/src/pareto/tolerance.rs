@@ -56,7 +56,6 @@ impl std::fmt::Display for Tolerance {
     }
 }
 
-/// By name.
 pub fn by_name<S: Serializer>(tolerances: &[Tolerance], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(tolerances.iter().map(|t| (&t.name, t.bound)))
 }
@@ -64,7 +63,6 @@ pub fn by_name<S: Serializer>(tolerances: &[Tolerance], serializer: S) -> Result
 /// An error held against its bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worst {
-    /// Of which quantity.
     pub quantity: String,
     /// The error over its bound, as it is shown.
     pub ratio: f64,

@@ -4,11 +4,8 @@ use std::str::FromStr;
 /// A key and the values that it takes in turn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// The key.
     pub key: String,
-    /// It with each of its values.
     pub edits: Vec<Edit>,
-    /// As it was written.
     pub text: String,
 }
 

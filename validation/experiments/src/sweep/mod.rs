@@ -18,38 +18,29 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// What is swept, and how.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The scene file.
     pub scene: PathBuf,
     /// Values that all runs have.
     pub edits: Vec<Edit>,
-    /// The keys and their values.
     pub axes: Vec<Axis>,
     /// Folder of the runs, `sweep.csv` and `report.html`.
     pub out: PathBuf,
     /// How many runs go on side by side.
     pub jobs: NonZeroUsize,
-    /// Threads of each.
     pub threads: NonZeroUsize,
     /// Whether runs that are there are replaced; else they go on, and finished ones are taken as they are.
     pub overwrite: bool,
 }
 
-/// One run of a sweep.
 #[derive(Debug, Clone, Serialize)]
 pub struct Point {
-    /// Its keys with their values.
     #[serde(serialize_with = "shown")]
     pub edits: Vec<Edit>,
-    /// Its folder.
     pub folder: PathBuf,
     /// What it measured; nothing if it failed or was stopped.
     pub headline: Headline,
-    /// Why it has no results.
     pub error: Option<String>,
-    /// Whether it came to its end.
     pub finished: bool,
 }
 
@@ -60,7 +51,6 @@ fn shown<S: serde::Serializer>(edits: &[Edit], to: S) -> Result<S::Ok, S::Error>
 /// The table of a sweep, in its folder.
 const TABLE: &str = "sweep.csv";
 
-/// The most runs of a sweep.
 const MOST: usize = 10_000;
 
 /// Runs all points, each in its own folder, until they are done or `stop` is set. `tell` hears of each that ended, with how

@@ -37,7 +37,6 @@ pub fn csv(axes: &[Axis], points: &[Point]) -> String {
     text
 }
 
-/// A field of the table.
 pub(super) fn quoted(text: &str) -> String {
     match text.contains([',', '"', '\n']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
