@@ -149,6 +149,16 @@ mod tests {
         }
     }
 
+    /// The difference of the farthest positions is beyond all numbers.
+    #[test]
+    fn particles_at_the_ends_of_all_numbers_hide_no_pair() {
+        let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
+        let x = [[-1.7e308; 3], [0.1, 0.2, 0.3], [1.7e308; 3], [0.1, 0.2, 0.8]];
+        let mut found = Vec::new();
+        for_each_pair(&x, &open, 3, 1.0, |p| found.push((p.i, p.j, p.r)));
+        assert_eq!(found, [(1, 3, 0.5)]);
+    }
+
     #[test]
     fn pairs_are_those_of_brute_force() {
         let skew = Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 3.0);

@@ -69,7 +69,8 @@ impl CellSearch {
         loop {
             for c in 0..3 {
                 let cells = if c < dimensions { ((high[c] - low[c]) / width[c]).floor() } else { 1.0 };
-                self.cells[c] = cells.clamp(1.0, most) as usize;
+                // An extent beyond all numbers over such a width is NaN, which `max` replaces.
+                self.cells[c] = cells.max(1.0).min(most) as usize;
             }
             let total: f64 = self.cells.iter().map(|n| *n as f64).product();
             if total <= most {
