@@ -1,25 +1,16 @@
 //! Error messages for people: what is wrong, where (with the line of the file), and what to do.
 
-use super::Lost;
+use super::error::CliError;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::RunError;
 use psidpd_experiments::ExperimentError;
-use psidpd_formats::files::WriteError;
 use psidpd_lammps_host::LammpsError;
 use std::path::PathBuf;
 
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;
-
-/// The error of a finished run whose results cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[error("the run in {} is finished, but {cause}", folder.display())]
-pub struct Unwritten {
-    pub folder: PathBuf,
-    pub cause: WriteError,
-}
 
 /// The error of a verb.
 #[derive(Debug)]
@@ -46,7 +37,8 @@ impl Failure {
     /// The exit code is 1 for a run that stopped and for lost results, 2 for bad input.
     pub fn exit_code(&self) -> u8 {
         let stopped = run_error(&*self.error).is_some_and(RunError::is_stop);
-        if stopped || self.error.is::<Lost>() || self.error.is::<Unwritten>() { 1 } else { 2 }
+        let lost = matches!(self.error.downcast_ref(), Some(CliError::Lost(_) | CliError::Unwritten { .. }));
+        if stopped || lost { 1 } else { 2 }
     }
 
     /// Renders the error for the terminal, with escape sequences for colour. An error about a file shows the line.

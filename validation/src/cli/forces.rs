@@ -1,9 +1,10 @@
+use super::error::CliError;
 use super::inputs::Files;
 use super::say;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::engine::Want;
-use psidpd_dynamics::run::{Simulation, State, StateError};
+use psidpd_dynamics::run::{Simulation, State};
 use psidpd_formats::data::DataFile;
 use psidpd_report::Table;
 use serde::Serialize;
@@ -31,22 +32,6 @@ impl Arguments {
     }
 }
 
-/// The error of a data file whose state does not fit the model.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}: {error}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
-struct NoState {
-    path: PathBuf,
-    line: Option<usize>,
-    error: StateError,
-}
-
-impl NoState {
-    fn of(path: &Path, error: &StateError) -> NoState {
-        let line = error.atom.and_then(|id| DataFile::line_of(path, id));
-        NoState { path: path.to_owned(), line, error: error.clone() }
-    }
-}
-
 /// The content of the file of `--json`.
 #[derive(Debug, Serialize)]
 struct Forces {
@@ -62,7 +47,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let (model, kt) = arguments.settings.model(&arguments.model)?;
     let mut data = DataFile::read(&arguments.data)?;
     data.sort_by_id();
-    let state = State::from_data(&data, &model).map_err(|error| NoState::of(&arguments.data, &error))?;
+    let state = State::from_data(&data, &model).map_err(|error| {
+        let line = error.atom.and_then(|id| DataFile::line_of(&arguments.data, id));
+        CliError::NoState { path: arguments.data.clone(), line, error }
+    })?;
     let mut simulation = Simulation::new(&model, kt.unwrap_or(arguments.kt), state, 1)?;
     // Other codes are compared with the plain sum over pairs.
     simulation.use_pair_sums_only(true);

@@ -1,5 +1,6 @@
 //! No verb overwrites a file that it reads.
 
+use super::error::CliError;
 use psidpd_core::document::{Document, Section, Value};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -11,11 +12,6 @@ pub struct Files {
     reads: Vec<PathBuf>,
     writes: Vec<PathBuf>,
 }
-
-/// The error of an output file that is also an input file.
-#[derive(Debug, thiserror::Error)]
-#[error("{} is an input of this verb and would be overwritten: choose another place for the results", .0.display())]
-pub struct WrittenOver(PathBuf);
 
 /// The depth of references: a scene names a model, and a model names tables.
 const DEEPEST: usize = 2;
@@ -43,13 +39,13 @@ impl Files {
 
     /// # Errors
     /// The function fails if a file is both an input and an output.
-    pub fn check(&self, json: Option<&Path>) -> Result<(), WrittenOver> {
+    pub fn check(&self, json: Option<&Path>) -> Result<(), CliError> {
         let id =
             |path: &Path| std::fs::metadata(path).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));
         let read: Vec<_> = self.reads.iter().filter_map(|path| id(path)).collect();
         let mut writes = self.writes.iter().map(PathBuf::as_path).chain(json);
         let both = writes.find(|path| id(path).is_some_and(|id| read.contains(&id)));
-        both.map_or(Ok(()), |path| Err(WrittenOver(path.to_owned())))
+        both.map_or(Ok(()), |path| Err(CliError::WrittenOver(path.to_owned())))
     }
 }
 

@@ -8,6 +8,7 @@ mod bench;
 mod calibrate;
 mod check;
 mod diagnostic;
+mod error;
 mod examples;
 mod export;
 mod forces;
@@ -30,6 +31,7 @@ mod validate;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use diagnostic::Failure;
+use error::CliError;
 use inputs::Files;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_formats::files::WriteError;
@@ -134,7 +136,7 @@ fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             // A closed terminal or pipe is not an error.
             match error.print() {
                 Err(lost) if code == 0 && lost.kind() != ErrorKind::BrokenPipe => {
-                    complain(&Lost(lost).into(), Caller::Neither)
+                    complain(&CliError::Lost(lost).into(), Caller::Neither)
                 }
                 _ => code,
             }
@@ -155,7 +157,7 @@ fn carry_out(arguments: Arguments) -> u8 {
         .map_err(Failure::from)
         .and_then(|()| run_verb(&arguments.verb, json))
         .map_err(|failure| failure.of(files.given()))
-        .and_then(|verdict| say::lost().map_or(Ok(verdict), |cause| Err(Lost(cause).into())));
+        .and_then(|verdict| say::lost().map_or(Ok(verdict), |cause| Err(CliError::Lost(cause).into())));
     match outcome {
         Ok(Verdict::Good) => 0,
         Ok(Verdict::CheckFailed) => 1,
@@ -170,11 +172,6 @@ fn complain(failure: &Failure, caller: Caller) -> u8 {
     let _ = writeln!(anstream::stderr(), "{}", failure.render(caller));
     failure.exit_code()
 }
-
-/// The error of output that is lost although the work is done.
-#[derive(Debug, thiserror::Error)]
-#[error("standard output cannot be written, and a part of the output is lost: {0}")]
-struct Lost(std::io::Error);
 
 impl Verb {
     /// The input and output files, for verbs that read files named by the user.

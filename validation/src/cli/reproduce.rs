@@ -1,3 +1,4 @@
+use super::error::CliError;
 use super::run::threads_at_once;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
@@ -36,11 +37,6 @@ pub struct Arguments {
     #[arg(skip)]
     pub(super) fault: Option<Fault>,
 }
-
-/// The error of an unknown case.
-#[derive(Debug, thiserror::Error)]
-#[error("there is no case {0}: psidpd reproduce --list shows all")]
-struct Unknown(String);
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let chosen = choose(&arguments.ids)?;
@@ -105,7 +101,7 @@ fn choose(ids: &[String]) -> Result<Vec<&'static Case>, Failure> {
             None => all.iter().copied().filter(|case| case.id.starts_with(&prefix)).collect(),
         };
         if some.is_empty() {
-            return Err(Unknown(id.clone()).into());
+            return Err(CliError::UnknownCase(id.clone()).into());
         }
         chosen.extend(
             some.into_iter().filter(|case| chosen.iter().all(|c| c.id != case.id)).collect::<Vec<_>>(),

@@ -1,4 +1,4 @@
-use super::diagnostic::Unwritten;
+use super::error::CliError;
 use super::inputs::Files;
 use super::say::{self, whoever_listens as say};
 use super::{Failure, Settings, Verdict, write_json};
@@ -153,7 +153,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             say(&format!("written to {}", out.display()));
             let results =
                 Report { summary: &summary, timing: &timing, headline: &found, advice: advice.as_ref() };
-            write_json(json, &results).map_err(|cause| Unwritten { folder: out.clone(), cause })?;
+            write_json(json, &results).map_err(|cause| CliError::Unwritten { folder: out.clone(), cause })?;
             Ok(Verdict::Good)
         }
         Outcome::Interrupted { stop, step, steps } => {
