@@ -56,13 +56,7 @@ impl<'a> Options<'a> {
 
     /// A number above zero.
     pub fn positive(&self, key: &str) -> Result<Option<f64>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        let number = value.number()?.value;
-        if number > 0.0 {
-            Ok(Some(number))
-        } else {
-            Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}"))))
-        }
+        self.get(key).map(|value| value.positive()).transpose()
     }
 
     /// A number from `low` to `high`.

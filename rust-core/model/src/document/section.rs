@@ -151,6 +151,14 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// Reads a number above zero.
+    pub fn positive(&self) -> Result<f64, FileError> {
+        match self.number()?.value {
+            x if x > 0.0 => Ok(x),
+            x => Err(self.error(FileErrorKind::Value(format!("must be positive, is {x}")))),
+        }
+    }
+
     /// Reads the value if it is a number; fails if the number is not finite.
     pub fn as_number(&self) -> Option<Result<f64, FileError>> {
         let number = match &self.value.content {

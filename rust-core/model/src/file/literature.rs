@@ -22,16 +22,8 @@ pub fn read(root: &Section) -> Result<Vec<Published>, FileError> {
     let mut all = Vec::new();
     for item in list.array()? {
         let table = item.section()?;
-        let positive = |key: &str| {
-            let Some(value) = table.get(key) else { return Ok(None) };
-            match value.number()?.value {
-                x if x > 0.0 => Ok(Some(x)),
-                x => Err(value.error(FileErrorKind::Value(format!("must be positive, is {x}")))),
-            }
-        };
-        table.require("kT")?;
-        let kt = positive("kT")?.unwrap_or(f64::NAN);
-        let density = positive("density")?;
+        let kt = table.require("kT")?.positive()?;
+        let density = table.get("density").map(|value| value.positive()).transpose()?;
         let mut values = Vec::new();
         for name in QUANTITIES {
             let Some(value) = table.get(name) else { continue };

@@ -1,6 +1,6 @@
 //! The units of a model's numbers.
 
-use crate::document::{FileError, FileErrorKind, Section};
+use crate::document::{FileError, Section};
 
 /// The units of a model, in SI. The unit of time is `length √(mass/energy)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,12 +19,6 @@ pub fn read(root: &Section) -> Result<Option<Units>, FileError> {
         return Ok(None);
     };
     let table = value.section()?;
-    let positive = |key: &str| {
-        let value = table.require(key)?;
-        match value.number()?.value {
-            number if number > 0.0 && number.is_finite() => Ok(number),
-            number => Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}")))),
-        }
-    };
+    let positive = |key: &str| table.require(key)?.positive();
     Ok(Some(Units { length: positive("length")?, mass: positive("mass")?, energy: positive("energy")? }))
 }

@@ -1,6 +1,5 @@
 //! `lattice` and `min_distance`: the arrangement of particles in a region.
 
-use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +41,7 @@ impl Arrangement {
         let lattice = section.get("lattice").map(|v| v.one_of("lattice", names)).transpose()?;
         match (lattice, section.get("min_distance")) {
             (None, None) => Ok(Arrangement::Random { min_distance: 0.0 }),
-            (None, Some(value)) => Ok(Arrangement::Random { min_distance: positive(&value)? }),
+            (None, Some(value)) => Ok(Arrangement::Random { min_distance: value.positive()? }),
             (Some(lattice), None) => Ok(Arrangement::Lattice(lattice.value)),
             (Some(_), Some(value)) => {
                 let message =

@@ -1,6 +1,5 @@
 //! `[box]`, or `box = …`: the lengths and boundaries of the box.
 
-use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 
@@ -44,7 +43,7 @@ fn build(value: &Value, dimensions: usize, periodic: [bool; 3]) -> Result<Period
 fn read_lengths(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {
     let third = |z: f64| if dimensions == 2 { 1.0 } else { z };
     if value.as_number().is_some() {
-        let length = positive(value)?;
+        let length = value.positive()?;
         return Ok([length, length, third(length)]);
     }
     match dimensions {

@@ -2,7 +2,6 @@
 
 use super::arrangement::{Arrangement, Lattice};
 use super::domain;
-use super::number::positive;
 use super::part::{Common, Part, WHOLE};
 use super::saved;
 use super::velocities::Velocities;
@@ -108,7 +107,7 @@ fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox),
     let common = Common::of(root, model, &domain)?;
     let parts = match (parts, density) {
         (Some(parts), _) => common.parts(&parts)?,
-        (None, Some(density)) => vec![common.everywhere(&density, positive(&density)?)?],
+        (None, Some(density)) => vec![common.everywhere(&density, density.positive()?)?],
         (None, None) => Vec::new(),
     };
     Ok((Initial::Parts(parts), domain))

@@ -2,7 +2,6 @@
 
 use super::Initial;
 use super::composition::unknown_species;
-use super::number::positive;
 use psidpd_core::document::{FileError, Section};
 
 /// Reads the masses; by default those of the data file, or 1.
@@ -18,7 +17,7 @@ pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec
             let kind = unknown_species(&name.value, species);
             return Err(name.error(section.source(), kind));
         };
-        mass[index] = positive(&value)?;
+        mass[index] = value.positive()?;
     }
     Ok(mass)
 }

@@ -41,7 +41,6 @@ pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
 use crate::particles::{BodyForce, State, Tags};
-use number::positive;
 use psidpd_core::document::keys::{of_another_kind, read_known};
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{LocalEnergy, PeriodicBox, Plan, Precision};
@@ -122,7 +121,7 @@ impl Scene {
         let root = document.root();
         let title = root.get("title").map(|value| value.string()).transpose()?;
         let (model_path, model) = read_model(&root.require("model")?, base, of_model)?;
-        let kt = positive(&root.require("kT")?)?;
+        let kt = root.require("kT")?.positive()?;
         let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
         let (initial, domain) = initial::read(&root, &model, base)?;

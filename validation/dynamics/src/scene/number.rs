@@ -1,16 +1,6 @@
-//! Numbers with a range, vectors and names of directions.
+//! Vectors and names of directions.
 
-use psidpd_core::document::{FileError, FileErrorKind, Value};
-
-/// Reads a number above zero.
-pub fn positive(value: &Value) -> Result<f64, FileError> {
-    let number = value.number()?.value;
-    if number > 0.0 {
-        Ok(number)
-    } else {
-        Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}"))))
-    }
-}
+use psidpd_core::document::{FileError, Value};
 
 /// Reads one number for each dimension; in two dimensions the third is 0.
 pub fn vector(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {

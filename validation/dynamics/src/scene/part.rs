@@ -2,7 +2,7 @@
 
 use super::arrangement::Arrangement;
 use super::composition::Composition;
-use super::number::{positive, vector};
+use super::number::vector;
 use super::shape::{Shape, Shapes};
 use super::velocities::Velocities;
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
@@ -44,7 +44,7 @@ pub struct Common<'a> {
 impl<'a> Common<'a> {
     /// Collects the shared data of the scene `root`.
     pub fn of(root: &Section, model: &'a Model, domain: &'a PeriodicBox) -> Result<Common<'a>, FileError> {
-        let density = root.get("density").map(|value| positive(&value)).transpose()?;
+        let density = root.get("density").map(|value| value.positive()).transpose()?;
         Ok(Common { model, shapes: Shapes { dimensions: model.dimensions(), domain }, density })
     }
 
@@ -88,7 +88,7 @@ impl<'a> Common<'a> {
                 Err(count.error(FileErrorKind::Value(message)))
             }
             (Some(density), None, _) => {
-                let count = (positive(&density)? * volume).round();
+                let count = (density.positive()? * volume).round();
                 check_count(count, |kind| density.error(kind))
             }
             (None, Some(count), _) => check_count(count.count()?.value as f64, |kind| count.error(kind)),

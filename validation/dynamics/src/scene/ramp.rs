@@ -3,7 +3,6 @@
 //! Each level is a stage of its own, because ψ may depend on kT: forces are computed anew at its start, and a
 //! LAMMPS input has a `run` for it.
 
-use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
 /// Number of levels of a ramp without `levels`.
@@ -30,10 +29,10 @@ pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, 
             let message = "only a ramp has levels, and kT is one temperature".to_owned();
             return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] is a ramp"));
         }
-        let kt = value.map_or(Ok(scene_kt), |value| positive(&value))?;
+        let kt = value.map_or(Ok(scene_kt), |value| value.positive())?;
         return Ok(vec![Level { number: None, steps, kt }]);
     };
-    let ends: Vec<f64> = ends.iter().map(positive).collect::<Result<_, _>>()?;
+    let ends: Vec<f64> = ends.iter().map(|end| end.positive()).collect::<Result<_, _>>()?;
     let [from, to] = ends[..] else {
         let message = format!("expected a temperature, or two of a ramp, found {}", ends.len());
         return Err(section.require("kT")?.error(FileErrorKind::Value(message)));

@@ -1,6 +1,5 @@
 //! `[[stage]]`, or `steps` at the top level: the stages of a run.
 
-use super::number::positive;
 use super::ramp;
 use crate::integrator::{Integrator, Settings, THERMOSTAT_STEPS};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
@@ -50,7 +49,7 @@ struct Defaults {
 pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
     let defaults = Defaults {
         kt,
-        dt: root.get("dt").map_or(Ok(DEFAULT_DT), |value| positive(&value))?,
+        dt: root.get("dt").map_or(Ok(DEFAULT_DT), |value| value.positive())?,
         integrator: read_integrator(root, Integrator::default())?,
     };
     let stages = read_all(root, defaults)?;
@@ -142,7 +141,7 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
     let steps = read_steps(&section.require("steps")?)?;
     let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean().map(|b| b.value));
     let integrator = read_integrator(section, defaults.integrator)?;
-    let dt = section.get("dt").map_or(Ok(defaults.dt), |value| positive(&value))?;
+    let dt = section.get("dt").map_or(Ok(defaults.dt), |value| value.positive())?;
     let stage = Stage {
         name,
         level: None,
@@ -217,7 +216,7 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
             *sweeps = read_steps(&value)?;
         }
         if let Some(value) = move_key {
-            *max_move = Some(positive(&value)?);
+            *max_move = Some(value.positive()?);
         }
     }
     let noise = noise.or(coupling.map(|coupling| &mut coupling.noise));

@@ -1,7 +1,7 @@
 //! The keys of a region.
 
 use super::Shape;
-use crate::scene::number::{axis, positive, vector};
+use crate::scene::number::{axis, vector};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 
@@ -41,7 +41,7 @@ impl Shapes<'_> {
             "layer" => self.read_layer(section)?,
             "sphere" => Shape::Sphere {
                 center: self.read_center(section)?,
-                radius: positive(&section.require("radius")?)?,
+                radius: section.require("radius")?.positive()?,
             },
             "cylinder" if self.dimensions == 3 => self.read_cylinder(section)?,
             "rest" => {
@@ -134,10 +134,10 @@ impl Shapes<'_> {
     fn read_cylinder(&self, section: &Section) -> Result<Shape, FileError> {
         let axis = self.read_axis(section)?;
         let length = match section.get("length") {
-            Some(value) => positive(&value)?,
+            Some(value) => value.positive()?,
             None => self.domain.lengths()[axis],
         };
-        let radius = positive(&section.require("radius")?)?;
+        let radius = section.require("radius")?.positive()?;
         Ok(Shape::Cylinder { axis, center: self.read_center(section)?, radius, length })
     }
 
@@ -147,7 +147,7 @@ impl Shapes<'_> {
 
     fn read_thickness(&self, section: &Section, axis: usize) -> Result<f64, FileError> {
         let value = section.require("thickness")?;
-        let thickness = positive(&value)?;
+        let thickness = value.positive()?;
         let length = self.domain.lengths()[axis];
         if thickness > length {
             let message = format!("must not exceed the box, {length} long, is {thickness}");
