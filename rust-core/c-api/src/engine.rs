@@ -11,6 +11,8 @@ use std::ffi::{CString, c_char};
 /// threads may use different ones.
 pub struct Engine {
     pub(super) engine: engine::Engine,
+    /// Forces of psidpd_engine_first, which psidpd_engine_second adds to the host's.
+    pub(super) first_forces: Vec<[f64; 3]>,
     plan_text: CString,
     path_text: CString,
     /// The setting of psidpd_engine_sum_all_densities.
@@ -188,6 +190,7 @@ impl Engine {
         let plan_text = c_text(&engine.plan().to_string());
         out.put(Box::into_raw(Box::new(Engine {
             engine,
+            first_forces: Vec::new(),
             plan_text,
             path_text: CString::default(),
             all_densities: false,
@@ -428,7 +431,7 @@ pub unsafe extern "C" fn psidpd_engine_densities(
         let want = engine::Want { densities: engine.all_densities, ..engine::Want::FORCES };
         let request = engine::Request { particles, v: &[], step: None, want };
         engine.engine.use_pair_sums_only(true);
-        let found = engine.engine.first(engine::Surroundings::ghosts(newton), &request);
+        let found = engine.engine.first(engine::Surroundings::ghosts(newton), &request, &mut []);
         engine.engine.use_pair_sums_only(false);
         found?;
         engine.state = State::Densities;
@@ -519,7 +522,7 @@ pub unsafe extern "C" fn psidpd_engine_forces(
         let request = engine::Request { particles, v, step, want };
         // If the evaluation panics the engine has no results; after an error the state is set below.
         engine.state = State::Nothing;
-        let sums = engine.engine.second(&request, force, true);
+        let sums = engine.engine.second(&request, force);
         engine.state = State::Densities;
         let sums = sums?;
         if let Some(out) = out {

@@ -247,7 +247,10 @@ pub unsafe extern "C" fn psidpd_engine_second(
         let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
         let request = engine::Request { particles, v, step, want };
         engine.state = State::Nothing;
-        let sums = engine.engine.second(&request, force, true)?;
+        let sums = engine.engine.second(&request, force)?;
+        for (force, first) in force.iter_mut().zip(&engine.first_forces) {
+            (0..3).for_each(|c| force[c] += first[c]);
+        }
         engine.state = State::Whole;
         if let Some(out) = out {
             out.put(Tally::of(&sums));
@@ -258,7 +261,9 @@ pub unsafe extern "C" fn psidpd_engine_second(
 
 fn first(engine: &mut Engine, surroundings: Surroundings, request: &engine::Request) -> Result<(), Failure> {
     engine.state = State::Nothing;
-    engine.engine.first(surroundings, request)?;
+    engine.first_forces.clear();
+    engine.first_forces.resize(request.particles.owned, [0.0; 3]);
+    engine.engine.first(surroundings, request, &mut engine.first_forces)?;
     engine.state = State::First;
     Ok(())
 }
