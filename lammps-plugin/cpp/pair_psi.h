@@ -95,7 +95,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   Extent extent() const;
   bool is_alone(const Extent &extent) const;
   void find_images();
-  void find_densities(int all, const Request &request);
+  void find_densities(int all, const Request &request, rust::Slice<double> f);
   void collect_pairs();
   // Whether special_bonds gives bonded neighbors factors other than 1.
   bool is_scaled() const;

@@ -70,7 +70,8 @@ rust::Slice<const bool> PairPsi::left_out(Extent &extent, const Request &request
   return {};
 }
 
-void PairPsi::find_densities(int all, const Request &request)
+// Densities and slopes; without a neighbor list also all forces but those of the slopes of ghosts.
+void PairPsi::find_densities(int all, const Request &request, rust::Slice<double> f)
 {
   const size_t owned = atom->nlocal;
   const auto x = flat(atom->x, all);
@@ -80,7 +81,7 @@ void PairPsi::find_densities(int all, const Request &request)
     Extent extent = this->extent();
     const auto images = left_out(extent, request);
     style_densities(**style, extent, images, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
-                    request);
+                    request, f);
     return;
   }
   collect_pairs();
@@ -162,7 +163,7 @@ void PairPsi::compute(int eflag, int vflag)
     });
     without_slopes = {atom->nlocal, atom->nghost};
   } else {
-    attempt([&] { find_densities(all, request); });
+    attempt([&] { find_densities(all, request, f); });
     forward();
     totals = attempt([&] { return style_forces(fluid, owned, x, v, tag, kind, request, f); });
     without_slopes = {-1, -1};

@@ -162,7 +162,7 @@ mod ffi {
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
-        /// `images` flags ghosts to be left out: see `Around`.
+        /// Adds all forces but those of the slopes of ghosts. `images` flags ghosts to be left out: see `Around`.
         #[allow(clippy::too_many_arguments)]
         fn style_densities(
             style: &mut Style,
@@ -175,6 +175,7 @@ mod ffi {
             kind: &[i32],
             newton: bool,
             request: &Request,
+            f: &mut [f64],
         ) -> Result<()>;
         #[allow(clippy::too_many_arguments)]
         fn densities_of_pairs(
@@ -403,10 +404,11 @@ fn style_densities(
     kind: &[i32],
     newton: bool,
     request: &ffi::Request,
+    f: &mut [f64],
 ) -> Result<(), StyleError> {
     let (step, want) = wanted(request);
     let domain = style.scale().domain(domain_of(extent)?);
-    style.densities(Around { domain: &domain, images }, owned, x, v, tag, kind, newton, step, want)
+    style.densities(Around { domain: &domain, images }, owned, x, v, tag, kind, newton, step, want, f)
 }
 
 #[allow(clippy::too_many_arguments)]

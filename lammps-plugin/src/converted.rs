@@ -2,7 +2,7 @@
 
 use crate::error::StyleError;
 use crate::units::Scale;
-use psidpd_core::engine::{EngineError, Step, Tally};
+use psidpd_core::engine::{EngineError, Step};
 
 /// Positions and velocities in units of the model, and results in those of LAMMPS.
 #[derive(Debug, Default)]
@@ -50,25 +50,22 @@ pub struct Taken<'a> {
 }
 
 impl Taken<'_> {
-    /// Runs `evaluate` on forces in units of the model, adds them to `f`, and returns its totals.
-    pub fn add_forces(
+    /// Runs `evaluate` on forces in units of the model, and adds them to `f`.
+    pub fn add_forces<R>(
         self,
         scale: &Scale,
         f: &mut [f64],
-        evaluate: impl FnOnce(&mut [[f64; 3]]) -> Result<Tally, EngineError>,
-    ) -> Result<Tally, StyleError> {
+        evaluate: impl FnOnce(&mut [[f64; 3]]) -> Result<R, EngineError>,
+    ) -> Result<R, StyleError> {
         if scale.is_one() {
             return Ok(evaluate(f.as_chunks_mut::<3>().0)?);
         }
         self.forces.clear();
         self.forces.resize(f.len(), 0.0);
-        let mut tally = evaluate(self.forces.as_chunks_mut::<3>().0)?;
+        let result = evaluate(self.forces.as_chunks_mut::<3>().0)?;
         for (f, force) in f.iter_mut().zip(&*self.forces) {
             *f += scale.force() * force;
         }
-        tally.excess *= scale.energy;
-        tally.pair *= scale.energy;
-        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= scale.energy);
-        Ok(tally)
+        Ok(result)
     }
 }

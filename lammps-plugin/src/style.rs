@@ -237,12 +237,12 @@ impl Style {
             let taken = converted.take(scale, x, v, step);
             let particles = Particles { owned: tag.len(), x: triples(taken.x), tag, kind };
             let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            taken.add_forces(scale, f, |f| engine.forces(domain, &request, f, true))
+            Ok(scale.tally(taken.add_forces(scale, f, |f| engine.forces(domain, &request, f, true))?))
         })
     }
 
-    /// First half of an evaluation, over the first `owned` particles of LAMMPS's arrays: pairs, forces
-    /// that need no density, densities, ψ and slopes.
+    /// First half of an evaluation, over the first `owned` particles of LAMMPS's arrays: adds to `f` all
+    /// forces but those of the slopes of ghosts.
     ///
     /// # Errors
     /// Fails as [`Engine::first`].
@@ -258,6 +258,7 @@ impl Style {
         newton: bool,
         step: Option<Step>,
         want: Want,
+        f: &mut [f64],
     ) -> Result<(), StyleError> {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
@@ -265,11 +266,12 @@ impl Style {
             let taken = converted.take(scale, x, v, step);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
             let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            Ok(engine.first(Surroundings::Ghosts(around, newton), &request)?)
+            let surroundings = Surroundings::Ghosts(around, newton);
+            taken.add_forces(scale, f, |f| engine.first(surroundings, &request, f))
         })
     }
 
-    /// First half of an evaluation, as [`Style::densities`], with pairs that LAMMPS lists.
+    /// First half of an evaluation, with pairs that LAMMPS lists: all forces are added in the second half.
     ///
     /// # Errors
     /// Fails as [`Engine::first`].
@@ -289,7 +291,7 @@ impl Style {
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
             // For listed pairs the request for energies and virials comes with the second half.
             let request = Request { particles, v: &[], step: None, want: Want::FORCES };
-            Ok(engine.first(Surroundings::Listed(*listed, newton), &request)?)
+            Ok(engine.first(Surroundings::Listed(*listed, newton), &request, &mut [])?)
         })
     }
 
@@ -363,7 +365,7 @@ impl Style {
         })
     }
 
-    /// Second half of an evaluation: adds the forces to `f`.
+    /// Second half of an evaluation: adds the rest of the forces to `f`.
     ///
     /// # Errors
     /// Fails as [`Engine::second`].
@@ -384,7 +386,7 @@ impl Style {
             let taken = converted.take(scale, x, v, step);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
             let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            taken.add_forces(scale, f, |f| engine.second(&request, f, true))
+            Ok(scale.tally(taken.add_forces(scale, f, |f| engine.second(&request, f))?))
         })
     }
 }

@@ -1,6 +1,6 @@
 //! From the units of LAMMPS to those of a model.
 
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{PeriodicBox, Tally};
 use psidpd_core::model::Units;
 
 /// One unit of the model in units of LAMMPS.
@@ -66,6 +66,14 @@ impl Scale {
 
     pub fn force(&self) -> f64 {
         self.energy / self.length
+    }
+
+    /// Converts energies and virials to units of LAMMPS.
+    pub fn tally(&self, mut tally: Tally) -> Tally {
+        tally.excess *= self.energy;
+        tally.pair *= self.energy;
+        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= self.energy);
+        tally
     }
 
     /// Converts the box of LAMMPS to units of the model.

@@ -6,7 +6,8 @@
 //!     target/release/examples/instructions mdpd mixed avx2 8
 //! ```
 //!
-//! With `ghosts` as last word the particles are those of a rank that has ghosts along z.
+//! With a number of sides as fifth word the particles are those of a rank that has ghosts on 2 (along z), 4
+//! or 6 sides; the sixth word is the number of particles, 2000 unless given.
 //!
 //! The difference between runs of different length is the cost of the additional evaluations. The
 //! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
@@ -14,7 +15,7 @@
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
-use setup::{Cloud, Rank, choose, sweep};
+use setup::{Cloud, Rank, choose, faces, sweep};
 use std::process::ExitCode;
 
 const COUNT: usize = 2000;
@@ -25,7 +26,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [ghosts]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES [PARTICLES]]"
             );
             ExitCode::FAILURE
         }
@@ -33,24 +34,26 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[String]) -> Result<(), String> {
-    let [fluid, precision, instructions, evaluations, ghosts @ ..] = arguments else {
+    let [fluid, precision, instructions, evaluations, rest @ ..] = arguments else {
         return Err("four arguments are needed".into());
     };
     let (subject, precision, set) = choose(fluid, precision, instructions)?;
     let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
     let fluid = subject.fluid();
     let mut sweep = sweep(&fluid, precision, set);
-    let force = match ghosts {
-        [] => {
-            let mut cloud = Cloud::new(subject, &fluid, COUNT);
+    let faces = faces(rest.first())?;
+    let count = rest.get(1).map_or(Ok(COUNT), |n| n.parse()).map_err(|_| "PARTICLES is a number")?;
+    let force = match faces {
+        0 => {
+            let mut cloud = Cloud::new(subject, &fluid, count);
             for _ in 0..evaluations {
                 cloud.drift();
                 cloud.evaluate(&mut sweep);
             }
             cloud.force
         }
-        [word] if word == "ghosts" => {
-            let mut rank = Rank::new(subject, &fluid, COUNT);
+        faces => {
+            let mut rank = Rank::new(subject, &fluid, count, faces);
             rank.find_ghosts(sweep.plan().cutoff());
             for _ in 0..evaluations {
                 rank.drift();
@@ -58,8 +61,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
             }
             rank.cloud.force
         }
-        _ => return Err("the last word, if there is a fifth, is ghosts".into()),
     };
-    println!("{COUNT} {}", force.iter().map(|f| f[0].abs()).sum::<f64>());
+    println!("{count} {}", force.iter().map(|f| f[0].abs()).sum::<f64>());
     Ok(())
 }

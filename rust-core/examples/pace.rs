@@ -1,15 +1,16 @@
-//! Times the parts of evaluations of forces, in nanoseconds for each particle and step: the fastest of
-//! several rounds, after the fluid has come to equilibrium.
+//! Times the parts of evaluations of forces, in nanoseconds for each owned particle and step: the fastest of
+//! several rounds, after the fluid has come to equilibrium; and the memory for each, in bytes.
 //!
 //! `cargo run --release -p psidpd-core --example pace mdpd mixed avx512 1 6050`
 //!
-//! With `ghosts` as last word the evaluations are those of a rank that has ghosts along z.
+//! With a number of sides as last word the evaluations are those of a rank that has ghosts on 2 (along z), 4
+//! or 6 sides, as each of 2, of 4, and of 8 or more ranks, without the noise of messages.
 
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
 use psidpd_core::engine::{Settings, Sweep, Times};
-use setup::{Cloud, Rank, choose};
+use setup::{Cloud, Rank, choose, faces};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -65,7 +66,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 THREADS PARTICLES [ghosts]"
+                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 THREADS PARTICLES [FACES]"
             );
             ExitCode::FAILURE
         }
@@ -73,21 +74,17 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[String]) -> Result<(), String> {
-    let [fluid, precision, instructions, threads, count, ghosts @ ..] = arguments else {
+    let [fluid, precision, instructions, threads, count, rest @ ..] = arguments else {
         return Err("five arguments are needed".into());
     };
-    let ghosts = match ghosts {
-        [] => false,
-        [word] if word == "ghosts" => true,
-        _ => return Err("the last word, if there is a sixth, is ghosts".into()),
-    };
+    let faces = faces(rest.first())?;
     let (subject, precision, instructions) = choose(fluid, precision, instructions)?;
     let threads = threads.parse().map_err(|_| "THREADS is a number above 0")?;
     let count: usize = count.parse().map_err(|_| "PARTICLES is a number")?;
     let fluid = subject.fluid();
-    let mut particles = match ghosts {
-        true => Any::Rank(Box::new(Rank::new(subject, &fluid, count))),
-        false => Any::Cloud(Box::new(Cloud::new(subject, &fluid, count))),
+    let mut particles = match faces {
+        0 => Any::Cloud(Box::new(Cloud::new(subject, &fluid, count))),
+        _ => Any::Rank(Box::new(Rank::new(subject, &fluid, count, faces))),
     };
     let settings = Settings { precision, instructions, threads };
     let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;
@@ -118,7 +115,8 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let [all, sort, first, excess, second, forces, around] = best;
     println!(
         "evaluation {all:.1}: sort {sort:.1}, first pass {first:.1}, ψ {excess:.1}, second pass {second:.1}, \
-         forces out {forces:.1}; motion {around:.1}"
+         forces out {forces:.1}; motion {around:.1}; {} B",
+        sweep.memory() / count
     );
     Ok(())
 }

@@ -406,12 +406,12 @@ fn run_sweep(
     let edges = nalgebra::Matrix3::from_columns(&[0, 1, 2].map(|k| c.domain.edge(k).into()));
     let open = PeriodicBox::new(c.domain.origin(), edges, [false; 3]).unwrap();
     let around = psidpd_core::engine::Around { domain: &open, images: &[] };
-    sweep.first(around, &particles, &[], None, Want::TOTALS).unwrap();
+    sweep.first(around, &particles, &[], None, Want::TOTALS, &mut forces).unwrap();
     let width = sweep.slope_width();
     let mut slopes = sweep.slopes()[..owned * width].to_vec();
     images.forward(width, &mut slopes);
     sweep.slopes_mut().copy_from_slice(&slopes);
-    let tally = sweep.second(&particles, &mut forces, false).unwrap();
+    let tally = sweep.second(&particles, &mut forces).unwrap();
     (tally.energy(), forces, tally.virial)
 }
 

@@ -28,7 +28,7 @@ fn baseline() -> PathBuf {
 fn count(program: &Path, case: &[&str], evaluations: u32) -> (f64, f64) {
     let mut run = Command::new("valgrind");
     run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program);
-    // The arguments are fluid, precision and instruction set; after the number, whether there are ghosts.
+    // The arguments are fluid, precision and instruction set; after the number, the sides with ghosts.
     run.args(&case[..3]).arg(evaluations.to_string()).args(&case[3..]);
     let output = run.output().unwrap_or_else(|e| {
         panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
@@ -63,10 +63,10 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
         for precision in ["mixed", "double"] {
             for instructions in ["portable", "avx2"] {
                 // The additional cost of ghosts hardly depends on the instruction set.
-                let ghosts = if instructions == "avx2" { &[false, true][..] } else { &[false] };
-                for ghosts in ghosts {
+                let faces = if instructions == "avx2" { &[None, Some("6")][..] } else { &[None] };
+                for faces in faces {
                     let mut case = vec![fluid, precision, instructions];
-                    case.extend(ghosts.then_some("ghosts"));
+                    case.extend(faces);
                     let count = per_particle_step(&program, &case);
                     println!("{:<24} {count:8.1}", case.join(" "));
                     counts.insert(case.join(" "), (10.0 * count).round() / 10.0);

@@ -17,10 +17,10 @@ fn types_map_to_species_by_name() {
     let mut f = [0.0; 6];
     let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
     let around = Around { domain: &open, images: &[] };
-    s.densities(around, 2, &x, &[], &[1, 2], &[1, 2], true, None, Want::FORCES).unwrap();
+    s.densities(around, 2, &x, &[], &[1, 2], &[1, 2], true, None, Want::FORCES, &mut f).unwrap();
     s.forces(2, &x, &[], &[1, 2], &[1, 2], None, Want::FORCES, &mut f).unwrap();
     assert_eq!(f, [0.0; 6]);
-    s.densities(around, 2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES).unwrap();
+    s.densities(around, 2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES, &mut f).unwrap();
     s.forces(2, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
     assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
     // Without ghosts, forces are added to those in `f`.
@@ -118,7 +118,8 @@ fn hostile_arguments_are_errors() {
             let known = kind == 1;
             let around = Around { domain: &open, images: &[] };
             assert!(
-                s.densities(around, 2, &x, &v, &[1, 2], &kinds, true, step, Want::FORCES).is_ok() == known
+                s.densities(around, 2, &x, &v, &[1, 2], &kinds, true, step, Want::FORCES, &mut f).is_ok()
+                    == known
                     || kind == 0
             );
         }
@@ -126,7 +127,7 @@ fn hostile_arguments_are_errors() {
     let around = Around { domain: &open, images: &[true] };
     for owned in [0, 1, 2, 3, usize::MAX] {
         for (tags, kinds) in [(&[1, 2][..], &[1][..]), (&[1], &[1, 1]), (&[], &[])] {
-            let short = s.densities(around, owned, &x, &v, tags, kinds, true, step, Want::FORCES);
+            let short = s.densities(around, owned, &x, &v, tags, kinds, true, step, Want::FORCES, &mut f);
             assert!(short.is_err());
             assert!(s.forces(owned, &x, &v, tags, kinds, step, Want::FORCES, &mut f).is_err());
         }

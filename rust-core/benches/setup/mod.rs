@@ -146,7 +146,21 @@ impl Cloud {
     }
 }
 
-/// Particles of a rank that has all of the box, with ghosts along z, which are its own images.
+/// Numbers of sides with ghosts: those of one rank, of 2 ranks, of 4, and of 8 or more.
+#[allow(dead_code)] // Some targets that include this module do not use it.
+pub const FACES: [usize; 4] = [0, 2, 4, 6];
+
+/// Reads a number of sides with ghosts.
+#[allow(dead_code)] // Some targets that include this module do not use it.
+pub fn faces(word: Option<&String>) -> Result<usize, &'static str> {
+    let number = word.map_or(Some(0), |word| word.parse().ok());
+    number.filter(|n| FACES.contains(n)).ok_or("FACES is 0, 2, 4 or 6")
+}
+
+/// The skin of LAMMPS: ghosts reach further than the cut-off by this.
+const SKIN: f64 = 0.3;
+
+/// Particles of a rank that has all of the box, with ghosts on some sides, which are its own images.
 #[allow(dead_code)] // Some targets that include this module do not use it.
 pub struct Rank {
     /// The box and the owned particles.
@@ -163,20 +177,22 @@ pub struct Rank {
 
 #[allow(dead_code)] // Some targets that include this module do not use it.
 impl Rank {
-    /// Creates the particles as [`Cloud::new`]; [`Rank::find_ghosts`] adds ghosts.
-    pub fn new(subject: &Subject, fluid: &Fluid, count: usize) -> Rank {
+    /// Creates the particles as [`Cloud::new`], with ghosts on `faces` sides of the box: two along z, two
+    /// along y, two along x. [`Rank::find_ghosts`] adds them.
+    pub fn new(subject: &Subject, fluid: &Fluid, count: usize, faces: usize) -> Rank {
         let cloud = Cloud::new(subject, fluid, count);
         let part = |periodic| PeriodicBox::orthogonal([0.0; 3], [cloud.edge; 3], periodic).expect("a box");
-        let (around, along) = (part([true, true, false]), part([false, false, true]));
+        let is_open = [faces > 4, faces > 2, faces > 0];
+        let (around, along) = (part(is_open.map(|open| !open)), part(is_open));
         let (tag, kind, images) = (cloud.tag.clone(), cloud.kind.clone(), Images::default());
         Rank { cloud, around, along, images, x: vec![], v: vec![], tag, kind, slopes: vec![] }
     }
 
-    /// Finds the images within `reach` of the box.
-    pub fn find_ghosts(&mut self, reach: f64) {
+    /// Finds the images within the cut-off and the skin of the box.
+    pub fn find_ghosts(&mut self, cutoff: f64) {
         let owned = self.cloud.x.len();
         self.x.clone_from(&self.cloud.x);
-        self.images.build(&self.along, 3, reach, owned, &mut self.x);
+        self.images.build(&self.along, 3, cutoff + SKIN, owned, &mut self.x);
         self.v.clone_from(&self.cloud.v);
         self.images.forward(1, &mut self.v);
         self.images.forward(1, &mut self.tag);
@@ -196,7 +212,10 @@ impl Rank {
         let owned = self.cloud.x.len();
         let particles = Particles { owned, x: &self.x, tag: &self.tag, kind: &self.kind };
         let around = Around { domain: &self.around, images: &[] };
-        sweep.first(around, &particles, &self.v, Some(self.cloud.step), Want::FORCES).expect("densities");
+        let (v, step, force) = (&self.v, Some(self.cloud.step), &mut self.cloud.force);
+        // As hosts do, before every evaluation.
+        force.fill([0.0; 3]);
+        sweep.first(around, &particles, v, step, Want::FORCES, force).expect("densities");
         between();
         let width = sweep.slope_width();
         self.slopes.clear();
@@ -204,7 +223,7 @@ impl Rank {
         self.images.forward(width, &mut self.slopes);
         sweep.slopes_mut().copy_from_slice(&self.slopes);
         between();
-        sweep.second(&particles, &mut self.cloud.force, false).expect("forces");
+        sweep.second(&particles, &mut self.cloud.force).expect("forces");
     }
 }
 

@@ -11,6 +11,8 @@ use std::ffi::{CString, c_char};
 /// threads may use different ones.
 pub struct Engine {
     pub(super) engine: engine::Engine,
+    /// Forces of psidpd_engine_first, which psidpd_engine_second adds to the host's.
+    pub(super) first_forces: Vec<[f64; 3]>,
     plan_text: CString,
     path_text: CString,
     pub(super) state: State,
@@ -164,7 +166,13 @@ pub unsafe extern "C" fn psidpd_engine_new(
         let engine = engine::Engine::new(&model.model.at(kt)?, settings.checked()?)?;
         let plan_text = c_text(&engine.plan().to_string());
         let path_text = CString::default();
-        out.put(Box::into_raw(Box::new(Engine { engine, plan_text, path_text, state: State::Nothing })));
+        out.put(Box::into_raw(Box::new(Engine {
+            engine,
+            first_forces: Vec::new(),
+            plan_text,
+            path_text,
+            state: State::Nothing,
+        })));
         Ok(())
     })
 }

@@ -226,9 +226,16 @@ pub unsafe extern "C" fn psidpd_engine_second(
         unsafe {
             let engine = exclusive(engine, "engine")?;
             engine.require(&[State::First], "psidpd_engine_first")?;
-            complete(engine, request, force, tally, |engine, request, force| {
-                engine.second(request, force, true)
-            })
+            let first_forces = std::mem::take(&mut engine.first_forces);
+            let done = complete(engine, request, force, tally, |engine, request, force| {
+                let sums = engine.second(request, force)?;
+                for (force, first) in force.iter_mut().zip(&first_forces) {
+                    (0..3).for_each(|c| force[c] += first[c]);
+                }
+                Ok(sums)
+            });
+            engine.first_forces = first_forces;
+            done
         }
     })
 }
@@ -265,7 +272,9 @@ unsafe fn complete(
 
 fn first(engine: &mut Engine, surroundings: Surroundings, request: &engine::Request) -> Result<(), Failure> {
     engine.state = State::Nothing;
-    engine.engine.first(surroundings, request)?;
+    engine.first_forces.clear();
+    engine.first_forces.resize(request.particles.owned, [0.0; 3]);
+    engine.engine.first(surroundings, request, &mut engine.first_forces)?;
     engine.state = State::First;
     Ok(())
 }

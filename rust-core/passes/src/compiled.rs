@@ -8,6 +8,7 @@ use crate::pair_batch::in_range_pairs::InRangePairs;
 use crate::plane::buffers::PairBuffers;
 use crate::plane::data::PassData;
 use crate::plane::first::first_pass;
+use crate::plane::rim::Rim;
 use crate::plane::second::second_pass;
 use crate::simd::{Isa, Kernel, Scalar, run};
 use crate::tally::Tally;
@@ -154,6 +155,10 @@ pub struct Second<'a, P: PairPrecision> {
     pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
     pub sums: PlaneSums<'a>,
     pub in_range: &'a InRangePairs<P::Scalar>,
+    /// The rim, emptied for this plane; it is listed if `near_rim`.
+    pub rim: &'a mut Rim<P::Scalar>,
+    /// Whether there are ghosts in this plane or in the next.
+    pub near_rim: bool,
     pub virial: &'a mut [f64; 6],
 }
 
@@ -164,8 +169,14 @@ impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let Second { data, sums, in_range, virial } = self.0;
+        let Second { data, sums, in_range, rim, near_rim, virial } = self.0;
         // SAFETY: the caller of `PairPrecision::second` fulfils the contract of `second_pass`.
-        unsafe { second_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, sums, in_range, virial) }
+        unsafe {
+            if near_rim {
+                second_pass::<I, P::On<I>, MULTISPECIES, TALLY, true>(data, sums, in_range, rim, virial);
+            } else {
+                second_pass::<I, P::On<I>, MULTISPECIES, TALLY, false>(data, sums, in_range, rim, virial);
+            }
+        }
     }
 }

@@ -504,11 +504,11 @@ mod tests {
                     let open = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [false; 3]).unwrap();
                     let around = Around { domain: &open, images: &[] };
                     let tally = if ghosts {
-                        sweep.first(around, &particles, &[], None, Want::TOTALS).unwrap();
+                        sweep.first(around, &particles, &[], None, Want::TOTALS, &mut force).unwrap();
                         let mut slopes = sweep.slopes_mut()[..2 * count as usize].to_vec();
                         images.forward(2, &mut slopes);
                         sweep.slopes_mut().copy_from_slice(&slopes);
-                        sweep.second(&particles, &mut force, false).unwrap()
+                        sweep.second(&particles, &mut force).unwrap()
                     } else {
                         sweep
                             .evaluate(&domain, &particles, &[], None, Want::TOTALS, &mut force, false)

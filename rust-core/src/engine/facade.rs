@@ -275,28 +275,30 @@ impl Engine {
         }
     }
 
-    /// The first half of an evaluation, which needs no slopes of ghosts. The second half has the same `request`.
+    /// The first half of an evaluation, which needs no slopes of ghosts. The second half has the same
+    /// `request`, and the same `force`, to which either half adds its part; sums over pairs add all
+    /// forces in the second half.
     ///
     /// # Errors
-    /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
+    /// Fails for a position, ψ or force that is not finite, a tag or type out of range, arrays of different
     /// lengths, and listed pairs of particles that do not exist.
-    pub fn first(&mut self, surroundings: Surroundings, request: &Request) -> Result<(), EngineError> {
+    pub fn first(
+        &mut self,
+        surroundings: Surroundings,
+        request: &Request,
+        force: &mut [[f64; 3]],
+    ) -> Result<(), EngineError> {
         let Request { particles, v, step, want } = request;
-        match (self.begin(surroundings, *want), surroundings) {
-            (Path::Sweep, Surroundings::Ghosts(around, _)) => {
-                self.find_corrections(around, particles)?;
-                self.sweep.first(around, particles, v, *step, *want)
-            }
-            (Path::Sweep, Surroundings::Box(domain)) => {
-                let around = Around { domain, images: &[] };
-                self.find_corrections(around, particles)?;
-                self.sweep.first(around, particles, v, *step, *want)
-            }
+        let around = match (self.begin(surroundings, *want), surroundings) {
+            (Path::Sweep, Surroundings::Ghosts(around, _)) => around,
+            (Path::Sweep, Surroundings::Box(domain)) => Around { domain, images: &[] },
             _ => {
                 self.pair_sums.set_special_pairs(&self.special, self.sweep.exclusions());
-                self.pair_sums.first(surroundings, particles, want.densities)
+                return self.pair_sums.first(surroundings, particles, want.densities);
             }
-        }
+        };
+        self.find_corrections(around, particles)?;
+        self.sweep.first(around, particles, v, *step, *want, force)
     }
 
     /// Computes the contributions of special pairs to a sweep, which leaves them out, and adds those to the densities.
@@ -340,8 +342,8 @@ impl Engine {
         }
     }
 
-    /// The second half of an evaluation: writes the forces to `force`, or adds them to it,
-    /// and returns the requested totals.
+    /// The second half of an evaluation: adds the rest of the forces to `force`, and returns the requested
+    /// totals.
     ///
     /// Only the sums over pairs compute forces on ghosts, if the host returns these to their owners.
     /// The sweep leaves ghosts without forces: the rank of the other particle computes the pair too,
@@ -349,16 +351,11 @@ impl Engine {
     ///
     /// # Errors
     /// Fails for a force that is not finite, and for arrays of other lengths than in [`Engine::first`].
-    pub fn second(
-        &mut self,
-        request: &Request,
-        force: &mut [[f64; 3]],
-        add: bool,
-    ) -> Result<Tally, EngineError> {
+    pub fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         match self.path {
-            Some(Path::PairSums(_)) => self.finish(request, force, add),
+            Some(Path::PairSums(_)) => self.finish(request, force, true),
             _ => {
-                let mut tally = self.sweep.second(&request.particles, force, add)?;
+                let mut tally = self.sweep.second(&request.particles, force)?;
                 if !self.corrections.is_empty() {
                     tally += self.correct(request, force)?;
                 }

@@ -150,7 +150,7 @@ fn special_pairs_that_make_no_sense_are_refused() {
     let narrow = Cloud::new([4.0, 1.9, 3.1], 260, 1);
     assert!(engine.forces(&narrow.domain, &narrow.request(Want::FORCES), &mut force, false).is_err());
     let listed = Surroundings::Listed(PairsOfHost { i: &[], j: &[], factor: &[] }, Newton::On);
-    assert!(engine.first(listed, &cloud.request(Want::FORCES)).is_err());
+    assert!(engine.first(listed, &cloud.request(Want::FORCES), &mut []).is_err());
     // A special pair with a factor of 1 is an ordinary pair.
     engine.set_special_pairs([SpecialPair { i: 7, j: 300, factor: 1.0 }]);
     assert!(engine.forces(&cloud.domain, &cloud.request(Want::FORCES), &mut force, false).is_ok());

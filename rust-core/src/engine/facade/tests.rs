@@ -97,13 +97,13 @@ pub(super) fn with_ghosts(
     let owned = all.x.len() - images.ghosts();
     let request = all.request(want);
     let request = Request { particles: Particles { owned, ..request.particles }, ..request };
-    engine.first(surroundings, &request).unwrap();
+    let mut force = vec![[0.0; 3]; all.x.len()];
+    engine.first(surroundings, &request, &mut force).unwrap();
     let width = engine.plan().slope_width();
     let mut slopes = engine.slopes_mut()[..owned * width].to_vec();
     images.forward(width, &mut slopes);
     engine.slopes_mut().copy_from_slice(&slopes);
-    let mut force = vec![[0.0; 3]; all.x.len()];
-    let tally = engine.second(&request, &mut force, true).unwrap();
+    let tally = engine.second(&request, &mut force).unwrap();
     images.reverse(&mut force);
     force.truncate(owned);
     (tally, force, engine.local_densities().to_vec())

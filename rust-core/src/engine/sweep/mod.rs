@@ -230,37 +230,20 @@ impl Sweep {
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
-        let thermostat = self.begin(particles, v, step, want)?;
-        if self.owned < self.all {
+        if particles.owned < particles.x.len() {
             return Err(EngineError::Host("ghosts are not allowed in an evaluation of the whole box"));
         }
-        if force.len() < self.owned {
-            return Err(EngineError::Host("the force array is too short"));
-        }
-        let input =
-            Input::new(particles, &[], v, &self.species_of_type, &self.added_densities, thermostat, want)
-                .excluding(&self.exclusions);
-        let set = self.set;
-        let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
-        let out = ForceSink::new(force, add, particles.tag);
-        let tally = with!(&mut self.workspace, m => {
-            let mut since = Instant::now();
-            let (geometry, grid) = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
-            m.sort_into_cells(pool, geometry, grid, &input)?;
-            lap(&mut since, &mut times.sort);
-            m.run_all(pool, plan, &input, out, times)?;
-            m.tally()
-        });
+        self.run(Around { domain, images: &[] }, particles, v, step, want, force, add)?;
         self.slopes.clear();
-        Ok(tally)
+        Ok(with!(&self.workspace, m => m.tally()))
     }
 
-    /// Finds pairs on a rank, adds the forces without density terms, sums densities and evaluates ψ;
-    /// the other arguments are those of [`Sweep::evaluate`].
+    /// Does all of an evaluation on a rank that needs no slopes of ghosts: adds all forces to `force`,
+    /// with these slopes zero, and evaluates ψ; the other arguments are those of [`Sweep::evaluate`].
     ///
     /// # Errors
-    /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
-    /// lengths, and a box that does not [fit](Sweep::fits).
+    /// Fails as [`Sweep::evaluate`], except that there may be ghosts.
+    #[allow(clippy::too_many_arguments)]
     pub fn first(
         &mut self,
         around: Around,
@@ -268,9 +251,32 @@ impl Sweep {
         v: &[[f64; 3]],
         step: Option<Step>,
         want: Want,
+        force: &mut [[f64; 3]],
+    ) -> Result<(), EngineError> {
+        self.run(around, particles, v, step, want, force, true)?;
+        let mut since = Instant::now();
+        with!(&self.workspace, m => m.slopes_to_host(&mut self.slopes));
+        lap(&mut since, &mut self.times.excess);
+        self.ready = true;
+        Ok(())
+    }
+
+    /// Sorts the particles, and runs all passes.
+    #[allow(clippy::too_many_arguments)]
+    fn run(
+        &mut self,
+        Around { domain, images }: Around,
+        particles: &Particles,
+        v: &[[f64; 3]],
+        step: Option<Step>,
+        want: Want,
+        force: &mut [[f64; 3]],
+        add: bool,
     ) -> Result<(), EngineError> {
         let thermostat = self.begin(particles, v, step, want)?;
-        let Around { domain, images } = around;
+        if force.len() < self.owned {
+            return Err(EngineError::Host("the force array is too short"));
+        }
         if !images.is_empty() && images.len() != self.all - self.owned {
             return Err(EngineError::Host("`images` must have one entry per ghost"));
         }
@@ -279,18 +285,14 @@ impl Sweep {
                 .excluding(&self.exclusions);
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
+        let out = ForceSink::new(force, add, particles.tag);
         with!(&mut self.workspace, m => {
             let mut since = Instant::now();
             let (geometry, grid) = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
-            m.first(pool, plan, &input, times)?;
-            let mut since = Instant::now();
-            m.slopes_to_host(&mut self.slopes);
-            lap(&mut since, &mut times.excess);
-        });
-        self.ready = true;
-        Ok(())
+            m.run_all(pool, plan, &input, out, times)
+        })
     }
 
     /// Checks the input of an evaluation, and stores its sizes; returns the thermostat, if it acts.
@@ -343,20 +345,15 @@ impl Sweep {
         &mut self.slopes
     }
 
-    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to it,
-    /// and returns the requested totals.
+    /// Adds to `force`, which [`Sweep::first`] has added to, the many-body forces of the slopes of ghosts, and
+    /// returns the requested totals.
     ///
     /// A pair of an owned particle and a ghost is computed for the owned particle alone, with half of
     /// its energy and virial: the rank of the ghost computes the other half.
     ///
     /// # Errors
     /// Fails for a force that is not finite, and for arrays of other lengths than in [`Sweep::first`].
-    pub fn second(
-        &mut self,
-        particles: &Particles,
-        force: &mut [[f64; 3]],
-        add: bool,
-    ) -> Result<Tally, EngineError> {
+    pub fn second(&mut self, particles: &Particles, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         if !std::mem::take(&mut self.ready) {
             return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
         }
@@ -364,12 +361,11 @@ impl Sweep {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
         let (pool, slopes, times) = (&self.pool, &self.slopes, &mut self.times);
-        let out = ForceSink::new(force, add, particles.tag);
+        let out = ForceSink::new(force, true, particles.tag);
         with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            m.slopes_from_host(slopes);
-            lap(&mut since, &mut times.excess);
-            m.second(pool, out, times)?;
+            m.add_rim(pool, slopes, out)?;
+            lap(&mut since, &mut times.second);
             Ok(m.tally())
         })
     }

@@ -534,9 +534,9 @@ fn what_cannot_be_computed_is_named() {
                 Some(domain) => {
                     sweep.evaluate(domain, &particles, v, Some(STEP), want, &mut force, false).unwrap_err()
                 }
-                None => sweep.first(open, &particles, v, Some(STEP), want).unwrap_err(),
+                None => sweep.first(open, &particles, v, Some(STEP), want, &mut force).unwrap_err(),
             };
-            assert!(sweep.second(&particles, &mut force, false).is_err());
+            assert!(sweep.second(&particles, &mut force).is_err());
             error
         };
         for bad in [f64::NAN, f64::INFINITY, 1e300] {

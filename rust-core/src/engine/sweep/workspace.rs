@@ -9,6 +9,7 @@ mod forces;
 mod host;
 mod input;
 mod prefetch;
+mod rim;
 mod scheduler;
 mod slopes;
 mod sorted_particles;
@@ -95,7 +96,8 @@ impl<P: PairPrecision> Workspace<P> {
     }
 
     /// Does everything after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over
-    /// all planes, and their forces. `times` are those of the caller's thread.
+    /// all planes, and their forces, with slopes of ghosts zero: [`Workspace::add_rim`] adds their
+    /// part. `times` are those of the caller's thread.
     ///
     /// # Errors
     /// Fails for ψ or a force that is not finite, and names the lowest tag.
@@ -108,7 +110,7 @@ impl<P: PairPrecision> Workspace<P> {
         times: &mut Times,
     ) -> Result<(), EngineError> {
         let planes = thread_slabs(&self.order, pool.threads());
-        self.up_to_slopes(pool, plan, input, Some(out), &planes)?;
+        self.up_to_slopes(pool, plan, input, out, &planes)?;
         self.on_slabs(&planes, |scheduler, slabs, accumulators| {
             let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
             // SAFETY: `up_to_slopes` has computed the slopes of all particles and copies.
@@ -120,54 +122,19 @@ impl<P: PairPrecision> Workspace<P> {
         self.finish(times)
     }
 
-    /// Does the steps after [`Workspace::sort_into_cells`], up to ψ and its slopes.
-    ///
-    /// # Errors
-    /// Fails for ψ that is not finite.
-    pub fn first(
-        &mut self,
-        pool: &Pool,
-        plan: &Plan,
-        input: &Input,
-        times: &mut Times,
-    ) -> Result<(), EngineError> {
-        let planes = thread_slabs(&self.order, pool.threads());
-        self.up_to_slopes(pool, plan, input, None, &planes)?;
-        self.finish(times)
-    }
-
-    /// Does the steps after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
-    ///
-    /// # Errors
-    /// Fails for a force that is not finite, and names the lowest tag.
-    pub fn second(&mut self, pool: &Pool, out: ForceSink, times: &mut Times) -> Result<(), EngineError> {
-        self.slopes.copy_first_plane(&self.order);
-        let planes = thread_slabs(&self.order, pool.threads());
-        self.on_slabs(&planes, |scheduler, slabs, accumulators| {
-            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `first` has computed the slopes of all particles; `copy_first_plane` has
-            // just copied those of the copies.
-            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_of_all(out, slab, sums) });
-            drop(work);
-            let sums = accumulators.sums();
-            pool.each(slabs, |slab| scheduler.forces_of_first(out, slab, sums));
-        });
-        self.finish(times)
-    }
-
-    /// Fills arrays, and does first passes and ψ of all planes. If there is a place for forces, it also
-    /// does the second pass and the forces of the planes between the ends of slabs.
+    /// Fills arrays, and does first passes and ψ of all planes, and the second pass and the forces of the
+    /// planes between the ends of slabs.
     fn up_to_slopes(
         &mut self,
         pool: &Pool,
         plan: &Plan,
         input: &Input,
-        out: Option<ForceSink>,
+        out: ForceSink,
         planes: &[Range<usize>],
     ) -> Result<(), EngineError> {
-        let (width, keeps_all) = (self.fluid.width(), out.is_none());
-        self.accumulators.lay_out(&self.order, planes, width, !keeps_all);
-        self.results.make_room(&self.order, planes.len(), width, keeps_all);
+        let width = self.fluid.width();
+        self.accumulators.lay_out(&self.order, planes, width);
+        self.results.make_room(&self.order, planes.len(), width);
         let excess = ExcessInput::new(plan, input);
         if excess.is_none() {
             self.results.excess.fill(0.0);

@@ -73,20 +73,20 @@ pub fn on_ranks(
         // Without images the array of flags is empty.
         let images = if closed == [false; 3] { &[] } else { &rank.images[..] };
         let around = Around { domain: &domain, images };
-        sweep.first(around, &rank.particles(), &rank.v, Some(STEP), Want::TOTALS).unwrap();
+        let mut out = vec![[1.0; 3]; rank.owned];
+        sweep.first(around, &rank.particles(), &rank.v, Some(STEP), Want::TOTALS, &mut out).unwrap();
         for k in 0..rank.owned {
             slopes[width * rank.number[k]..][..width].copy_from_slice(&sweep.slopes()[width * k..][..width]);
         }
-        ranks.push(rank);
+        ranks.push((rank, out));
     }
     let mut force = vec![[0.0; 3]; n];
     let mut tally = Tally::default();
-    for (sweep, rank) in sweeps.iter_mut().zip(&ranks) {
+    for (sweep, (rank, mut out)) in sweeps.iter_mut().zip(ranks) {
         for (k, number) in rank.number.iter().enumerate() {
             sweep.slopes_mut()[width * k..][..width].copy_from_slice(&slopes[width * number..][..width]);
         }
-        let mut out = vec![[1.0; 3]; rank.owned];
-        tally += sweep.second(&rank.particles(), &mut out, true).unwrap();
+        tally += sweep.second(&rank.particles(), &mut out).unwrap();
         for (number, f) in rank.number.iter().zip(out) {
             force[*number] = f.map(|c| c - 1.0);
         }
@@ -153,8 +153,51 @@ fn what_is_around_a_rank_has_to_fit() {
     let (here, totals) = swept(&mut sweep, &open, Want::TOTALS);
     assert!(difference(&force, &here).max(tally_difference(&tally, &totals)) < tolerance(Precision::Mixed));
     let around = |domain, images| Around { domain, images };
-    let mut first = |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES);
+    let mut force = vec![[0.0; 3]; cloud.x.len()];
+    let mut first =
+        |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES, &mut force);
     assert!(matches!(first(around(&half, &[])), Err(EngineError::Host(_))));
     assert!(matches!(first(around(&cloud.domain, &[true])), Err(EngineError::Host(_))));
     assert!(first(around(&cloud.domain, &[])).is_ok());
+}
+
+/// Forces of ghosts' slopes are added plane by plane, and a plane's in the order of its list.
+#[test]
+fn ranks_have_the_same_bits_on_any_number_of_threads() {
+    for fluid in [shipped("warren2003-set6.toml"), many()] {
+        let cutoff = fluid.cutoff();
+        let domain =
+            PeriodicBox::orthogonal([0.0; 3], [3.1, 3.4, 9.3].map(|l| l * cutoff), [true; 3]).unwrap();
+        let count = (3.0 * domain.volume(3) / cutoff.powi(3)) as usize | 1;
+        let cloud = Cloud::new(domain, 3, fluid.species.len(), count, 8);
+        let on = |threads, axis, closed| {
+            let settings = settings(Precision::Mixed, Instructions::Portable, threads);
+            let mut sweeps = [0, 1].map(|_| Sweep::new(&fluid, settings).unwrap());
+            on_ranks(&mut sweeps, &cloud, axis, closed)
+        };
+        for (axis, closed) in [(2, [false; 3]), (0, [false, false, true])] {
+            let one = on(1, axis, closed);
+            for threads in [3, 7] {
+                assert!(one == on(threads, axis, closed), "{}, {threads} threads", fluid.title);
+            }
+        }
+    }
+}
+
+/// A rank keeps the pairs of a few planes, as a box does. All pairs in range would take 85 bytes for each particle:
+/// 16 for each, of 6 · 4π/3 · 0.75³ / 2 pairs. The ranks of this test have three and a half particles or ghosts,
+/// nearly all far away, for each of the box; the place, the cell and the slope of each take 24 bytes.
+#[test]
+fn a_rank_keeps_the_pairs_of_few_planes() {
+    let fluid = shipped("warren2003-set6.toml");
+    let domain = PeriodicBox::orthogonal([0.0; 3], [6.3, 6.3, 60.0], [true; 3]).unwrap();
+    let count = (6.0 * domain.volume(3)) as usize | 1;
+    let cloud = Cloud::new(domain, 3, 1, count, 8);
+    let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::Portable, 1)).unwrap();
+    swept(&mut sweep, &cloud, Want::FORCES);
+    let alone = sweep.memory() as f64 / count as f64;
+    let mut ranks = [0, 1].map(|_| sweep.clone());
+    on_ranks(&mut ranks, &cloud, 2, [true, true, false]);
+    let both = ranks.iter().map(|sweep| sweep.memory()).sum::<usize>() as f64 / count as f64;
+    assert!(both < alone + 24.0 * 2.5 + 85.0, "{both:.0} bytes a particle instead of {alone:.0}");
 }

@@ -54,18 +54,18 @@ pub struct Added<'a> {
 }
 
 impl AccumulatorArrays {
-    /// Lays out accumulators for thread slabs, for `variables` densities. If planes are `reused`, all
-    /// but the first two of a slab share blocks with the third plane after them.
-    pub fn lay_out(&mut self, order: &CellOrder, slabs: &[Range<usize>], variables: usize, reused: bool) {
+    /// Lays out accumulators for thread slabs, for `variables` densities. All planes but the first two
+    /// of a slab share blocks with the third plane after them.
+    pub fn lay_out(&mut self, order: &CellOrder, slabs: &[Range<usize>], variables: usize) {
         self.offset.clear();
         self.slab_sizes.clear();
         let mut begin = 0;
         for slab in slabs {
             let slot = |plane: usize| match plane - slab.start {
-                k if k < ACCUMULATOR_SLOTS || !reused => k,
+                k if k < ACCUMULATOR_SLOTS => k,
                 k => ACCUMULATOR_SLOTS - TURNS + (k - ACCUMULATOR_SLOTS) % TURNS,
             };
-            let mut sizes = vec![0; if reused { ACCUMULATOR_SLOTS } else { slab.len() }];
+            let mut sizes = [0; ACCUMULATOR_SLOTS];
             for plane in slab.clone() {
                 let size = block_size(order, plane);
                 sizes[slot(plane)] = size.max(sizes[slot(plane)]);

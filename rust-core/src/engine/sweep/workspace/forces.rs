@@ -47,6 +47,23 @@ impl<'a> ForceSink<'a> {
         };
         if finite { None } else { forces.lost(self.tag) }
     }
+
+    /// Adds to the force on an owned particle; returns its tag if the sum is not finite.
+    ///
+    /// # Safety
+    /// No other thread writes the force on this particle.
+    #[inline(always)]
+    pub unsafe fn add(self, particle: usize, force: [f64; 3]) -> Option<i32> {
+        assert!(particle < self.force.len(), "an owned particle");
+        // SAFETY: the array has an entry for the particle; the caller promises that no other thread writes it.
+        let sum = unsafe { &mut *self.force.at(particle) };
+        for c in 0..3 {
+            sum[c] += force[c];
+        }
+        // The sum is finite unless a component is not, or it exceeds all that forces can be.
+        let finite = (sum[0] + sum[1] + sum[2]).is_finite();
+        if finite { None } else { Some(self.tag[particle]) }
+    }
 }
 
 /// Forces on the particles of one plane. Only [`ForceSink::write`] creates it: its caller promises that no

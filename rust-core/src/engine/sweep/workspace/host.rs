@@ -32,16 +32,6 @@ impl<P: PairPrecision> Workspace<P> {
         }
     }
 
-    /// Copies the slopes of ghosts from the host.
-    pub fn slopes_from_host(&mut self, slopes: &[f64]) {
-        let width = self.fluid.width();
-        for (s, (k, ghost)) in self.order.order.iter().zip(&self.particles.ghost).enumerate() {
-            if *ghost {
-                self.slopes.set(s, &slopes[width * *k as usize..][..width]);
-            }
-        }
-    }
-
     /// Energies and virials of the last evaluation, summed in the order of planes.
     pub fn tally(&self) -> Tally {
         let mut tally = Tally::default();

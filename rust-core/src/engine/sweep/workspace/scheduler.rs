@@ -1,6 +1,6 @@
 //! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache when the
-//! next pass reads them. Without ghosts all passes run together, and only a few planes are in memory at once. With
-//! ghosts an evaluation has two halves: up to ψ, and, after the host has sent the slopes of ghosts, the rest.
+//! next pass reads them: all passes run together, and only a few planes are in memory at once. With ghosts the
+//! second pass takes their slopes as zero; `rim` adds the rest when the host has sent them.
 //!
 //! Each thread has a slab of planes. Dependencies between planes:
 //!
@@ -48,8 +48,8 @@ pub struct PassInput<'a> {
     pub input: &'a Input<'a>,
     /// The input of ψ; `None` if ψ is zero.
     pub excess: Option<ExcessInput<'a>>,
-    /// The place for forces, if the second pass follows at once.
-    pub out: Option<ForceSink<'a>>,
+    /// The place for forces.
+    pub out: ForceSink<'a>,
 }
 
 /// The planes of each of `threads` threads, divided so that all slabs have about the same number of pairs.
@@ -115,9 +115,9 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.sort);
     }
 
-    /// Fills the arrays of a thread slab, and does the first pass over all its planes and ψ of all but
-    /// the first. With a place for forces it also does the second pass over the planes between the
-    /// first and the last, and the forces of those that are complete.
+    /// Fills the arrays of a thread slab, and does the first pass over all its planes, ψ of all but
+    /// the first, the second pass over the planes between the first and the last, and the forces of
+    /// those that are complete.
     ///
     /// # Safety
     /// The starts of all slabs are filled, and the copies of the first plane exist. Other threads run
@@ -143,14 +143,13 @@ impl<P: PairPrecision> Scheduler<'_, P> {
                 unsafe { self.excess(input, slab, sums.sums(), plane) };
                 lap(&mut since, &mut slab.state.times.excess);
             }
-            let Some(out) = input.out else { continue };
             if plane > planes.start + 1 {
                 // SAFETY: `excess` has evaluated ψ of `plane - 1` and `plane`, both of this slab.
                 unsafe { self.second(slab, sums, plane - 1) };
                 lap(&mut since, &mut slab.state.times.second);
             }
             if plane > planes.start + 2 {
-                self.forces(out, slab, sums.sums(), plane - 1);
+                self.forces(input.out, slab, sums.sums(), plane - 1);
                 lap(&mut since, &mut slab.state.times.forces);
             }
         }
@@ -200,29 +199,6 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.forces);
     }
 
-    /// Does the second pass of a thread slab, and the forces of all its planes but the first.
-    ///
-    /// # Safety
-    /// All slopes are complete, including those of the copies, and no thread writes any.
-    pub unsafe fn second_of_all(
-        &self,
-        out: ForceSink,
-        slab: &mut ThreadSlab<P::Scalar>,
-        sums: &mut SlabSums,
-    ) {
-        slab.state.lost = None;
-        let mut since = Instant::now();
-        for plane in slab.planes.clone() {
-            // SAFETY: the caller promises that all slopes are complete.
-            unsafe { self.second(slab, sums, plane) };
-            lap(&mut since, &mut slab.state.times.second);
-            if plane > slab.planes.start {
-                self.forces(out, slab, sums.sums(), plane);
-                lap(&mut since, &mut slab.state.times.forces);
-            }
-        }
-    }
-
     /// Writes the forces of the first plane of a thread slab, to which the last plane of another slab contributes.
     pub fn forces_of_first(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
@@ -237,7 +213,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
     /// # Safety
     /// The plane, the next one and the vectors after them are filled; no thread writes there meanwhile.
     unsafe fn first(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
-        let (buffers, in_range, tally) = slab.plane(plane);
+        let (buffers, in_range, _, tally) = slab.plane(plane);
         let [forces, densities] = sums.of_plane(self.order, plane);
         forces.fill(Accumulator::default());
         densities.fill(Accumulator::default());
@@ -266,6 +242,10 @@ impl<P: PairPrecision> Scheduler<'_, P> {
                 let species = if has_species { particles.clone() } else { 0..0 };
                 (self.particles.species.slice(species), self.slopes.rows_mut(particles.clone()))
             };
+            if !self.particles.ghosts.is_empty() {
+                // ψ of ghosts is not evaluated: their slopes stay zero.
+                slopes.fill(0.0);
+            }
             let block = DensityBlock {
                 first,
                 added: sums.of_particles(self.order, plane, particles.clone()),
@@ -284,7 +264,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
     }
 
-    /// Does the second pass of a plane.
+    /// Does the second pass of a plane, and lists its rim.
     ///
     /// # Safety
     /// Slopes of the plane and of the next are complete, and no thread writes them.
@@ -292,13 +272,19 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         if self.fluid.terms.passes.is_empty() {
             return;
         }
-        let (_, in_range, tally) = slab.plane(plane);
+        let (_, in_range, rim, tally) = slab.plane(plane);
+        rim.clear(self.order.plane_start(plane + 1));
+        let columns = self.order.grid.columns_per_plane;
+        let mut of_both =
+            self.particles.ghosts.owned_of_column.iter().skip(plane * columns).take(2 * columns);
+        let near_rim = of_both.any(|column| column.with_ghosts);
         let [forces, densities] = sums.of_plane(self.order, plane);
         let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
         // SAFETY: the first pass of this plane has stored the pairs; the caller promises that slopes
         // are complete; the accumulators are those of this plane and the next.
         unsafe {
-            P::second(&self.passes, Second { data: &self.data, sums, in_range, virial: &mut tally.virial })
+            let virial = &mut tally.virial;
+            P::second(&self.passes, Second { data: &self.data, sums, in_range, rim, near_rim, virial })
         };
     }
 

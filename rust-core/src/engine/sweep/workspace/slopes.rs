@@ -53,14 +53,6 @@ impl<T: Scalar> SlopeArrays<T> {
         &self.rows
     }
 
-    /// Writes the slopes of one particle.
-    pub fn set(&mut self, particle: usize, slopes: &[f64]) {
-        self.rows[self.width * particle..][..self.width].copy_from_slice(slopes);
-        for (eight, of_eight) in self.packed.chunks_exact_mut(self.stride).enumerate() {
-            pack(self.width, eight, slopes, &mut of_eight[SLOPES_PER_BLOCK * particle..][..SLOPES_PER_BLOCK]);
-        }
-    }
-
     /// Lends the slopes to the passes.
     pub fn share(&mut self) -> SharedSlopes<'_, T> {
         SharedSlopes {

@@ -7,6 +7,7 @@ use crate::engine::sweep::times::Times;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::in_range_pairs::InRangePairs;
 use psidpd_passes::plane::buffers::PairBuffers;
+use psidpd_passes::plane::rim::Rim;
 use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
 use std::ops::Range;
@@ -44,9 +45,10 @@ impl<T: Scalar> ThreadState<T> {
 /// Results of the passes: for each plane and for each particle.
 #[derive(Default)]
 pub struct PlaneResults<T> {
-    /// Pairs for the second pass: of all planes, or of a few planes of each thread slab.
+    /// Pairs for the second pass, of a few planes of each thread slab.
     in_range: Vec<InRangePairs<T>>,
-    keeps_all: bool,
+    /// The rim of each plane, if there are ghosts.
+    pub rims: Vec<Rim<T>>,
     pub tallies: Vec<Tally>,
     /// The densities of each particle, and ψ, in the order of cells.
     pub densities: Vec<f64>,
@@ -60,7 +62,7 @@ pub struct ThreadSlab<'a, T> {
     pub first: usize,
     pub state: &'a mut ThreadState<T>,
     in_range: &'a mut [InRangePairs<T>],
-    keeps_all: bool,
+    rims: &'a mut [Rim<T>],
     tallies: &'a mut [Tally],
     /// Densities of the particles of the slab.
     pub densities: &'a mut [f64],
@@ -68,11 +70,10 @@ pub struct ThreadSlab<'a, T> {
 }
 
 impl<T: Scalar> PlaneResults<T> {
-    /// Makes room for all particles of an order, `width` densities each, and for the pairs of all planes or of a few.
-    pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize, keeps_all: bool) {
-        let kept = if keeps_all { order.grid.planes } else { KEPT_PLANES * slabs };
-        self.keeps_all = keeps_all;
-        self.in_range.resize_with(kept, InRangePairs::default);
+    /// Makes room for all particles of an order, `width` densities each, and for the pairs of a few planes of each slab.
+    pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize) {
+        self.in_range.resize_with(KEPT_PLANES * slabs, InRangePairs::default);
+        self.rims.resize_with(order.grid.planes, Rim::default);
         self.tallies.clear();
         self.tallies.resize(order.grid.planes, Tally::default());
         self.excess.resize(order.particles(), 0.0);
@@ -89,15 +90,15 @@ impl<T: Scalar> PlaneResults<T> {
     ) -> Vec<ThreadSlab<'a, T>> {
         let (mut in_range, mut tallies) = (&mut self.in_range[..], &mut self.tallies[..]);
         let (mut densities, mut excess) = (&mut self.densities[..], &mut self.excess[..]);
-        let keeps_all = self.keeps_all;
+        let mut rims = &mut self.rims[..];
         let slab = |(planes, state): (&Range<usize>, &'a mut ThreadState<T>)| {
             let particles = order.particles_of(planes);
             ThreadSlab {
                 planes: planes.clone(),
                 first: particles.start,
                 state,
-                in_range: take(&mut in_range, if keeps_all { planes.len() } else { KEPT_PLANES }),
-                keeps_all,
+                in_range: take(&mut in_range, KEPT_PLANES),
+                rims: take(&mut rims, planes.len()),
                 tallies: take(&mut tallies, planes.len()),
                 densities: take(&mut densities, width * particles.len()),
                 excess: take(&mut excess, particles.len()),
@@ -109,27 +110,30 @@ impl<T: Scalar> PlaneResults<T> {
     /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         self.in_range.iter().map(|pairs| pairs.bytes()).sum::<usize>()
+            + self.rims.iter().map(Rim::bytes).sum::<usize>()
             + (self.densities.capacity() + self.excess.capacity()) * size_of::<f64>()
     }
 }
 
 /// Splits off the first `count` elements.
-fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+pub fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let (first, behind) = std::mem::take(rest).split_at_mut(count);
     *rest = behind;
     first
 }
 
 impl<T> ThreadSlab<'_, T> {
-    /// The buffers of a pass over a plane of the slab, its pairs for the second pass, and its energies and virials.
-    pub fn plane(&mut self, plane: usize) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Tally) {
+    /// The buffers of a pass over a plane of the slab, its pairs for the second pass, its rim, and its energies and virials.
+    pub fn plane(
+        &mut self,
+        plane: usize,
+    ) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Rim<T>, &mut Tally) {
         let number = plane - self.planes.start;
         let kept = match plane {
-            _ if self.keeps_all => number,
             _ if plane == self.planes.start => 0,
             _ if plane + 1 == self.planes.end => 1,
             _ => 2 + plane % 2,
         };
-        (&mut self.state.buffers, &mut self.in_range[kept], &mut self.tallies[number])
+        (&mut self.state.buffers, &mut self.in_range[kept], &mut self.rims[number], &mut self.tallies[number])
     }
 }

@@ -21,8 +21,9 @@ pub struct Fractions<'a> {
     inverse: [f64; 3],
     origin: [f64; COORDINATES],
     scale: [f64; COORDINATES],
-    /// The largest fraction along open directions, where fractions do not wrap.
-    ends: [[f64; 2]; COORDINATES],
+    /// The smallest and the largest fraction along open directions, where fractions do not wrap.
+    lowest: [f64; COORDINATES],
+    highest: [f64; COORDINATES],
     is_open: bool,
     /// Number of cells along each axis, and the difference of neighbouring cells' numbers along it.
     of: [u32; COORDINATES],
@@ -41,7 +42,8 @@ impl<'a> Fractions<'a> {
             inverse,
             origin: std::array::from_fn(|c| geometry.origin[c % 3]),
             scale: std::array::from_fn(|c| scale[c % 3]),
-            ends: std::array::from_fn(|c| [end(c % 3, 0.0, -FAR), end(c % 3, TWO_TO_32 - 1.0, FAR)]),
+            lowest: std::array::from_fn(|c| end(c % 3, 0.0, -FAR)),
+            highest: std::array::from_fn(|c| end(c % 3, TWO_TO_32 - 1.0, FAR)),
             is_open: !geometry.periodic.iter().all(|p| *p),
             of: std::array::from_fn(|c| of[c % 3]),
             step: std::array::from_fn(|c| step[c % 3]),
@@ -89,7 +91,7 @@ impl<'a> Fractions<'a> {
     /// Limits fractions to the ends of the box geometry.
     #[inline(never)]
     fn stay(&self, scaled: &mut [f64; COORDINATES]) {
-        for (t, [low, high]) in scaled.iter_mut().zip(&self.ends) {
+        for (t, (low, high)) in scaled.iter_mut().zip(self.lowest.iter().zip(&self.highest)) {
             let above = if *t > *low { *t } else { *low };
             *t = if above < *high { above } else { *high };
         }
