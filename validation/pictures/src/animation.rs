@@ -1,5 +1,5 @@
 use super::Image;
-use super::snapshot::{SNAPSHOTS, snapshots};
+use super::snapshot::{SNAPSHOTS, snapshots, step_of};
 use psidpd_formats::FormatError;
 use std::path::Path;
 
@@ -22,7 +22,11 @@ pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
     for path in all.iter().rev().step_by(stride) {
         let bytes = std::fs::read(path).map_err(FormatError::read(path))?;
         let picture = |message: String| FormatError::Picture { path: path.clone(), message };
-        images.push(Image::from_png(&bytes).map_err(picture)?.reduced(2));
+        let mut image = Image::from_png(&bytes).map_err(picture)?.reduced(2);
+        if let Some(step) = step_of(path) {
+            image.stamp(&format!("step {step}"));
+        }
+        images.push(image);
     }
     images.reverse();
     let packed = Image::to_apng(&images, PER_SECOND);

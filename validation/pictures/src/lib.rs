@@ -7,6 +7,7 @@ mod animation;
 pub mod colour;
 mod field;
 mod image;
+mod lettering;
 mod particles;
 pub mod projection;
 pub mod snapshot;

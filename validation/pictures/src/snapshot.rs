@@ -10,6 +10,11 @@ pub fn snapshot_name(step: u64) -> String {
     format!("particles-{step:010}.png")
 }
 
+/// The step of a snapshot, from its name.
+pub(super) fn step_of(path: &Path) -> Option<u64> {
+    path.file_stem()?.to_str()?.strip_prefix("particles-")?.parse().ok()
+}
+
 /// Writes a picture of the particles into the folder of snapshots of a run, whole or not at all, and returns its path.
 /// The folder is created if it does not exist.
 pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatError> {

@@ -97,6 +97,15 @@ impl Figure {
         }
     }
 
+    /// The picture alone. A field has a scale bar, since its axes are left out.
+    pub fn with_scale_bar(self) -> Image {
+        let mut image = self.image;
+        if let (Border::Axes(_, [[left, right], _]), Some(_)) = (&self.border, &self.bar) {
+            image.draw_scale_bar(right - left);
+        }
+        image
+    }
+
     /// Makes the SVG document, without prolog, fit for embedding.
     ///
     /// # Errors

@@ -141,7 +141,15 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let images = frames
             .iter()
             .zip(&values)
-            .map(|(f, v)| Ok(figure(a, model.as_ref(), f, v.as_deref(), ends)?.image))
+            .map(|(f, v)| {
+                let mut image = figure(a, model.as_ref(), f, v.as_deref(), ends)?.with_scale_bar();
+                match (f.time, f.step) {
+                    (Some(time), _) => image.stamp(&format!("t = {}", (1e6 * time).round() / 1e6)),
+                    (None, Some(step)) => image.stamp(&format!("step {step}")),
+                    (None, None) => {}
+                }
+                Ok(image)
+            })
             .collect::<Result<Vec<_>, Failure>>()?;
         write_atomically(&out, &Image::to_gif(&images, DELAY).map_err(request)?)?;
         say!("{}", out.display());
@@ -152,7 +160,8 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let values = values(a, model.as_ref(), &configuration)?;
     let ends = ends(values.iter().flatten());
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
-    let bytes = if kind == "svg" { figure.render()?.into_bytes() } else { figure.image.to_png()? };
+    let bytes =
+        if kind == "svg" { figure.render()?.into_bytes() } else { figure.with_scale_bar().to_png()? };
     write_atomically(&out, &bytes)?;
     say!("{}", out.display());
     let particles = configuration.x.len();

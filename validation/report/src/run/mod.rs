@@ -76,8 +76,8 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
     );
     let mut sections = vec![
         state::section(folder, state.as_ref(), about.as_ref()),
-        series::section(table.as_ref(), about.as_ref(), state.as_ref().map(|s| s.configuration.x.len())),
         observables::section(observables.as_deref()),
+        series::section(table.as_ref(), about.as_ref(), state.as_ref().map(|s| s.configuration.x.len())),
         files_section(folder),
     ];
     if let Some(section) = found.section() {
