@@ -56,11 +56,15 @@ fn figure(plot: &Plot, caption: &str) -> Result<Item, ReportError> {
 
 fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
     let species = model.species().len();
-    let (mut mean_field, mut correlated) = (Vec::new(), Vec::new());
+    let (mut mean_field, mut correlated, mut highest) = (Vec::new(), Vec::new(), None);
     for kt in scope.kts {
         let Some(theory) = model.at(*kt).ok().and_then(|fluid| MeanField::new(&fluid).ok()) else { continue };
         let at = |k: usize| 2.0 * scope.density * k as f64 / DENSITIES as f64;
         let pressure = |rho: f64| theory.pressure(&vec![rho / species as f64; species]);
+        if let Ok(b) = theory.binodal() {
+            let loops = (1..DENSITIES).map(|k| pressure(b.liquid * k as f64 / DENSITIES as f64).abs());
+            highest = loops.chain(highest).reduce(f64::max);
+        }
         mean_field.push(Series {
             name: format!("mean field, kT = {kt}"),
             points: (1..=DENSITIES).map(|k| (at(k), pressure(at(k)))).collect(),
@@ -78,6 +82,12 @@ fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         }
     }
     mean_field.extend(correlated);
+    // The loop of coexisting phases fills the plot; the pressure of a liquid beyond them is a hundred times higher.
+    if let Some(highest) = highest {
+        for (_, p) in mean_field.iter_mut().flat_map(|s| &mut s.points).filter(|(_, p)| *p > 1.5 * highest) {
+            *p = f64::NAN;
+        }
+    }
     let equal = if species > 1 { ", the species in equal shares" } else { "" };
     let plot = Plot {
         title: "Pressure".into(),

@@ -17,7 +17,7 @@ pub(super) const BELOW: f64 = 52.0;
 pub(super) const SMALL: f64 = 12.0;
 const MEDIUM: f64 = 13.0;
 const LARGE: f64 = 15.0;
-const INK: RGBColor = RGBColor(0x33, 0x33, 0x33);
+pub(super) const INK: RGBColor = RGBColor(0x33, 0x33, 0x33);
 pub(super) const GREY: RGBColor = RGBColor(0x6B, 0x6B, 0x6B);
 const GRID: RGBColor = RGBColor(0xE3, 0xE3, 0xE3);
 
@@ -110,19 +110,6 @@ pub(super) fn axes(chart: &mut Chart, names: [&str; 2], scales: [&Scale; 2], gri
         .set_all_tick_mark_size(px(5.0))
         .label_style(font(SMALL, INK))
         .axis_desc_style(font(MEDIUM, INK))
-        .draw()?;
-    Ok(())
-}
-
-/// Draws a legend in a corner.
-pub(super) fn legend(chart: &mut Chart, position: SeriesLabelPosition) -> Fallible {
-    chart
-        .configure_series_labels()
-        .position(position)
-        .legend_area_size(px(32.0))
-        .margin(px(6.0))
-        .background_style(WHITE.mix(0.85))
-        .label_font(font(SMALL, INK))
         .draw()?;
     Ok(())
 }

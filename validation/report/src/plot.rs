@@ -2,11 +2,12 @@
 
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::ReportError;
-use super::chart::{Chart, Fallible, GREY, SMALL, chart, legend, note, pen, px, svg};
+use super::chart::{Chart, Fallible, GREY, INK, LEFT, SMALL, chart, font, note, pen, px, svg};
 use super::scale::Scale;
-use super::text::{fit, width};
+use super::text::{fit, one_line, width};
 use psidpd_pictures::colour;
 
 /// The style of a series.
@@ -58,6 +59,10 @@ pub struct Plot {
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 420.0;
+/// The room for the title, for a row of the legend and for the sample before a name, in pixels.
+const TITLE: f64 = 30.0;
+const ROW: f64 = 18.0;
+const SAMPLE: f64 = 24.0;
 /// The largest room for a name, in pixels.
 const NAME: f64 = 260.0;
 
@@ -89,8 +94,22 @@ impl Plot {
     /// The function fails if plotters cannot draw the plot.
     pub fn render(&self) -> Result<String, ReportError> {
         let [x, y] = &self.scales();
-        svg(&self.title, [WIDTH, HEIGHT], "", |area| {
-            let top = if self.marks.is_empty() { 36.0 } else { 52.0 };
+        let (legend, rows) = self.legend();
+        let below = TITLE + ROW * rows as f64;
+        let top = below + if self.marks.is_empty() { 6.0 } else { 22.0 };
+        svg(&self.title, [WIDTH, HEIGHT + ROW * rows as f64], "", |area| {
+            for (at, name, sample) in legend {
+                let [left, middle] = [px(at[0]), px(at[1])];
+                // A marker stands in the middle of the room that a line fills.
+                let marker = matches!(sample, Sample::Series(_, Style::Points));
+                let from = left + if marker { px(0.5 * SAMPLE) } else { 0 };
+                area.draw(&sample.element([(from, middle), (left + px(SAMPLE), middle)]))?;
+                area.draw(&Text::new(
+                    one_line(&name),
+                    (left + px(SAMPLE + 6.0), middle),
+                    font(SMALL, INK).pos(Pos::new(HPos::Left, VPos::Center)),
+                ))?;
+            }
             let mut chart = chart(area, [top, 20.0], [&self.x_label, &self.y_label], [x, y], true)?;
             let runs: Vec<_> = self.series.iter().map(|s| runs(s, x, y)).collect();
             // Errors are drawn behind all data.
@@ -101,12 +120,29 @@ impl Plot {
             for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
                 draw_series(&mut chart, k, series, runs)?;
             }
-            let names = self.series.iter().map(|s| &s.name).chain(self.levels.iter().map(|l| &l.1));
-            if names.into_iter().any(|name| !name.trim().is_empty()) {
-                legend(&mut chart, corner(&runs, x, y))?;
-            }
             Ok(())
         })
+    }
+
+    /// The entries of the legend, in rows above the chart, where they cover no data, and the number of rows.
+    fn legend(&self) -> (Vec<([f64; 2], String, Sample)>, usize) {
+        let levels = self.levels.iter().filter(|(level, _)| level.is_finite());
+        let series = self.series.iter().enumerate().map(|(k, s)| (&s.name, Sample::Series(k, s.style)));
+        let entries = series.chain(levels.map(|(_, name)| (name, Sample::Level)));
+        let (mut placed, mut rows, mut free) = (Vec::new(), 0, f64::INFINITY);
+        for (name, sample) in entries {
+            let name = fit(name, SMALL, NAME);
+            if name.trim().is_empty() {
+                continue;
+            }
+            let room = SAMPLE + 6.0 + width(&name, SMALL);
+            if free + room > WIDTH - 20.0 {
+                (rows, free) = (rows + 1, LEFT);
+            }
+            placed.push(([free, TITLE + ROW * (rows as f64 - 0.5)], name, sample));
+            free += room + 18.0;
+        }
+        (placed, rows)
     }
 
     /// Axes with room for all visible points. A point that cannot be shown must not widen the other axis.
@@ -126,25 +162,17 @@ impl Plot {
         [Scale::around(xs.into_iter(), self.log_x), Scale::around(ys.into_iter(), self.log_y)]
     }
 
-    /// Draws horizontal lines with names in the legend, and vertical lines with names above them if there is room.
+    /// Draws horizontal lines, whose names are in the legend, and vertical lines with names above them if there is room.
     fn draw_references(&self, chart: &mut Chart, x: &Scale, y: &Scale) -> Fallible {
-        let line = pen(GREY, 1.2);
-        let dotted = |ends: [(f64, f64); 2]| DashedPathElement::new(ends, px(2.0), px(3.0), line);
         let (across, up) = (x.ends(), y.ends());
-        for (level, name) in self.levels.iter().filter(|(level, _)| y.clamp(*level).is_some()) {
-            let drawn = chart.draw_series([dotted([(across.0, *level), (across.1, *level)])])?;
-            let name = fit(name, SMALL, NAME);
-            if !name.trim().is_empty() {
-                let sample =
-                    move |(x, y)| DashedPathElement::new([(x, y), (x + px(24.0), y)], px(2.0), px(3.0), line);
-                drawn.label(name).legend(sample);
-            }
+        for (level, _) in self.levels.iter().filter(|(level, _)| y.clamp(*level).is_some()) {
+            chart.draw_series([Sample::Level.element([(across.0, *level), (across.1, *level)])])?;
         }
         let mut free = f64::NEG_INFINITY;
         let mut marks: Vec<_> = self.marks.iter().filter(|(mark, _)| x.clamp(*mark).is_some()).collect();
         marks.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (mark, name) in marks {
-            chart.draw_series([dotted([(*mark, up.0), (*mark, up.1)])])?;
+            chart.draw_series([Sample::Level.element([(*mark, up.0), (*mark, up.1)])])?;
             let at = chart.backend_coord(&(*mark, up.1)).0 as f64 / px(1.0) as f64;
             let name = fit(name, SMALL, NAME);
             if at > free {
@@ -192,11 +220,7 @@ fn draw_errors(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]
 }
 
 fn draw_series(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
-    let colour = colour_of(k);
-    let line = match series.style {
-        Style::Faint => pen(colour.mix(0.55), 1.0),
-        _ => pen(colour, 1.8),
-    };
+    let (colour, line) = (colour_of(k), line_of(k, series.style));
     let mut elements = Vec::new();
     for run in runs {
         let path: Vec<(f64, f64)> = run.iter().map(|s| s.at).collect();
@@ -206,15 +230,37 @@ fn draw_series(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]
             (style, _) => elements.push(stroke(path, style, line)),
         }
     }
-    let (drawn, style) = (chart.draw_series(elements)?, series.style);
-    let name = fit(&series.name, SMALL, NAME);
-    if !name.trim().is_empty() {
-        drawn.label(name).legend(move |(x, y)| match style {
-            Style::Points => marker(k, (x + px(12.0), y)),
-            style => stroke(vec![(x, y), (x + px(24.0), y)], style, line),
-        });
-    }
+    chart.draw_series(elements)?;
     Ok(())
+}
+
+fn line_of(k: usize, style: Style) -> ShapeStyle {
+    match style {
+        Style::Faint => pen(colour_of(k).mix(0.55), 1.0),
+        _ => pen(colour_of(k), 1.8),
+    }
+}
+
+/// What stands before a name in the legend.
+#[derive(Clone, Copy)]
+enum Sample {
+    Series(usize, Style),
+    /// A dotted reference line.
+    Level,
+}
+
+impl Sample {
+    /// A line between two points, or the marker of a series between them.
+    fn element<'a, Part: Copy + 'static>(
+        self,
+        ends: [(Part, Part); 2],
+    ) -> DynElement<'static, SVGBackend<'a>, (Part, Part)> {
+        match self {
+            Sample::Level => DashedPathElement::new(ends, px(2.0), px(3.0), pen(GREY, 1.2)).into_dyn(),
+            Sample::Series(k, Style::Points) => marker(k, ends[0]),
+            Sample::Series(k, style) => stroke(ends.to_vec(), style, line_of(k, style)),
+        }
+    }
 }
 
 /// A solid or dashed line.
@@ -238,23 +284,6 @@ fn marker<'a, At: Clone + 'static>(k: usize, at: At) -> DynElement<'static, SVGB
         2 => Cross::new(at, px(3.0), pen(colour_of(k), 1.8)).into_dyn(),
         _ => Circle::new(at, px(3.0), pen(colour_of(k), 1.4)).into_dyn(),
     }
-}
-
-/// The corner in which a legend covers the least of the data, including lines between points.
-fn corner(runs: &[Vec<Vec<Shown>>], x: &Scale, y: &Scale) -> SeriesLabelPosition {
-    use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
-    let mut corners = [(0, UpperRight), (0, UpperLeft), (0, LowerRight), (0, LowerLeft)];
-    let place = |s: &Shown| (x.map(&s.at.0, (0, 100)), y.map(&s.at.1, (0, 100)));
-    for run in runs.iter().flatten() {
-        for (a, b) in run.iter().zip(run.iter().skip(1).chain(run.last())) {
-            let (a, b) = (place(a), place(b));
-            for t in 0..10 {
-                let at = ((10 - t) * a.0 + t * b.0, (10 - t) * a.1 + t * b.1);
-                corners[usize::from(at.0 < 500) + 2 * usize::from(at.1 < 600)].0 += 1;
-            }
-        }
-    }
-    corners.into_iter().min_by_key(|corner| corner.0).map_or(UpperRight, |corner| corner.1)
 }
 
 #[cfg(test)]
