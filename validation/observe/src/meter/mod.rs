@@ -4,6 +4,7 @@
 
 mod across;
 mod clusters;
+mod contact_angle;
 mod density_field;
 mod distances;
 mod drop;
@@ -138,6 +139,7 @@ meters!(
     Poiseuille(poiseuille::Poiseuille),
     Drop(drop::Drop),
     Pendant(pendant::Pendant),
+    ContactAngle(contact_angle::ContactAngle),
     Clusters(clusters::Clusters),
     LocalDensity(local_density::LocalDensity),
 );

@@ -36,6 +36,20 @@ pub struct Pendant {
     series: Series,
 }
 
+/// The density of the liquid in a field: half of the particles are in denser bins. Unlike the mean of a chosen region this
+/// does not depend on the shape, and unlike a maximum it does not follow the noise.
+pub(super) fn median_density(field: &[f64], volume: impl Fn(usize) -> f64) -> f64 {
+    let particles = |k: usize| field[k] * volume(k);
+    let mut cells: Vec<usize> = (0..field.len()).collect();
+    cells.sort_by(|a, b| field[*b].total_cmp(&field[*a]).then(a.cmp(b)));
+    let mut left = 0.5 * (0..field.len()).map(particles).sum::<f64>();
+    let median = cells.into_iter().find(|k| {
+        left -= particles(*k);
+        left <= 0.0
+    });
+    median.map_or(f64::NAN, |k| field[k])
+}
+
 impl Pendant {
     fn volume(&self, outwards: usize) -> f64 {
         let (a, b) = (outwards as f64 * self.width[0], (outwards + 1) as f64 * self.width[0]);
@@ -46,18 +60,8 @@ impl Pendant {
         across * self.width[1]
     }
 
-    /// The density of the liquid: half of the particles are in denser bins. Unlike the mean of a chosen region this does not
-    /// depend on the shape, and unlike a maximum it does not follow the noise.
     fn liquid(&self, field: &[f64]) -> f64 {
-        let particles = |k: usize| field[k] * self.volume(k % self.bins[0]);
-        let mut cells: Vec<usize> = (0..field.len()).collect();
-        cells.sort_by(|a, b| field[*b].total_cmp(&field[*a]).then(a.cmp(b)));
-        let mut left = 0.5 * (0..field.len()).map(particles).sum::<f64>();
-        let median = cells.into_iter().find(|k| {
-            left -= particles(*k);
-            left <= 0.0
-        });
-        median.map_or(f64::NAN, |k| field[k])
+        median_density(field, |k| self.volume(k % self.bins[0]))
     }
 
     /// The points (r, z) of the isosurface, with z measured along the axis from the origin of the box, up from the apex.

@@ -108,9 +108,16 @@ pub fn gather(
     let both = |c| [("interface_width", c), ("drop", c)];
     add("liquid", &per_volume, scalar(&both("liquid")));
     add("vapour", &per_volume, scalar(&both("vapour")));
-    add("tension", &per_area, scalar(&[("surface_tension", "stress"), ("drop", "tension")]));
-    add("width", "length", scalar(&both("width")));
+    // Of the two routes to the tension of a slab the one with the smaller error.
+    let routes = ["stress", "free_energy"].map(|route| scalar(&[("surface_tension", route)]));
+    let error = |found: &(f64, Option<f64>, String)| found.1.filter(|e| *e > 0.0).unwrap_or(f64::INFINITY);
+    let tension = routes.into_iter().flatten().min_by(|a, b| error(a).total_cmp(&error(b)));
+    add("tension", &per_area, tension.or_else(|| scalar(&[("drop", "tension")])));
+    let width =
+        scalar(&both("width")).map(|(w, error, from)| (w, error, format!("{from}: 2 d of tanh(z/d)")));
+    add("width", "length", width);
     add("radius", "length", scalar(&[("drop", "radius")]));
+    add("contact_angle", "degree", scalar(&[("contact_angle", "angle")]));
 
     let mut note = |text: String| all.notes.push(text);
     let thermo =
