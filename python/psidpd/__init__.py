@@ -12,13 +12,18 @@
     result = psidpd.run("scene.toml", out="slab")
     result.value("surface_tension.stress")                   # value, error
 
+    simulation = psidpd.Simulation("scene.toml")             # no files: stepped from here
+    simulation.run(100)
+    simulation.positions
+
 All numbers are in the reduced units of the model: lengths in r_c, masses in m, energies in the unit of kT. `psidpd.ase`
 has a calculator for ASE, `psidpd.lammps` finds the pair styles for LAMMPS.
 """
 
 from ._psidpd import Engine, Evaluation, Model, estimate, version
 from .errors import InputError, PsidpdError, RunStoppedError
-from .result import Result, run
+from .result import Result, run, sweep
+from .simulation import Simulation
 
 __version__ = version()
 
@@ -30,6 +35,8 @@ __all__ = [
     "PsidpdError",
     "Result",
     "RunStoppedError",
+    "Simulation",
     "estimate",
     "run",
+    "sweep",
 ]

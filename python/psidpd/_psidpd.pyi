@@ -8,7 +8,7 @@ import numpy
 import pandas
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Engine", "Evaluation", "Model", "estimate", "main", "run_scene", "version"]
+__all__ = ["Engine", "Evaluation", "Model", "Steps", "estimate", "main", "run_scene", "version"]
 
 @final
 class Model:
@@ -58,6 +58,34 @@ class Engine:
         periodic: Sequence[bool] | None = None,
     ) -> Evaluation: ...
 
+@final
+class Steps:
+    def __new__(
+        cls,
+        path: str | PathLike[str] | None,
+        text: str | None,
+        base: str | PathLike[str],
+        threads: int,
+        precision: str | None,
+    ) -> Steps: ...
+    def run(self, steps: int | None) -> None: ...
+    @property
+    def left(self) -> int: ...
+    @property
+    def positions(self) -> NDArray[numpy.float64]: ...
+    @property
+    def velocities(self) -> NDArray[numpy.float64]: ...
+    @property
+    def forces(self) -> NDArray[numpy.float64]: ...
+    @property
+    def types(self) -> NDArray[numpy.int32]: ...
+    @property
+    def species(self) -> list[str]: ...
+    @property
+    def box(self) -> list[list[float]]: ...
+    @property
+    def now(self) -> tuple[int, float, str, float, float, float, float, list[float]]: ...
+
 def estimate(series: ArrayLike) -> tuple[float, float]: ...
 def run_scene(
     path: str | PathLike[str] | None,
@@ -69,6 +97,15 @@ def run_scene(
     begin: Literal["new", "resume", "overwrite"],
     report: bool,
 ) -> None: ...
+def sweep(
+    scene: str | PathLike[str],
+    over: Sequence[tuple[str, Sequence[str]]],
+    out: str | PathLike[str],
+    jobs: int | None,
+    threads: int,
+    overwrite: bool,
+) -> None: ...
+def read_positions(path: str | PathLike[str]) -> NDArray[numpy.float64]: ...
 def headline(
     folder: str | PathLike[str],
 ) -> tuple[

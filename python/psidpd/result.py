@@ -10,15 +10,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _psidpd
 from .errors import InputError
+from .scenes import AnyPath, AnyScene, opened, toml
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from collections.abc import Mapping, Sequence
 
-    AnyPath = str | os.PathLike[str]
+    import numpy
+    from numpy.typing import NDArray
+    from pandas import DataFrame
 
 
 def run(
-    scene: AnyPath,
+    scene: AnyScene,
     out: AnyPath | None = None,
     *,
     base: AnyPath | None = None,
@@ -30,8 +33,8 @@ def run(
 ) -> Result:
     """Runs a scene and returns its Result, as `psidpd run SCENE --out OUT` does.
 
-    scene : path of a scene file, or its text; a text has at least one line break, and paths in it start from `base`,
-        or else from the present folder.
+    scene : path of a scene file, its text, or a dictionary with its keys: {"model": "fluid.toml", "kT": 1.0, …}. A text has at
+        least one line break. Paths in a text or a dictionary start from `base`, or else from the present folder.
     out : the folder for all files; left out, a temporary one that lives as long as the Result.
     threads : how many share the work. What a run writes does not depend on it.
     precision : "mixed" or "double"; as the scene says if left out, or else mixed.
@@ -48,16 +51,43 @@ def run(
     if resume and overwrite:
         raise InputError("resume and overwrite exclude each other")
     begin = "resume" if resume else "overwrite" if overwrite else "new"
-    is_text = isinstance(scene, str) and "\n" in scene
     temporary = None
     if out is None:
         if resume:
             raise InputError("to resume a run, say where it is: out=…")
         temporary = tempfile.TemporaryDirectory(prefix="psidpd-")
     folder = Path(out if temporary is None else temporary.name)
-    path, text = (None, scene) if is_text else (os.fspath(scene), None)
-    _psidpd.run_scene(path, text, Path(base or "."), folder, threads, precision, begin, report)
+    _psidpd.run_scene(*opened(scene, base), folder, threads, precision, begin, report)
     return Result(folder, temporary)
+
+
+def sweep(
+    scene: AnyPath,
+    over: Mapping[str, Sequence[Any]],
+    out: AnyPath,
+    *,
+    jobs: int | None = None,
+    threads: int = 1,
+    overwrite: bool = False,
+) -> DataFrame:
+    """Runs a scene with every combination of values of its keys, several runs at a time, as `psidpd sweep` does.
+
+    scene : path of a scene file.
+    over : values of keys of the scene or of its model: {"kT": [0.8, 1.0], "model.parameters.B": [20, 25]}.
+    out : the folder of the runs; each has a folder of its own there, beside sweep.csv and report.html.
+    jobs : runs side by side; processors over threads if left out.
+    overwrite : start over where runs are. Otherwise finished runs are taken as they are.
+
+    Returns the table of sweep.csv: keys, results and their errors, and the folder of each run. Ctrl-C ends the runs with
+    checkpoints and raises KeyboardInterrupt; the same call goes on from there.
+
+    Raises InputError for a scene or values that cannot be used. A run that fails has `finished` False in the table.
+    """
+    import pandas
+
+    axes = [(key, [value if isinstance(value, str) else toml(value) for value in values]) for key, values in over.items()]
+    _psidpd.sweep(os.fspath(scene), axes, os.fspath(out), jobs, threads, overwrite)
+    return pandas.read_csv(Path(out) / "sweep.csv")
 
 
 class Result:
@@ -104,6 +134,17 @@ class Result:
         table = table.astype(dict.fromkeys(numbers, float))
         table.attrs["notes"] = notes
         return table
+
+    @property
+    def positions(self) -> NDArray[numpy.float64]:
+        """Positions after the last step, wrapped into the box: shape (N, 3), in the order of the particles' tags.
+
+        Raises InputError for a run that is not finished.
+        """
+        path = self.folder / "final.data"
+        if not path.is_file():
+            raise InputError(f"{self.folder} has no final.data: the run is not finished")
+        return _psidpd.read_positions(path)
 
     @property
     def thermo(self) -> DataFrame:

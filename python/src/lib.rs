@@ -6,6 +6,7 @@
 mod arrays;
 mod engine;
 mod errors;
+mod live;
 mod model;
 mod phases;
 mod runs;
@@ -19,9 +20,11 @@ mod _psidpd {
     #[pymodule_export]
     use super::engine::{Engine, Evaluation};
     #[pymodule_export]
+    use super::live::Steps;
+    #[pymodule_export]
     use super::model::Model;
     #[pymodule_export]
-    use super::runs::{estimate, headline_of, run_scene};
+    use super::runs::{estimate, headline_of, read_positions, run_scene, sweep};
     #[pymodule_export]
     use super::{main, version};
 }

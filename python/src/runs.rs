@@ -1,5 +1,8 @@
 use crate::engine::{settings, thread_count};
-use crate::errors::{exception, wrong};
+use crate::errors::{RunStoppedError, exception, wrong};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use psidpd::experiments::sweep::{self as sweeps, Axis, Options};
+use psidpd::formats::{Configuration, Which};
 use psidpd::observe;
 use psidpd::report::{headline, write_run_report};
 use psidpd::run::{Begin, Outcome, Runner};
@@ -7,7 +10,8 @@ use psidpd::scene::Scene;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 use std::ffi::CString;
-use std::path::PathBuf;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
@@ -15,7 +19,16 @@ use std::time::{Duration, Instant};
 const INTERRUPT: usize = 2;
 
 /// The time between checks for Ctrl-C. Python reports the signal only when asked.
-const LOOK: Duration = Duration::from_millis(50);
+pub const LOOK: Duration = Duration::from_millis(50);
+
+/// The scene of a file, or of a text whose paths start from a folder.
+pub fn read_scene(path: Option<PathBuf>, text: Option<&str>, base: &Path) -> PyResult<Scene> {
+    match (path, text) {
+        (Some(path), _) => Scene::open(&path),
+        (None, text) => Scene::parse("scene", text.unwrap_or_default(), base),
+    }
+    .map_err(exception)
+}
 
 /// Runs a scene into the folder `out`: what `psidpd.run` does. The scene is the file `path`, or `text`, whose paths start
 /// from the folder `base`. `begin` is "new", "resume" or "overwrite".
@@ -35,11 +48,7 @@ pub fn run_scene(
     begin: &str,
     report: bool,
 ) -> PyResult<()> {
-    let mut scene = match (path, text) {
-        (Some(path), _) => Scene::open(&path),
-        (None, text) => Scene::parse("scene", text.unwrap_or_default(), &base),
-    }
-    .map_err(exception)?;
+    let mut scene = read_scene(path, text, &base)?;
     if let Some(name) = precision {
         scene.precision = Some(settings(name, 1)?.precision);
     }
@@ -112,6 +121,66 @@ pub fn estimate(series: &Bound<PyAny>) -> PyResult<(f64, f64)> {
         }
         Err(error) => Err(exception(error)),
     }
+}
+
+/// Runs a scene with every combination of values of its keys, which are given as in a file: what `psidpd.sweep` does.
+#[pyfunction]
+#[pyo3(signature = (scene, over, out, jobs, threads, overwrite))]
+pub fn sweep(
+    py: Python,
+    scene: PathBuf,
+    over: Vec<(String, Vec<String>)>,
+    out: PathBuf,
+    jobs: Option<usize>,
+    threads: usize,
+    overwrite: bool,
+) -> PyResult<()> {
+    let axis = |(key, values): (String, Vec<String>)| {
+        if values.is_empty() {
+            return Err(wrong(format!("{key}: no values")));
+        }
+        let edits =
+            values.iter().map(|value| format!("{key}={value}").parse()).collect::<Result<_, String>>();
+        let text = format!("{key}={}", values.join(","));
+        Ok(Axis { key, edits: edits.map_err(wrong)?, text })
+    };
+    let axes = over.into_iter().map(axis).collect::<PyResult<Vec<Axis>>>()?;
+    let threads = thread_count(threads)?;
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let jobs = match jobs {
+        Some(jobs) => thread_count(jobs)?,
+        None => NonZeroUsize::new(cores / threads.get()).unwrap_or(NonZeroUsize::MIN),
+    };
+    let options = Options { scene, edits: Vec::new(), axes, out, jobs, threads, overwrite };
+    let stop = AtomicUsize::new(0);
+    let (ended, raised) = py.detach(|| {
+        std::thread::scope(|scope| {
+            let runs = scope.spawn(|| sweeps::run(&options, &stop, &|_, _| ()));
+            let mut raised = None;
+            while !runs.is_finished() {
+                std::thread::sleep(LOOK);
+                if raised.is_none() {
+                    raised = Python::attach(|py| py.check_signals()).err();
+                    stop.store(if raised.is_some() { INTERRUPT } else { 0 }, Ordering::Relaxed);
+                }
+            }
+            (runs.join(), raised)
+        })
+    });
+    let points = ended.map_err(|_| RunStoppedError::new_err("the sweep failed"))?.map_err(exception)?;
+    let title = options.scene.file_stem().map_or("sweep".into(), |name| name.to_string_lossy());
+    sweeps::write(&options, &title, &points).map_err(exception)?;
+    raised.map_or(Ok(()), Err)
+}
+
+/// The positions of a data file, in the order of the particles' tags: shape (N, 3).
+#[pyfunction]
+pub fn read_positions(py: Python, path: PathBuf) -> PyResult<Bound<PyArray2<f64>>> {
+    let read = py.detach(|| Configuration::open(&path, Which::Last)).map_err(exception)?;
+    let mut order: Vec<usize> = (0..read.x.len()).collect();
+    order.sort_by_key(|k| read.tag.get(*k).copied());
+    let flat: Vec<f64> = order.iter().flat_map(|k| read.x[*k]).collect();
+    PyArray1::from_vec(py, flat).reshape([order.len(), 3])
 }
 
 /// A result of a run: name, value, error, unit, source, mean-field prediction, and published value with its error.

@@ -1,0 +1,185 @@
+//! A run that Python steps.
+
+use crate::engine::{settings, thread_count};
+use crate::errors::{RunStoppedError, exception, wrong};
+use crate::runs::{LOOK, read_scene};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use psidpd::run::{Live, Simulation};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Instant;
+
+type Vectors = OnceLock<Py<PyArray2<f64>>>;
+type Part = fn(&Simulation) -> &[[f64; 3]];
+
+/// The compiled part of psidpd.Simulation.
+#[pyclass(frozen, module = "psidpd")]
+pub struct Steps {
+    live: Mutex<Live>,
+    /// Arrays that were asked for; their numbers are renewed after steps.
+    positions: Vectors,
+    velocities: Vectors,
+    forces: Vectors,
+    process: u32,
+}
+
+impl Steps {
+    /// Does something with the run, without Python's lock.
+    fn with<R: Send>(&self, py: Python, act: impl FnOnce(&mut Live) -> R + Send) -> PyResult<R> {
+        if self.process != std::process::id() {
+            return Err(RunStoppedError::new_err(
+                "this Simulation belongs to another process: make one here",
+            ));
+        }
+        Ok(py.detach(|| act(&mut self.live.lock().unwrap_or_else(PoisonError::into_inner))))
+    }
+
+    /// An array of numpy that is the same at every call.
+    fn shown(&self, py: Python, array: &Vectors, of: Part) -> PyResult<Py<PyArray2<f64>>> {
+        let vectors = self.with(py, |live| by_tag(live, of))?;
+        let made = array.get_or_init(|| {
+            let made = PyArray2::zeros(py, [vectors.len(), 3], false);
+            fill(&made, &vectors);
+            made.readwrite().make_nonwriteable();
+            made.unbind()
+        });
+        Ok(made.clone_ref(py))
+    }
+}
+
+/// Vectors of all particles, in the order of tags.
+fn by_tag(live: &Live, of: Part) -> Vec<[f64; 3]> {
+    let simulation = live.simulation();
+    let mut sorted = vec![[0.0; 3]; simulation.len()];
+    for (vector, tag) in of(simulation).iter().zip(simulation.tags()) {
+        sorted[*tag as usize - 1] = *vector;
+    }
+    sorted
+}
+
+fn fill(array: &Bound<PyArray2<f64>>, vectors: &[[f64; 3]]) {
+    // SAFETY: the array was made by `Steps::shown`, contiguous and with a row for each particle; the caller holds Python's
+    // lock, and users have the array as read-only.
+    if let Ok(numbers) = unsafe { array.as_slice_mut() } {
+        numbers.copy_from_slice(vectors.as_flattened());
+    }
+}
+
+#[pymethods]
+impl Steps {
+    #[new]
+    fn new(
+        py: Python,
+        path: Option<PathBuf>,
+        text: Option<&str>,
+        base: PathBuf,
+        threads: usize,
+        precision: Option<&str>,
+    ) -> PyResult<Steps> {
+        let mut scene = read_scene(path, text, &base)?;
+        if let Some(name) = precision {
+            scene.precision = Some(settings(name, 1)?.precision);
+        }
+        let threads = thread_count(threads)?;
+        let live = py.detach(|| Live::new(scene, threads)).map_err(exception)?;
+        let tags = live.simulation().tags();
+        if tags.iter().any(|tag| !(1..=tags.len() as i32).contains(tag)) {
+            return Err(wrong("the tags of the particles must be 1 to their number"));
+        }
+        Ok(Steps {
+            live: Mutex::new(live),
+            positions: OnceLock::new(),
+            velocities: OnceLock::new(),
+            forces: OnceLock::new(),
+            process: std::process::id(),
+        })
+    }
+
+    /// Makes steps, up to the end of the scene if their number is left out. Ctrl-C ends them after the present one.
+    #[pyo3(signature = (steps))]
+    fn run(&self, py: Python, steps: Option<u64>) -> PyResult<()> {
+        let mut raised = None;
+        let outcome = self.with(py, |live| {
+            let mut looked = Instant::now();
+            live.run(steps.unwrap_or(live.left()), || {
+                if looked.elapsed() >= LOOK {
+                    looked = Instant::now();
+                    raised = Python::attach(|py| py.check_signals()).err();
+                }
+                raised.is_some()
+            })
+        })?;
+        let parts: [(&Vectors, Part); 3] = [
+            (&self.positions, Simulation::positions),
+            (&self.velocities, Simulation::velocities),
+            (&self.forces, Simulation::forces),
+        ];
+        for (array, of) in parts {
+            if let Some(array) = array.get() {
+                fill(array.bind(py), &self.with(py, |live| by_tag(live, of))?);
+            }
+        }
+        outcome.map_err(exception)?;
+        raised.map_or(Ok(()), Err)
+    }
+
+    /// The steps of the scene that are left.
+    #[getter]
+    fn left(&self, py: Python) -> PyResult<u64> {
+        self.with(py, |live| live.left())
+    }
+
+    #[getter]
+    fn positions(&self, py: Python) -> PyResult<Py<PyArray2<f64>>> {
+        self.shown(py, &self.positions, Simulation::positions)
+    }
+
+    #[getter]
+    fn velocities(&self, py: Python) -> PyResult<Py<PyArray2<f64>>> {
+        self.shown(py, &self.velocities, Simulation::velocities)
+    }
+
+    #[getter]
+    fn forces(&self, py: Python) -> PyResult<Py<PyArray2<f64>>> {
+        self.shown(py, &self.forces, Simulation::forces)
+    }
+
+    /// The index of each particle's species, in the order of tags.
+    #[getter]
+    fn types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i32>>> {
+        let types = self.with(py, |live| {
+            let simulation = live.simulation();
+            let mut types = vec![0; simulation.len()];
+            for (species, tag) in simulation.species().iter().zip(simulation.tags()) {
+                types[*tag as usize - 1] = *species;
+            }
+            types
+        })?;
+        Ok(PyArray1::from_vec(py, types))
+    }
+
+    /// The edge vectors of the box, as rows.
+    #[getter]
+    fn r#box(&self, py: Python) -> PyResult<[[f64; 3]; 3]> {
+        self.with(py, |live| [0, 1, 2].map(|k| live.simulation().domain().edge(k)))
+    }
+
+    #[getter]
+    fn species(&self, py: Python) -> PyResult<Vec<String>> {
+        self.with(py, |live| live.scene().model.species().to_vec())
+    }
+
+    /// Step number, time, name of the stage, kT of the thermostat, temperature, potential energy, kinetic energy, and the
+    /// pressure tensor in the order xx, yy, zz, xy, xz, yz.
+    #[getter]
+    #[allow(clippy::type_complexity, reason = "Python gives the numbers their names")]
+    fn now(&self, py: Python) -> PyResult<(u64, f64, String, f64, f64, f64, f64, [f64; 6])> {
+        self.with(py, |live| {
+            let (s, stage) = (live.simulation(), live.stage());
+            let energies = (s.temperature(), s.potential_energy(), s.kinetic_energy());
+            let (number, time, name) = (s.step_number(), live.time(), stage.name.clone());
+            (number, time, name, stage.kt, energies.0, energies.1, energies.2, s.pressure_tensor())
+        })
+    }
+}

@@ -1,0 +1,110 @@
+import os
+import signal
+import threading
+import time
+
+import numpy
+import psidpd
+import pytest
+from conftest import MODELS, scene
+
+SCENE = {
+    "model": MODELS / "warren2003-set6.toml",
+    "kT": 1.0,
+    "box": numpy.array([4.0, 4.0, 4.0]),
+    "density": 6.05,
+    "seed": 3,
+    "stage": [
+        {"name": "settle", "steps": 20, "dt": 0.005},
+        {"name": "produce", "steps": 40, "dt": 0.02, "integrator": "two-stage", "kT": 1.2},
+    ],
+}
+
+
+def test_steps_are_those_of_a_run():
+    """Through two stages with other steps, integrators and temperatures, in pieces, to the last bit; also with two threads."""
+    result = psidpd.run(SCENE)
+    assert result.summary["steps"] == 60
+    for threads in (1, 2):
+        simulation = psidpd.Simulation(SCENE, threads=threads)
+        seen = []
+        simulation.run(30, every=7, callback=lambda s: seen.append((s.step, s.stage)))
+        assert seen == [(7, "settle"), (14, "settle"), (21, "produce"), (28, "produce"), (30, "produce")]
+        simulation.run()
+        assert (simulation.step, simulation.kT) == (60, 1.2) and simulation.time == pytest.approx(20 * 0.005 + 40 * 0.02)
+        assert numpy.array_equal(simulation.positions, result.positions)
+        last = result.thermo.iloc[-1]
+        assert simulation.temperature == last["temperature"] and simulation.pressure[0] == last["pxx"]
+        assert simulation.potential_energy == pytest.approx(last["potential"], rel=1e-12)
+        simulation.run(5)
+        assert simulation.step == 65 and simulation.stage == "produce"
+
+
+def test_arrays_follow_the_run_and_cannot_be_written():
+    simulation = psidpd.Simulation(SCENE)
+    x, v = simulation.positions, simulation.velocities
+    before = x.copy()
+    assert x.shape == (len(simulation.types), 3) and simulation.positions is x
+    simulation.run(1)
+    # One step of velocity Verlet moves a particle by about its velocity times the step.
+    moved = x - before
+    moved -= 4.0 * numpy.round(moved / 4.0)
+    assert 0.0 < numpy.abs(moved).max() < 0.005 * 10.0 and simulation.velocities is v
+    with pytest.raises(ValueError, match="read-only"):
+        x[0] = 0.0
+    assert numpy.array_equal(simulation.box, 4.0 * numpy.eye(3)) and simulation.species == ["F"]
+    energy = 0.5 * (v**2).sum()
+    assert simulation.kinetic_energy == pytest.approx(energy) and abs(v.sum(axis=0)).max() < 1e-9
+
+
+def test_forces_are_those_of_the_engine():
+    """Two-stage steps keep drag and noise apart, so that what is left is the gradient of the energy."""
+    simulation = psidpd.Simulation(SCENE | {"stage": [{"steps": 9, "dt": 0.02, "integrator": "two-stage"}]}, precision="double")
+    simulation.run()
+    model = psidpd.Model.from_file(MODELS / "warren2003-set6.toml")
+    found = psidpd.Engine(model, kT=1.0).evaluate(simulation.positions, box=4.0)
+    assert simulation.potential_energy == pytest.approx(found.energy, rel=1e-10)
+    assert numpy.abs(simulation.forces - found.forces).max() < 1e-8
+
+
+def test_ctrl_c_stops_at_once_and_keeps_the_state():
+    simulation = psidpd.Simulation(scene(10**9))
+    threading.Thread(target=lambda: (time.sleep(0.4), os.kill(os.getpid(), signal.SIGINT))).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        simulation.run()
+    assert time.monotonic() - began < 10.0
+    step = simulation.step
+    assert step > 0
+    simulation.run(3)
+    assert simulation.step == step + 3 and 0.5 < simulation.temperature < 2.0
+    whole = psidpd.Simulation(scene(10**9))
+    whole.run(step + 3)
+    assert numpy.array_equal(whole.positions, simulation.positions)
+
+
+def test_what_cannot_be_done_is_said():
+    simulation = psidpd.Simulation(SCENE)
+    with pytest.raises(ZeroDivisionError):
+        simulation.run(10, every=2, callback=lambda s: 1 / 0)
+    assert simulation.step == 2
+    for wrong in ({"steps": -1}, {"every": 2}, {"every": 0, "callback": print}):
+        with pytest.raises(psidpd.InputError):
+            simulation.run(**wrong)
+    with pytest.raises(psidpd.InputError, match="kT"):
+        psidpd.Simulation({**SCENE, "kT": -1.0})
+    with pytest.raises(psidpd.InputError, match="set"):
+        psidpd.run({**SCENE, "density": {6.05}})
+    with pytest.raises(psidpd.RunStoppedError):
+        psidpd.Simulation({**SCENE, "stage": [{"steps": 10, "dt": 1e6}]}).run()
+
+
+def test_a_sweep_is_a_table(tmp_path):
+    (tmp_path / "scene.toml").write_text(scene(40).replace("density = 6.05\n", "density = 5.0\n"))
+    table = psidpd.sweep(tmp_path / "scene.toml", {"density": [5.0, 6.0], "kT": [1.0]}, tmp_path / "out")
+    assert list(table["density"]) == [5.0, 6.0] and table["finished"].all()
+    # 64 ρ particles.
+    counts = [len(psidpd.Result(tmp_path / "out" / folder).positions) for folder in table["folder"]]
+    assert counts == [320, 384]
+    with pytest.raises(psidpd.InputError):
+        psidpd.sweep(tmp_path / "scene.toml", {"densty": [5.0]}, tmp_path / "other")

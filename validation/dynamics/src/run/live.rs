@@ -1,0 +1,93 @@
+use super::error::RunError;
+use super::simulation::Simulation;
+use crate::scene::{Scene, Stage};
+use psidpd_core::engine::{Settings, Want};
+use psidpd_formats::memory;
+use std::num::NonZeroUsize;
+
+/// A scene in memory, without files: its stages are made step by step as the caller asks for them. The trajectory has the
+/// same bits as that of a [`Runner`](super::Runner).
+#[derive(Debug)]
+pub struct Live {
+    scene: Scene,
+    simulation: Simulation,
+    stage: usize,
+    /// The steps made in the present stage.
+    done: u64,
+    /// The time at which the present stage began.
+    begin: f64,
+}
+
+impl Live {
+    /// Prepares the first step of a scene.
+    ///
+    /// # Errors
+    /// The initial state is invalid, or its particles do not fit into memory.
+    pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
+        memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
+        let mut simulation = scene.simulation(scene.initial_state())?;
+        let precision = scene.precision();
+        simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;
+        simulation.set_reordering(true);
+        let mut live = Live { scene, simulation, stage: 0, done: 0, begin: 0.0 };
+        live.enter()?;
+        Ok(live)
+    }
+
+    fn enter(&mut self) -> Result<(), RunError> {
+        let stage = &self.scene.stages[self.stage];
+        self.scene.enter(stage, &mut self.simulation)?;
+        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)
+    }
+
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    pub fn stage(&self) -> &Stage {
+        &self.scene.stages[self.stage]
+    }
+
+    pub fn time(&self) -> f64 {
+        self.begin + self.done as f64 * self.stage().dt
+    }
+
+    /// The steps of the scene that are left.
+    pub fn left(&self) -> u64 {
+        let all: u64 = self.scene.stages.iter().map(|stage| stage.steps).sum();
+        all.saturating_sub(self.simulation.step_number())
+    }
+
+    /// Makes `steps` steps, with the totals after the last one. Beyond the end of the scene the steps are those of its last
+    /// stage. `stop` is asked before each step; the step after its first `true` is the last.
+    ///
+    /// # Errors
+    /// The physics fails, as in [`Simulation::step`].
+    pub fn run(&mut self, steps: u64, mut stop: impl FnMut() -> bool) -> Result<(), RunError> {
+        for k in 1..=steps {
+            if self.done == self.stage().steps && self.stage + 1 < self.scene.stages.len() {
+                (self.begin, self.stage, self.done) = (self.time(), self.stage + 1, 0);
+                self.enter()?;
+            }
+            let last = stop() || k == steps;
+            let want = if last { Want::TOTALS } else { Want::FORCES };
+            let (dt, integrator) = (self.stage().dt, self.stage().integrator);
+            self.simulation.set_settling(self.scene.settles(self.stage, self.done));
+            self.simulation.begin_step(dt, integrator, want)?;
+            self.done += 1;
+            // A stage begins with the velocities at the end of the step before it.
+            if last || self.done == self.stage().steps {
+                self.simulation.end_step()?;
+                self.simulation.refresh(want)?;
+            }
+            if last {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
