@@ -59,7 +59,7 @@ def test_arrays_follow_the_run_and_cannot_be_written():
 
 def test_forces_are_those_of_the_engine():
     """Two-stage steps keep drag and noise apart, so that what is left is the gradient of the energy."""
-    simulation = psidpd.Simulation(SCENE | {"stage": [{"steps": 9, "dt": 0.02, "integrator": "two-stage"}]}, precision="double")
+    simulation = psidpd.Simulation(SCENE | {"stage": [{"name": "run", "steps": 9, "dt": 0.02, "integrator": "two-stage"}]}, precision="double")
     simulation.run()
     model = psidpd.Model.from_file(MODELS / "warren2003-set6.toml")
     found = psidpd.Engine(model, kT=1.0).evaluate(simulation.positions, box=4.0)
@@ -96,7 +96,7 @@ def test_what_cannot_be_done_is_said():
     with pytest.raises(psidpd.InputError, match="set"):
         psidpd.run({**SCENE, "density": {6.05}})
     with pytest.raises(psidpd.RunStoppedError):
-        psidpd.Simulation({**SCENE, "stage": [{"steps": 10, "dt": 1e6}]}).run()
+        psidpd.Simulation({**SCENE, "stage": [{"name": "run", "steps": 10, "dt": 1e6}]}).run()
 
 
 def test_a_sweep_is_a_table(tmp_path):
