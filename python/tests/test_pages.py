@@ -10,8 +10,8 @@ from conftest import ROOT
 
 PAGES = [page for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))] if "```python" in page.read_text()]
 
-# Needs files of a run; tests/tests/read_back.rs reads them.
-ELSEWHERE = {"output.md"}
+# The page on output needs files of a run, which tests/tests/read_back.rs reads. Notebooks are run by test_notebooks.py.
+ELSEWHERE = {"output.md", *(page.name for page in (ROOT / "docs").glob("notebook-*.md"))}
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name not in ELSEWHERE], ids=lambda page: page.stem)
