@@ -152,7 +152,7 @@ impl Work<'_> {
                 | "change_box",
                 rest @ ..,
             ] if names_built_in(rest) => {
-                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi")
+                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi");
             }
             _ => {}
         }
