@@ -25,7 +25,7 @@ class PairDPDPsi : public PairPsi {
   void read_settings(int narg, char **arg) override
   {
     if (narg < 2)
-      stop("expected 'pair_style dpd/psi T seed' and perhaps keywords, found " + std::to_string(narg) +
+      stop("expected 'pair_style dpd/psi T seed' and optional keywords, found " + std::to_string(narg) +
            " arguments");
     read_temperature(arg[0]);
     read_seed(arg[1]);
@@ -84,7 +84,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
   if (strcmp(arg[0], "*") != 0 || strcmp(arg[1], "*") != 0)
     stop("pair_coeff must begin with '* *': one model file describes all types");
   if (!allocated) allocate();
-  if (given) warn(std::string("this pair_coeff replaces the model ") + source + " of the one before");
+  if (given) warn(std::string("this pair_coeff replaces the model ") + source + " of the previous pair_coeff");
 
   // The file is searched as other styles do: in the working folder, then in LAMMPS_POTENTIALS.
   std::string path = utils::get_potential_file_path(arg[2]);

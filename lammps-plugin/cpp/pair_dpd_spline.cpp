@@ -22,7 +22,7 @@ class PairDPDSpline : public PairTable {
   void read_settings(int narg, char **arg) override
   {
     if (narg < 3)
-      stop("expected 'pair_style dpd/spline T cutoff seed' and perhaps keywords, found " + std::to_string(narg) +
+      stop("expected 'pair_style dpd/spline T cutoff seed' and optional keywords, found " + std::to_string(narg) +
            " arguments");
     read_temperature(arg[0]);
     read_cutoff(arg[1]);

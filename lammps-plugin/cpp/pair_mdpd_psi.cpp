@@ -24,7 +24,7 @@ class PairMDPDPsi : public PairTable {
   void read_settings(int narg, char **arg) override
   {
     if (narg < 3)
-      stop("expected 'pair_style mdpd/psi T cutoff seed' and perhaps keywords, found " + std::to_string(narg) +
+      stop("expected 'pair_style mdpd/psi T cutoff seed' and optional keywords, found " + std::to_string(narg) +
            " arguments");
     read_temperature(arg[0]);
     read_cutoff(arg[1]);

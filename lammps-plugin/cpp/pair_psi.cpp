@@ -218,12 +218,12 @@ void PairPsi::init_style()
 void PairPsi::advise()
 {
   if (lmp->suffix_enable)
-    warn("there is no accelerated variant: the suffix has no effect on it; it has the keywords 'precision mixed' and "
+    warn("there is no accelerated variant, and the suffix has no effect: use the keywords 'precision mixed' and "
          "'threads'");
   const size_t used = (*style)->threads();
   if (used < threads)
-    warn("threads " + std::to_string(threads) + " is more than the processors that this process may use: " +
-         std::to_string(used) + " run, with the same results");
+    warn("threads " + std::to_string(threads) + " is more than the processors that this process may use: using " +
+         std::to_string(used) + ", with the same results");
 }
 
 std::string PairPsi::search()
@@ -247,7 +247,7 @@ double PairPsi::init_one(int i, int j)
 {
   if (setflag[i][j] == 0)
     stop("no coefficients for types " + std::to_string(i) + " and " + std::to_string(j) +
-         ": there is no mixing, set them with pair_coeff");
+         ": this style does not mix them, set them with pair_coeff");
   refresh();
   asked[static_cast<size_t>(i - 1) * atom->ntypes + j - 1] = 1;
   return (*style)->cutoff();

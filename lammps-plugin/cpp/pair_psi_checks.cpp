@@ -124,5 +124,5 @@ void PairPsi::check_lost()
   if (!text.empty())
     warn("at step " + std::to_string(update->ntimestep) + " " + text +
          ": they went past all neighboring ranks, or out of a box that is not periodic, between two builds of lists; a "
-         "shorter timestep and 'neigh_modify every 1' help against the former");
+         "shorter timestep and 'neigh_modify every 1' help in the first case");
 }

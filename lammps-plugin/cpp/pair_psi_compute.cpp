@@ -111,7 +111,7 @@ void PairPsi::compute(int eflag, int vflag)
     check_lost();
     if (domain->box_change) check_box();
     if (why_listed.empty() && neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol != rules)
-      stop("pairs were excluded after the style was set up, by a fix perhaps: run again");
+      stop("pairs were excluded after the setup of the style, perhaps by a fix: run again");
     if (why_listed.empty() && is_scaled() && is_narrow())
       stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
     find_images();
@@ -256,7 +256,7 @@ double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, d
   const bool many_body = (*style)->slope_width() > 0;
   if (many_body && !is_pair(i, j, itype, jtype, rsq))
     stop_here("asked for the energy of a pair that the last evaluation does not contain, as of an atom to be inserted or "
-              "moved: a many-body energy is no sum over pairs; fix gcmc and fix widom need full_energy with a many-body "
+              "moved: a many-body energy is not a sum over pairs; fix gcmc and fix widom need full_energy with a many-body "
               "style, and pair_write cannot be used");
   if (many_body && without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
     without_slopes = {-1, -1};

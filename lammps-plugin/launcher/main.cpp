@@ -77,7 +77,7 @@ class PluginCommand : protected Pointers {
     else if (verb == "unload" && narg == 3)
       unload(arg[1], arg[2]);
     else
-      leave("psidpd-lmp knows the plugin command as 'plugin load psidpdplugin.so', 'plugin list' and "
+      leave("psidpd-lmp understands the plugin command as 'plugin load psidpdplugin.so', 'plugin list' and "
             "'plugin unload pair STYLE' or 'plugin unload fix STYLE' only");
   }
 

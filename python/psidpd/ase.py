@@ -35,7 +35,7 @@ class Psidpd(Calculator):
         if symbol not in self.species and len(self.names) == 1:
             return 0
         raise InputError(
-            f"the symbol {symbol} is no species of this model ({', '.join(self.names)}): give species={{{symbol!r}: …}}"
+            f"the symbol {symbol} is not a species of this model ({', '.join(self.names)}): give species={{{symbol!r}: …}}"
         )
 
     def calculate(self, atoms=None, properties=None, system_changes=all_changes):

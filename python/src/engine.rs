@@ -153,7 +153,7 @@ impl Engine {
         let Some(types) = types else { return Ok(vec![0; count]) };
         if types.is_instance_of::<PyString>() {
             return Err(wrong(format!(
-                "types must have an index or a name of a species for each particle, as a list: is the one text {}",
+                "types must have an index or a name of a species for each particle, as a list; found the single text {}",
                 types.repr()?
             )));
         }

@@ -97,7 +97,9 @@ impl Model {
         }
         let densities = rho.as_slice()?;
         if let Some(rho) = densities.iter().find(|rho| !(**rho >= 0.0 && rho.is_finite())) {
-            return Err(wrong(format!("a density is a finite number that is not negative, not {rho}")));
+            return Err(wrong(format!(
+                "a density must be a finite number that is not negative, found {rho}"
+            )));
         }
         let pressures: Vec<f64> =
             py.detach(|| densities.chunks_exact(species).map(|d| theory.pressure(d)).collect());

@@ -326,7 +326,7 @@ fn every_template_can_be_written_checked_and_run() {
         assert_eq!(run.status.code(), Some(0), "{template}: {}", said(&run));
         let again = psidpd(here, &["new", template, "--template", template]);
         assert_eq!(again.status.code(), Some(2));
-        assert!(said(&again).contains("is there already"), "{}", said(&again));
+        assert!(said(&again).contains("already exists"), "{}", said(&again));
     }
     let unknown = psidpd(here, &["new", "x", "--template", "tube"]);
     assert_eq!(unknown.status.code(), Some(2));

@@ -85,7 +85,10 @@ fn is_the_same_fluid(style: &str) {
     let hidden = format!("{}if \"1 > 0\" then \"fix 2 all mvv/dpd\"\n", OLD.replace("STYLE", style));
     std::fs::write(at("in.hidden"), &hidden).unwrap();
     let out = psidpd(folder.path(), &["lammps", "convert", "in.hidden", "--law", "lucy"]);
-    let expected = format!("by hand  line {:4}: names the built-in style", hidden.lines().count());
+    let expected = format!(
+        "by hand  line {:4}: names the built-in style: rewrite it for mdpd/psi",
+        hidden.lines().count()
+    );
     assert!(out.status.code() == Some(1) && said(&out).contains(&expected), "{}", said(&out));
     let missing = psidpd(folder.path(), &["lammps", "convert", "in.nowhere"]);
     assert_eq!(missing.status.code(), Some(2), "{}", said(&missing));

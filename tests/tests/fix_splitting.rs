@@ -325,7 +325,7 @@ fn a_restart_goes_on_as_the_unbroken_run() {
     }
 }
 
-/// Energies printed after a step equal those computed anew at its end. The virial also includes the impulses.
+/// Energies printed after a step equal those computed again at its end. The virial also includes the impulses.
 #[test]
 fn energies_are_those_of_ends_of_steps() {
     for (fix, ranks_have) in [("two-stage", 33), ("force-gradient", 33), ("aboba", 33)] {

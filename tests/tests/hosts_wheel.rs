@@ -148,7 +148,7 @@ fn the_loaded_file_needs_nothing_of_lammps() {
     let alone = folder.path().join("psidpdplugin.so");
     std::fs::copy(plugin, &alone).unwrap();
     let error = outcome(&alone).unwrap_err();
-    assert!(error.contains("psidpd-styles.so is not beside psidpdplugin.so"), "{error}");
+    assert!(error.contains("psidpd-styles.so is not in the folder of psidpdplugin.so"), "{error}");
     // The error names truncated styles, cut at the end of the file or within its first lines.
     let styles = plugin.with_file_name("psidpd-styles.so");
     let bytes = std::fs::read(&styles).unwrap();

@@ -205,7 +205,7 @@ fn a_truncated_checkpoint_falls_back_to_the_one_before() {
     newest.set_len(1000).unwrap();
     let words = finished(&run(here, "cut", &["--resume"]));
     assert!(words.contains("checkpoint is truncated: 1000 bytes of "), "{words}");
-    assert!(words.contains("going on from the one before"), "{words}");
+    assert!(words.contains("going on from the previous checkpoint"), "{words}");
     assert_same(whole, &out);
     // With both checkpoints damaged no file changes.
     let out = interrupted(here, "both", Signal::INT).0;

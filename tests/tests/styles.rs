@@ -75,7 +75,7 @@ fn mistakes_stop_with_one_clear_line() {
         (
             style,
             "pair_style dpd/psi 1.0".into(),
-            "expected 'pair_style dpd/psi T seed' and perhaps keywords, found 1 arguments",
+            "expected 'pair_style dpd/psi T seed' and optional keywords, found 1 arguments",
         ),
         (style, "pair_style dpd/psi 1.0 5 6".into(), "keyword '6' needs a value"),
         (style, "pair_style dpd/psi 1.0 5 law lucy".into(), "unknown keyword 'law': expected 'precision' or"),
@@ -231,7 +231,7 @@ fn b_by_type_pair_is_refused_with_the_reason() {
     assert!(error.contains("partial densities"), "{error}");
     let missing = text.replace("pair_coeff 1 2 -30 20 18 1 0.75\n", "");
     let error = outcome(&format!("{missing}\n"), 1).unwrap_err();
-    assert!(error.contains("no coefficients for types 1 and 2: there is no mixing"), "{error}");
+    assert!(error.contains("no coefficients for types 1 and 2: this style does not mix them"), "{error}");
     let same = text.replace("-30 20", "-30 25");
     assert!(outcome(&format!("{same}\n"), 1).is_ok());
 }

@@ -108,7 +108,7 @@ fn more_than_a_machine_has_is_refused_with_a_number() {
     let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "few", "--threads", "1000"]));
     let processors = std::thread::available_parallelism().unwrap().get();
     assert!(code == Some(0) && text.contains("1000 threads are more than the processors"), "{text}");
-    assert!(text.contains(&format!(": {processors} run, with the same results")), "{text}");
+    assert!(text.contains(&format!(": using {processors}, with the same results")), "{text}");
     for (range, times) in [("20", "5.0 times"), ("1e6", "250000.0 times")] {
         scene(range);
         let begun = Instant::now();

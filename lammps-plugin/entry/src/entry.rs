@@ -44,7 +44,7 @@ unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
         (styles::symbol(c"lammps_version"), styles::symbol(c"lammps_extract_setting"))
     else {
         return Some(format!(
-            "The psidpd plugin was built for LAMMPS {}, and finds no functions of LAMMPS's C interface here.",
+            "The psidpd plugin was built for LAMMPS {}, and does not find the functions of LAMMPS's C interface here.",
             named(BUILT_FOR)
         ));
     };

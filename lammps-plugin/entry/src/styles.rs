@@ -74,11 +74,9 @@ pub fn load() -> Result<&'static [Style], String> {
 
 /// The whole table of the styles; the condition of [`load`] applies.
 pub fn table() -> Result<&'static Styles, String> {
-    let path = folders()
-        .into_iter()
-        .map(|folder| folder.join(FILE))
-        .find(|path| path.is_file())
-        .ok_or_else(|| format!("{FILE} is not beside psidpdplugin.so: the two belong together"))?;
+    let path = folders().into_iter().map(|folder| folder.join(FILE)).find(|path| path.is_file()).ok_or_else(
+        || format!("{FILE} is not in the folder of psidpdplugin.so: keep both files in one folder"),
+    )?;
     if let Some((wanted, has)) = whole::sizes(&path)
         && has < wanted
     {
@@ -102,7 +100,7 @@ pub fn table() -> Result<&'static Styles, String> {
     // SAFETY: the second file fills its first field with a static C string.
     let built = unsafe { CStr::from_ptr(table.built) };
     if built.to_bytes_with_nul() != BUILT.as_bytes() {
-        return Err(format!("{} is of another build ({})", path.display(), built.to_string_lossy()));
+        return Err(format!("{} is from another build ({})", path.display(), built.to_string_lossy()));
     }
     Ok(table)
 }

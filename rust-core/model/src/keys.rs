@@ -157,13 +157,12 @@ pub const CURVES: Table = Table {
             equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
     keys: keys! {
         "table": ValueKind::TableFile, OPTIONAL,
-            "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; if the first row is \
-             no numbers it names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
+            "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; a first row that is not numeric names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
              its exact slope; beyond the ends psi' goes on linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the \
              environment the file may be anywhere."
             => "[excess_free_energy]\nA = { table = \"psi.csv\" }";
         "pressure": ValueKind::Words("string with a formula, or `{ table = \"FILE\" }`"), OPTIONAL,
-            "The equation of state wanted, for one species: a formula of `rho` and `kT`, or a table with rows of `rho` and \
+            "The required equation of state, for one species: a formula of `rho` and `kT`, or a table with rows of `rho` and \
              `p`, measured at the kT of the run. `psi' = (p - rho kT)/rho^2`; psi is its integral, from a density where \
              it is finite. Beyond the ends of a table psi' goes on linearly."
             => "[excess_free_energy]\nA = { pressure = \"rho*kT/(1 - 0.016*rho) - 0.03*rho^2\" }";
@@ -195,7 +194,7 @@ pub const PAIR: Table = Table {
     array: true,
     forms: ("form", FORMS),
     about: "A pair potential `phi(r)`, added to the many-body terms; any number of them. In a model with \
-            interactions every two species must have one, of strength 0 if that is meant.",
+            interactions every two species must have one, of strength 0 if they do not interact.",
     keys: &joined::<{ PAIR_KEYS.len() + count(FORM_KEYS) }>(PAIR_KEYS, FORM_KEYS),
 };
 
@@ -242,7 +241,7 @@ pub const LITERATURE: Table = Table {
     array: true,
     forms: ("", &[]),
     about: "Measured values that were published for the fluid, by temperature: each a value and its error. Nothing is \
-            computed from them; `theory`, `run` and reports put them beside theory and what is measured.",
+            computed from them; `theory`, `run` and reports show them next to theory and measurements.",
     keys: keys! {
         "kT": ValueKind::Positive, REQUIRED,
             "The temperature."
@@ -254,7 +253,7 @@ pub const LITERATURE: Table = Table {
             "Pressure of the homogeneous fluid at `density`."
             => "[[literature]]\nkT = 1.0\ndensity = 3.0\npressure = [23.65, 0.05]";
         "liquid": ValueKind::Words(ERROR), OPTIONAL,
-            "Number density of the liquid beside its vapour."
+            "Number density of the liquid in equilibrium with its vapour."
             => "[[literature]]\nkT = 1.0\nliquid = [6.05, 0.01]";
         "vapour": ValueKind::Words(ERROR), OPTIONAL,
             "Number density of the vapour."

@@ -39,8 +39,8 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Reason::ListedPairs => "the host lists the pairs",
-            Reason::ParticleValues => "energies or virials of single particles are wanted",
-            Reason::Densities => "a density is wanted that no force needs",
+            Reason::ParticleValues => "energies or virials of single particles are needed",
+            Reason::Densities => "a density is requested that no force needs",
             Reason::Box => "the box is narrower than twice the cut-off, or its edges are turned",
             Reason::Asked => "it was asked for",
         })

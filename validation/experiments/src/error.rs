@@ -76,19 +76,19 @@ pub enum ExperimentError {
     WhichDensity(String),
     #[error("{0}")]
     Conditions(String),
-    #[error("the wanted pressure at density {0} is not a finite number: choose another range of densities")]
+    #[error("the required pressure at density {0} is not a finite number: choose another range of densities")]
     NoTarget(f64),
     #[error(
         "{}: no correction could be measured at densities {low} to {high} ({failed}): use a smaller --dt, or a narrower --density range",
         model.display()
     )]
     NoCorrection { model: PathBuf, low: f64, high: f64, failed: String },
-    #[error("no folder for the runs: {0}")]
+    #[error("cannot make a folder for the runs: {0}")]
     Folder(std::io::Error),
     #[error("{points} runs are more than the {most} that a sweep may have: use fewer values")]
     TooManyRuns { points: usize, most: usize },
     #[error(
-        "{} has the run {row}, which is none of this sweep and would be lost from the table: choose another folder, sweep over \
+        "{} has the run {row}, which is not part of this sweep and would be lost from the table: choose another folder, sweep over \
          values with the old ones among them, or replace the table with --overwrite", path.display()
     )]
     OtherGrid { path: PathBuf, row: String },

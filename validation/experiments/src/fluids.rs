@@ -81,7 +81,7 @@ impl Subject {
 pub struct WarrenSet {
     /// Its name in the paper.
     pub name: &'static str,
-    /// The fluid as it is shipped, at the density of the liquid beside its vapour.
+    /// The fluid as it is shipped, at the density of the liquid in equilibrium with its vapour.
     pub fluid: Subject,
     /// `B`; `A` is −40, `r_c` 1 and `r_d` 0.75 in both.
     pub b: f64,

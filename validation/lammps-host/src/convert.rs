@@ -94,7 +94,7 @@ pub fn files(
                 results.push((beside(path, &new_name(name, DATA)), text));
             }
             Some(_) => new.by_hand.push(Note {
-                text: format!("{name} is not there: take the density out of its atoms, {column}"),
+                text: format!("{name} does not exist: take the density out of its atoms, {column}"),
                 ..note.clone()
             }),
             None => new.left.push(Note { text: format!("{name} {without_out}"), ..note.clone() }),
@@ -104,7 +104,7 @@ pub fn files(
     if let Some((path, _)) = results.iter().find(|(path, _)| !overwrite && path.is_file()) {
         let path = path.display();
         return Err(LammpsError::Request(format!(
-            "{path} is there already: replace it with --overwrite, or choose another --out"
+            "{path} already exists: replace it with --overwrite, or choose another --out"
         )));
     }
     for (path, text) in &results {

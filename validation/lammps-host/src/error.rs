@@ -77,7 +77,7 @@ pub enum LammpsError {
     NoHeader { header: &'static str, include: PathBuf, package: &'static str },
     #[error("no C++ compiler ({compiler} does not run): install one (Debian: apt install g++) or set CXX")]
     NoCompiler { compiler: String },
-    #[error("the plugin is built from the psidpd sources, but {} is not there: run from a checkout", path.display())]
+    #[error("the plugin is built from the psidpd sources, but {} does not exist: run from a checkout", path.display())]
     NoSources { path: PathBuf },
     #[error("building the plugin failed:\n{output}")]
     Build { output: String },

@@ -235,7 +235,9 @@ impl Lammps {
     /// A thermodynamic quantity of the last step: `temp`, `pe`, `press`, `pxy`, `c_ID[2]` …
     pub fn thermo(&self, name: &str) -> Result<f64, LammpsError> {
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "_[]*".contains(c)) {
-            return Err(LammpsError::Request(format!("'{name}' is no name of a thermodynamic quantity")));
+            return Err(LammpsError::Request(format!(
+                "'{name}' is not the name of a thermodynamic quantity"
+            )));
         }
         if self.library.lammps_eval.is_ok() {
             // `lammps_get_thermo` returns 0 for unknown names, so compound names are evaluated as expressions.

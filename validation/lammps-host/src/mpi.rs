@@ -58,7 +58,7 @@ pub(super) fn library_of(lammps: &Path) -> Result<Option<PathBuf>, LammpsError> 
         Command::new(ldd).arg(lammps).stdin(Stdio::null()).output().map_err(LammpsError::io("run", ldd))?;
     mpi_among(&String::from_utf8_lossy(&out.stdout)).map_err(|name| LammpsError::Load {
         path: lammps.to_owned(),
-        reason: format!("it needs {name}, which is not there: install that MPI"),
+        reason: format!("it needs {name}, which is not installed: install that MPI"),
     })
 }
 

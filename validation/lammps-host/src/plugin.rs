@@ -320,7 +320,7 @@ fn note_of(plugin: &Path) -> PathBuf {
 pub fn built_for(plugin: &Path) -> Result<BuiltFor, LammpsError> {
     let unknown = |reason: String| LammpsError::PluginUnknown { plugin: plugin.to_owned(), reason };
     if !plugin.is_file() {
-        return Err(unknown("the file is not there".into()));
+        return Err(unknown("the file does not exist".into()));
     }
     let note = note_of(plugin);
     let text = fs::read_to_string(&note).map_err(|e| unknown(format!("{}: {e}", note.display())))?;

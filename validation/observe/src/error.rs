@@ -10,7 +10,7 @@ pub enum ObserveError {
     Overflow,
     #[error("{times} times but {values} values")]
     Times { times: usize, values: usize },
-    #[error("time {index} is not a finite number later than the one before")]
+    #[error("time {index} is not a finite number later than the previous one")]
     Time { index: usize },
     #[error("the pressure components differ in length: {xx} xx, {yy} yy, {zz} zz")]
     Pressures { xx: usize, yy: usize, zz: usize },

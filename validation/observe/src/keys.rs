@@ -95,7 +95,7 @@ A run writes what it measured to `observables.json` and, one file each, to `obse
 ```
 
 A `scalar` has one value in each column and no `x`; the first columns of a `field` are the coordinates of its
-points. `null` stands for a value, or an error, that there is not: a temperature where no particle came, the
+points. `null` stands for a value, or an error, that does not exist: a temperature where no particle came, the
 error of a single sample.
 
 **Error bars** are one standard deviation. Samples that follow each other are correlated; the error of a mean is that of

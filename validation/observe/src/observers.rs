@@ -152,7 +152,7 @@ impl Observers {
             for mut observation in sampled.meter.finish() {
                 observation.stage.clone_from(&sampled.stage);
                 if sampled.left_out > 0 {
-                    let text = format!("{} samples had no value and were left out.", sampled.left_out);
+                    let text = format!("Samples without a value, left out: {}.", sampled.left_out);
                     observation = observation.note(text);
                 }
                 all.push(observation);

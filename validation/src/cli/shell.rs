@@ -18,7 +18,7 @@ pub struct Completions {
 /// Write manual pages: psidpd.1, and one for each verb.
 #[derive(Debug, clap::Args)]
 pub struct Man {
-    /// Folder for the pages; it is made if need be.
+    /// Folder for the pages; it is made if necessary.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

@@ -213,7 +213,7 @@ fn values(
             let evaluator = Evaluator::new(fluid)?;
             if configuration.species.iter().any(|s| *s as usize >= model.species().len()) {
                 return Err(request(format!(
-                    "the model has {} species, the file more",
+                    "the model has only {} species, the file has more",
                     model.species().len()
                 )));
             }
@@ -273,7 +273,7 @@ fn index(name: &str, names: &[String]) -> Result<usize, Failure> {
     names
         .iter()
         .position(|n| n == name)
-        .ok_or_else(|| request(format!("no species {name}: there are {}", names.join(", "))))
+        .ok_or_else(|| request(format!("no species {name} in the model; it has {}", names.join(", "))))
 }
 
 /// The weight function of the model's first density, with the range of the command line if given.

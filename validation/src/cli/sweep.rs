@@ -27,7 +27,7 @@ pub struct Arguments {
     /// Threads of each run.
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
-    /// Start over where runs are, finished or not.
+    /// Start over in folders that hold runs, finished or not.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]

@@ -267,7 +267,10 @@ impl<'a> Value<'a> {
         let numbers: Vec<f64> =
             items.iter().map(|v| v.number().map(|x| x.value)).collect::<Result<_, _>>()?;
         <[f64; N]>::try_from(numbers).map_err(|_| {
-            self.error(FileErrorKind::Value(format!("expected {expected}, found {} values", items.len())))
+            self.error(FileErrorKind::Value(format!(
+                "expected {expected}, found an array of length {}",
+                items.len()
+            )))
         })
     }
 }

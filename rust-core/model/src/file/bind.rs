@@ -153,7 +153,7 @@ fn bind_slopes(
     if let Some(v) = (0..variables.count).find(bounded) {
         let name = &densities[v / context.species].name;
         let message =
-            format!("density {name} has bounds, beyond which psi goes on; stated slopes have no psi");
+            format!("density {name} has bounds, beyond which psi is continued; stated slopes have no psi");
         return Err(FileError::new(source, 0..0, "excess_free_energy", FileErrorKind::Value(message))
             .with_help("leave the bounds out, or limit the density in the formula with min and max"));
     }

@@ -109,7 +109,9 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
         return whole(
             "pair",
             format!("nothing acts between species {a} and {b}"),
-            format!("add a [[pair]] with between = [\"{a}\", \"{b}\"], of strength 0 if that is meant"),
+            format!(
+                "add a [[pair]] with between = [\"{a}\", \"{b}\"], of strength 0 if they do not interact"
+            ),
         );
     }
     let held: Vec<bool> = fluid.thermostats.iter().map(Option::is_some).collect();
@@ -117,7 +119,7 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
         let (a, b) = (&fluid.species[a], &fluid.species[b]);
         return whole(
             "thermostat",
-            format!("species {a} and {b} have none, others have"),
+            format!("species {a} and {b} have no thermostat, but other pairs have one"),
             "leave `between` out for a thermostat of every pair, or add one with gamma = 0".into(),
         );
     }

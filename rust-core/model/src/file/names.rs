@@ -24,8 +24,9 @@ pub fn read_species(root: &Section) -> Result<Located<Vec<String>>, FileError> {
             ))));
         }
         if name == "NULL" {
-            return Err(item
-                .error(FileErrorKind::Value("NULL is what pair_coeff calls a type without species".into())));
+            return Err(item.error(FileErrorKind::Value(
+                "NULL is reserved: pair_coeff uses it for a type without species".into(),
+            )));
         }
         if names.contains(&name) {
             return Err(item.error(FileErrorKind::Value(format!("\"{name}\" is named twice"))));
@@ -43,7 +44,7 @@ pub fn check_identifier(name: &Located<String>, section: &Section) -> Result<(),
     let problem = if !starts || !goes_on {
         "is not a name: a letter or underscore, then letters, digits and underscores"
     } else if name.value == "kT" {
-        "kT is the host's: it is not set in a model file"
+        "the scene or the host code sets kT, not the model file"
     } else if name.value == "pi" || KNOWN_FUNCTIONS.contains(&name.value.as_str()) {
         "is the name of a constant or function of formulas"
     } else {

@@ -114,7 +114,7 @@ range = 1
 "#;
     let error = error_of(text).to_string();
     assert!(error.contains("nothing acts between species A and B"), "{error}");
-    assert!(error.contains("of strength 0 if that is meant"), "{error}");
+    assert!(error.contains("of strength 0 if they do not interact"), "{error}");
     // An ideal gas is a valid fluid.
     assert!(Model::parse("m.toml", "title = \"ideal\"\nspecies = [\"A\", \"B\"]\n").is_ok());
 }
@@ -153,7 +153,7 @@ range = 1
     let twice = text.replace("between = [\"B\", \"A\"]\n", "");
     assert!(error_of(&twice).to_string().contains("has a thermostat already"));
     let partial = text.replace("gamma = 4.5", "between = [\"A\", \"A\"]\ngamma = 4.5");
-    assert!(error_of(&partial).to_string().contains("have none, others have"));
+    assert!(error_of(&partial).to_string().contains("have no thermostat, but other pairs have one"));
 }
 
 #[test]

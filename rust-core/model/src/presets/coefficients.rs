@@ -23,7 +23,7 @@ pub struct WarrenPair {
 #[non_exhaustive]
 pub enum PresetError {
     /// Species `i` and `j` (from 1) have no coefficients.
-    #[error("no coefficients for types {0} and {1}: there is no mixing, set them with pair_coeff")]
+    #[error("no coefficients for types {0} and {1}: this style does not mix them, set them with pair_coeff")]
     Missing(usize, usize),
     /// The table is not square or empty, or the number of masses differs from that of types.
     #[error("expected coefficients for every pair of types, and as many masses as types")]

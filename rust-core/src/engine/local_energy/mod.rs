@@ -30,8 +30,7 @@ const LANES: usize = 128;
 pub enum NoEnergy {
     /// The forces have no potential.
     #[error(
-        "the forces of the model are no gradient of an energy: {0}; moves that are accepted by their energy need a psi, \
-         and force kernels that are those of the densities"
+        "the forces of the model are not the gradient of an energy: {0}; Monte Carlo moves need a psi, and densities without a force_kernel of their own"
     )]
     NotConservative(String),
     /// A derivative grows beyond the limits of the formula engine.

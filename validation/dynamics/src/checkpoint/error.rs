@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 pub enum CheckpointError {
     #[error("the checkpoint {} cannot be read: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
-    #[error("{} is no checkpoint of psidpd", path.display())]
+    #[error("{} is not a checkpoint of psidpd", path.display())]
     Other { path: PathBuf },
     #[error(
         "the checkpoint {} is in version {found} of the format, and this program (psidpd {}) reads version {}",
@@ -18,7 +18,7 @@ pub enum CheckpointError {
     #[error("the checkpoint {} is damaged: {what}", path.display())]
     Damaged { path: PathBuf, what: String },
     #[error(
-        "{} has {found} bytes, fewer than the {expected} that the checkpoint {} counts on",
+        "{} has {found} bytes, fewer than the {expected} that it had at the checkpoint {}",
         file.display(), path.display()
     )]
     File { path: PathBuf, file: PathBuf, found: u64, expected: u64 },

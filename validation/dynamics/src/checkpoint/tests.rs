@@ -99,7 +99,7 @@ fn no_damage_goes_unnoticed() {
     let longer = [whole.as_slice(), b"x"].concat();
     assert!(matches!(read(&longer), Err(CheckpointError::Damaged { .. })));
     let text = read(b"title = \"a scene, and longer than any header\"\n").unwrap_err().to_string();
-    assert!(text.ends_with("c is no checkpoint of psidpd"), "{text}");
+    assert!(text.ends_with("c is not a checkpoint of psidpd"), "{text}");
     let error = format::read(&folder.path().join("none")).unwrap_err();
     assert!(matches!(error, CheckpointError::Unreadable { .. }), "{error}");
 }

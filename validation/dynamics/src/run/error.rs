@@ -52,14 +52,13 @@ pub enum RunError {
     Uncounted { step: u64, tag: i32 },
     #[error(
         "step {step}: the fluid has been hotter than 2 kT since step {since} and is at {ratio:.1} kT, though the thermostat \
-         had time to cool it: dt = {dt} is likely too large for its forces with {integrator}; use a smaller dt, or an integrator \
-         that bears larger ones (docs/integrators.md)"
+         had time to cool it: dt = {dt} is likely too large for its forces with {integrator}; use a smaller dt, or an integrator that allows larger ones (docs/integrators.md)"
     )]
     TooHot { step: u64, since: u64, ratio: f64, dt: f64, integrator: String },
     #[error(
         "stage \"{stage}\" stopped: {cause}; the state of step {good} is in {}{}",
         saved.display(),
-        if *checkpoint { ", and in the checkpoint beside it" } else { "" }
+        if *checkpoint { ", and in the checkpoint in the same folder" } else { "" }
     )]
     Stopped {
         stage: String,

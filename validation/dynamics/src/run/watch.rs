@@ -103,7 +103,7 @@ impl fmt::Display for Deviation {
         write!(
             f,
             "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
-             dt, or an integrator that bears it (docs/integrators.md)"
+             dt, or an integrator that allows it (docs/integrators.md)"
         )
     }
 }

@@ -173,7 +173,7 @@ impl<'a> Common<'a> {
         let (rest, whole) =
             (shapes[first].volume(self.shapes.dimensions), self.shapes.domain.volume(self.shapes.dimensions));
         if rest <= 1e-9 * whole {
-            let message = "the other parts fill the box: there is no rest".to_owned();
+            let message = "the other parts fill the box and leave no rest".to_owned();
             return Err(keys[first].error(FileErrorKind::Value(message)));
         }
         Ok(())

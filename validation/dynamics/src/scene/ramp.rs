@@ -1,6 +1,6 @@
 //! `kT = [from, to]` of a stage: a temperature that changes in equal levels.
 //!
-//! Each level is a stage of its own, because ψ may depend on kT: forces are computed anew at its start, and a
+//! Each level is a stage of its own, because ψ may depend on kT: forces are computed again at its start, and a
 //! LAMMPS input has a `run` for it.
 
 use psidpd_core::document::{FileError, FileErrorKind, Section};

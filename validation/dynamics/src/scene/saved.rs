@@ -53,7 +53,7 @@ pub fn open(
                 PeriodicBox::new(state.domain.origin(), edges, periodic).map_err(|e| e.to_string())?;
             let state = State { domain, ..state };
             match state.fault(model.species().len(), model.dimensions()) {
-                Some(fault) => Err(format!("is no state of this model: {fault}")),
+                Some(fault) => Err(format!("is not a state of this model: {fault}")),
                 None => Ok(state),
             }
         }
@@ -95,7 +95,10 @@ fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
     let ids: Vec<u64> =
         value.array()?.iter().map(|v| v.count().map(|c| c.value)).collect::<Result<_, _>>()?;
     let [first, last] = ids[..] else {
-        return Err(wrong(format!("expected the first and the last id, found {} values", ids.len())));
+        return Err(wrong(format!(
+            "expected the first and the last id, found an array of length {}",
+            ids.len()
+        )));
     };
     let (Ok(first), Ok(last)) = (i32::try_from(first), i32::try_from(last)) else {
         return Err(wrong(format!("{last} exceeds the largest id, 2147483647")));

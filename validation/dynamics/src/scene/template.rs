@@ -40,7 +40,7 @@ pub const TEMPLATES: &[Template] = &[
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TemplateError {
-    #[error("{} is there already: choose another name, or remove it", .0.display())]
+    #[error("{} already exists: choose another name, or remove it", .0.display())]
     Exists(PathBuf),
     #[error("{} cannot be written: {source}", path.display())]
     Output { path: PathBuf, source: std::io::Error },

@@ -473,7 +473,7 @@ fn checkpoints_bring_all_but_the_clock() {
     for (from, to, message) in [
         ("\"run\"", "\"nowhere\"", "nowhere"),
         ("\"run\"", "\"mixture.toml\"", "mixture.toml"),
-        ("mixture.toml", "lone.toml", "is no state of this model"),
+        ("mixture.toml", "lone.toml", "is not a state of this model"),
         ("\"reflecting\"", "\"periodic\"", ""),
     ] {
         match Scene::parse("s.toml", &text.replace(from, to), folder.path()) {

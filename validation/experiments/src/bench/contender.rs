@@ -120,7 +120,7 @@ fn word_after<'a>(words: &'a str, key: &str) -> Option<&'a str> {
     words.split_whitespace().skip_while(|w| *w != key).nth(1)
 }
 
-/// What the rate of others is held against: the built-in of the fluid.
+/// What the rate of others is compared with: the built-in of the fluid.
 pub fn reference(subject: &Subject) -> Option<Contender> {
     if *subject == MDPD {
         Some(Contender::alone(Code::BuiltIn))

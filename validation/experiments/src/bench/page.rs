@@ -237,7 +237,7 @@ pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
     };
     let report = Report {
         title: "psidpd bench".into(),
-        subtitle: "Speed beside LAMMPS in one run".into(),
+        subtitle: "Speed compared with LAMMPS in one run".into(),
         facts: vec![
             ("psidpd".into(), outcome.version.into()),
             ("LAMMPS".into(), outcome.lammps.version.clone()),

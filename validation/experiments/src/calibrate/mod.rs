@@ -342,9 +342,9 @@ fn note(round: &Round, converged: bool, options: &Options, command: &str) -> Str
         [] => String::new(),
         some => format!("\nThe fluid does not run with it at density {}.", some.join(", ")),
     };
-    let verdict = if converged { "" } else { ", which is not the tolerance asked for" };
+    let verdict = if converged { "" } else { ", which misses the requested tolerance" };
     format!(
-        "Corrected density, found by\n  {command}\nAt kT = {} and {range} the pressure is the wanted one within {:.2} \
+        "Corrected density, found by\n  {command}\nAt kT = {} and {range} the pressure agrees with the required one within {:.2} \
          %{verdict}.{without}",
         options.kt,
         100.0 * round.pressure_residual

@@ -15,7 +15,7 @@ pub fn missing(fluid: &Fluid) -> Option<Warning> {
         id: "uncalibrated",
         severity: Severity::Warning,
         message: format!(
-            "the pressure of the model is what is wanted and not what a run will have: density {} has no correction for \
+            "a run will not have the pressure that the model asks for: density {} has no correction for \
              the correlations of particles, which often cost a fifth of the pressure; find it with: psidpd calibrate \
              MODEL --kT {} --density LOW:HIGH --out FILE",
             density.name, fluid.kt

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! with factors of each integrator from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them. A liquid
-//! beside its vapour has the carried pressure of the vapour: it is thinner by the error over ρ ∂p/∂ρ, which a second sample
+//! in equilibrium with its vapour has the carried pressure of the vapour: it is thinner by the error over ρ ∂p/∂ρ, which a second sample
 //! gives, a little denser.
 
 use psidpd_core::engine::noise::{Law, PairNoise};
@@ -51,7 +51,7 @@ pub struct StepEstimate {
     pub error: f64,
     /// Error of the pressure that steps carry, in ρkT.
     pub carried: f64,
-    /// By how much of its density a liquid beside its vapour is too thin, if the fluid resists compression.
+    /// By how much of its density a liquid in equilibrium with its vapour is too thin, if the fluid resists compression.
     pub thinner: Option<f64>,
     /// The Δt at which the larger of the first two is 0.01.
     pub one_percent: f64,

@@ -49,7 +49,7 @@ fn no_mean_field(reason: &TheoryError) -> Warning {
     Warning {
         id: "no-mean-field",
         severity: Severity::Warning,
-        message: format!("{reason}; neither stability nor thermodynamic limit is looked at"),
+        message: format!("{reason}; neither stability nor the thermodynamic limit is checked"),
     }
 }
 

@@ -41,7 +41,7 @@ pub fn section(results: &Results) -> Section {
         })
         .collect();
     let built_in = format!(
-        "LAMMPS's built-in mdpd computes another force, which is no gradient of an energy: with the thermostat off it heats, \
+        "LAMMPS's built-in mdpd computes another force, which is not the gradient of an energy: with the thermostat off it heats, \
          and its liquid is another one{}.",
         if shifts.is_empty() { String::new() } else { format!(" ({})", shifts.join("; ")) }
     );
@@ -65,7 +65,7 @@ pub fn section(results: &Results) -> Section {
             ))
         })
         .collect();
-    let warren = format!("Beside the published values the native runner has, {}.", published.join("; "));
+    let warren = format!("The native runner compared with the published values: {}.", published.join("; "));
     Section {
         heading: "Conclusion".into(),
         items: vec![Item::Prose(format!("{agree}\n\n{built_in}\n\n{warren}"))],

@@ -99,7 +99,7 @@ pub fn from_eos(
     let units = Units::new(substance, &liquid, options);
     let wanted = liquid.tension / units.tension;
     told(&format!(
-        "liquid of {:.1} kg/m3; r_c = {:.3} nm; wanted in reduced units: dp/drho = {:.1}, tension = {wanted:.2}",
+        "liquid of {:.1} kg/m3; r_c = {:.3} nm; targets in reduced units: dp/drho = {:.1}, tension = {wanted:.2}",
         liquid.density * substance.molar_mass,
         units.length * 1e9,
         1.0 / (liquid.compressibility * units.pressure * options.density),

@@ -115,7 +115,7 @@ pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
                 }
                 let tells = *error <= part;
                 if !tells {
-                    return Err(format!("a temperature of {t:.3} ± {error:.3} kT tells too little"));
+                    return Err(format!("a temperature of {t:.3} ± {error:.3} kT is too uncertain to judge"));
                 }
             }
             if *momentum <= ROUNDING { Ok(()) } else { Err(format!("momentum {momentum:.1e}")) }

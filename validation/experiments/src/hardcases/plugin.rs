@@ -18,7 +18,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 pub struct Plugin(PluginHost);
 
 impl Plugin {
-    /// The LAMMPS that is installed; builds the plugin if need be.
+    /// The LAMMPS that is installed; builds the plugin if necessary.
     ///
     /// # Errors
     /// There is none, or the plugin cannot be built.

@@ -16,7 +16,7 @@ pub struct PluginHost {
 }
 
 impl PluginHost {
-    /// Builds the plugin for `host`, if need be.
+    /// Builds the plugin for `host`, if necessary.
     ///
     /// # Errors
     /// It cannot be built.

@@ -28,7 +28,7 @@ pub struct Lammps {
 }
 
 impl Lammps {
-    /// The LAMMPS that is installed; builds the plugin for it if need be.
+    /// The LAMMPS that is installed; builds the plugin for it if necessary.
     ///
     /// # Errors
     /// There is none, or the plugin cannot be built.

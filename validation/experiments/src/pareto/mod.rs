@@ -118,9 +118,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
                 lammps_reference = reference;
                 points.extend(own);
             }
-            Ok(None) => {
-                left_out.push("LAMMPS has no style of its own for this fluid that is known here.".into())
-            }
+            Ok(None) => left_out.push("psidpd knows no style of LAMMPS's own for this fluid.".into()),
             Err(error) => left_out.push(format!("LAMMPS's own style is not among the points: {error}.")),
         }
     }
@@ -144,8 +142,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     front::mark(&mut points, &tolerances);
     let (reference, reference_of_dynamics) = references.tell(&origin, known);
     if let Err(why) = &references.configurations {
-        left_out
-            .push(format!("There is no Monte Carlo of this scene, so small steps are the reference: {why}."));
+        left_out.push(format!("This scene cannot run Monte Carlo, so small steps are the reference: {why}."));
     }
     let mut outcome = Outcome {
         format: 2,
@@ -183,7 +180,7 @@ fn what(origin: &Origin, physics: &Physics) -> String {
     format!("{integrator}, dt = {}, {} precision", origin.dt(physics), physics.precision)
 }
 
-/// Whether velocities have a distribution that is known, and what pressures are held against.
+/// Whether velocities have a distribution that is known, and what pressures are compared with.
 fn known(origin: &Origin) -> Result<Known, ExperimentError> {
     let (scene, stage) = (origin.scene, origin.stage);
     let flows = stage.body_forces && !scene.body_forces.is_empty();

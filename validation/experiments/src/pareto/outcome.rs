@@ -21,11 +21,11 @@ pub struct Outcome {
     pub kt: f64,
     /// Δt of the stage.
     pub dt: f64,
-    /// Whether temperatures are held against kT; against the reference otherwise.
+    /// Whether temperatures are compared with kT; against the reference otherwise.
     pub temperature_is_known: bool,
-    /// What errors are held against, with its own: of its temperatures, and in the errors of its values.
+    /// What errors are compared with, with its own: of its temperatures, and in the errors of its values.
     pub reference: Reference,
-    /// What those of diffusion and viscosities are held against, if the reference has no time step.
+    /// What those of diffusion and viscosities are compared with, if the reference has no time step.
     pub reference_of_dynamics: Option<Reference>,
     /// That of LAMMPS's own style.
     pub lammps_reference: Option<Reference>,

@@ -6,7 +6,7 @@ use crate::lammps::style::PairStyle;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
 
-/// The style for the fluid of a scene, found by the model's parameters and held against its forces.
+/// The style for the fluid of a scene, found by the model's parameters and compared with its forces.
 ///
 /// # Errors
 /// The model does not hold at the temperature.

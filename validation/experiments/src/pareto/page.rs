@@ -218,8 +218,8 @@ pub fn explanation(outcome: &Outcome) -> String {
          units or sweeps){dynamics}; the references' own errors are in their rows. ± is one standard deviation, and \"<\" an \
          error below twice that, with what it is likely to be below. \"worst\" is the error that is most of its tolerance. \
          p_carried is the momentum that steps carry, which walls and coexisting phases feel. Points of the plugin have the \
-         errors of the native steps, which they are. Points of LAMMPS's own many-body style are another force law, held \
-         against small steps of its own; they are not on the front.",
+         errors of the native steps, which they are. Points of LAMMPS's own many-body style are another force law, compared \
+         with small steps of its own; they are not on the front.",
         outcome.reference.what, outcome.reference.samples, outcome.reference.time
     )
 }

@@ -1,4 +1,4 @@
-//! The settings that are held against each other: integrator × Δt × precision, and threads.
+//! The settings that are compared with each other: integrator × Δt × precision, and threads.
 
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::{Coupling, Integrator};
@@ -45,13 +45,13 @@ impl Physics {
         (wanted..).find(|steps| greatest_common_divisor(*steps, every) == 1).unwrap_or(wanted)
     }
 
-    /// What all others are held against that have no time: no time step at all.
+    /// What all others are compared with that have no time: no time step at all.
     pub fn reference() -> Physics {
         let integrator = Integrator::MonteCarlo { sweeps: SWEEPS, max_move: None };
         Physics { integrator, multiple: 1.0, precision: Precision::Double }
     }
 
-    /// What diffusion and viscosities are held against, and all where there is no Monte Carlo: as small an error as a few times the
+    /// What diffusion and viscosities are compared with, and all where there is no Monte Carlo: as small an error as a few times the
     /// cost of the scene's own step buys.
     pub fn small_steps() -> Physics {
         Physics { integrator: force_gradient(1.0 / 6.0, 1), multiple: 1.0, precision: Precision::Double }

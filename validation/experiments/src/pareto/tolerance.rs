@@ -60,7 +60,7 @@ pub fn by_name<S: Serializer>(tolerances: &[Tolerance], serializer: S) -> Result
     serializer.collect_map(tolerances.iter().map(|t| (&t.name, t.bound)))
 }
 
-/// An error held against its bound.
+/// An error compared with its bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worst {
     pub quantity: String,

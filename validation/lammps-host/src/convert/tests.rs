@@ -71,7 +71,7 @@ fn what_is_left_is_said() {
         "3: a variable has the data file: take the density out of its atoms, column 3",
         "4: a restart file",
         "5: there is no property rho",
-        "10: names the built-in style",
+        "10: names the built-in style: rewrite it for mdpd/psi",
         "6: B differs between types (25, 20)",
     ] {
         assert!(by_hand.contains(said), "{said}: {by_hand}");
@@ -113,10 +113,22 @@ fn what_is_hidden_is_named() {
     for (old, said) in [
         ("atom_style ${a}\n", "1: a variable has the style"),
         ("pair_style ${p}\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n", "1: a variable has the style"),
-        ("pair_style ${p}\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n", "2: names the built-in style"),
-        ("variable p string \"hybrid/overlay mdpd/rhosum mdpd 1 1 5\"\n", "1: names the built-in style"),
-        ("run 1\nif \"1 > 0\" then \"fix 1 all mvv/dpd\" else 'run 1'\n", "2: names the built-in style"),
-        ("run 10 every 5 \"set group all sph/rho 0\"\n", "1: names the built-in style"),
+        (
+            "pair_style ${p}\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n",
+            "2: names the built-in style: rewrite it for mdpd/psi",
+        ),
+        (
+            "variable p string \"hybrid/overlay mdpd/rhosum mdpd 1 1 5\"\n",
+            "1: names the built-in style: rewrite it for mdpd/psi",
+        ),
+        (
+            "run 1\nif \"1 > 0\" then \"fix 1 all mvv/dpd\" else 'run 1'\n",
+            "2: names the built-in style: rewrite it for mdpd/psi",
+        ),
+        (
+            "run 10 every 5 \"set group all sph/rho 0\"\n",
+            "1: names the built-in style: rewrite it for mdpd/psi",
+        ),
         ("include ${f}\n", "1: a variable has the included file"),
         ("\ninclude none\n", "2: the included file cannot be read"),
         ("atom_style hybrid line mdpd\nread_data d\n", "2: atoms of this hybrid have a column"),

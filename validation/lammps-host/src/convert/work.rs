@@ -145,13 +145,15 @@ impl Work<'_> {
             }
             // The first words of fixes and computes are names of the user.
             ["fix" | "dump" | "compute", _, _, rest @ ..] if names_built_in(rest) => {
-                self.by_hand(command, "names the built-in style");
+                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi");
             }
             [
                 "variable" | "fix_modify" | "pair_coeff" | "pair_modify" | "if" | "run" | "python" | "set"
                 | "change_box",
                 rest @ ..,
-            ] if names_built_in(rest) => self.by_hand(command, "names the built-in style"),
+            ] if names_built_in(rest) => {
+                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi");
+            }
             _ => {}
         }
     }
@@ -180,7 +182,7 @@ impl Work<'_> {
         let at = |name| style.iter().position(|word| *word == name);
         let (Some(densities), Some(forces)) = (at(DENSITIES), at(FORCES)) else {
             if at(DENSITIES).is_some() || at(FORCES).is_some() {
-                self.by_hand(command, "mdpd and mdpd/rhosum belong together: one of them is not here");
+                self.by_hand(command, "mdpd and mdpd/rhosum belong together: one of them is missing");
             } else {
                 self.look(command, &command.words);
             }
@@ -212,7 +214,7 @@ impl Work<'_> {
         if forces < densities {
             self.left(
                 command,
-                "mdpd stood before mdpd/rhosum and took the densities of the step before; the new style never does",
+                "mdpd stood before mdpd/rhosum and used the densities of the previous step; the new style never does",
             );
         }
         let mut text = String::new();
@@ -320,7 +322,10 @@ impl Work<'_> {
         }
         if known.is_none() {
             let Some(old) = (self.read)(file) else {
-                self.by_hand(command, "the included file cannot be read beside the script: convert it too");
+                self.by_hand(
+                    command,
+                    "the included file cannot be read in the folder of the script: convert it too",
+                );
                 return None;
             };
             self.parts.push(Part { name: Some(file.to_owned()), text: String::new(), is_open: true });

@@ -134,8 +134,7 @@ impl Drop {
         if percolated > 0.0 {
             let distance = self.distance.value().unwrap_or(f64::NAN);
             doubts.push(format!(
-                "In {:.0} % of the samples the largest cluster percolates: it meets its own image through the box, and is no \
-                 drop. Give a smaller `distance` than {distance:.3}, or a larger box.",
+                "In {:.0} % of the samples the largest cluster percolates: it meets its own image through the box, and is not a drop. Give a smaller `distance` than {distance:.3}, or a larger box.",
                 100.0 * percolated
             ));
         }

@@ -55,7 +55,7 @@ impl Meter for SurfaceTension {
                 `stress_conservative` has the velocities at the ends of steps and conservative forces alone. Both have \
                 the same limit as the time step goes to 0. `free_energy` is the \
                 test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
-                with their box at constant volume to 1 ± ε times the area, the many-body energy is computed anew, \
+                with their box at constant volume to 1 ± ε times the area, the many-body energy is computed again, \
                 and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. The two \
                 routes agree in equilibrium, to the error of the time step. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
         keys: &[

@@ -133,7 +133,7 @@ impl<'a> Curves<'a> {
             "{} rows. Means are over the {} rows of the last stage, “{name}”; their errors are one standard \
              deviation of the mean, correlation of the rows taken into account. \
              Fewer than {MINIMUM_SAMPLES} rows have none. In the figures pale lines are single rows, strong \
-             ones means from the start of each stage to there.",
+             ones means from the start of each stage up to that row.",
             self.table.rows(),
             rows.len()
         )

@@ -7,7 +7,7 @@
 //! The thermostat is exact for the Maxwell distribution, so that what is left is the error of the
 //! conservative force, of second order; an ideal gas has none. One evaluation of forces a step, and the
 //! thermostat acts at the same positions. These are in the middle of the step: the energies and pressures
-//! that a run reports are computed anew at its end, which trajectories do not depend on. T_kin is that of the
+//! that a run reports are computed again at its end, which trajectories do not depend on. T_kin is that of the
 //! velocities at the end of the step, behind a kick.
 
 use super::{Coupling, RunError, Simulation, Want};

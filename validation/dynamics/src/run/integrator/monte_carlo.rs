@@ -10,7 +10,7 @@
 //! the total momentum where that is conserved: they are exact, and say nothing of the positions. There is no time: the clock
 //! advances by one a step. Random numbers are those of the scene's seed and the step's number.
 //!
-//! U is that of the model in double precision. Everything that changes from trial to trial is computed anew at the
+//! U is that of the model in double precision. Everything that changes from trial to trial is computed again at the
 //! beginning of a step, so that a run which goes on from a checkpoint makes the same moves.
 
 use super::{RunError, Simulation, Want};

@@ -231,7 +231,7 @@ fn what_is_asked_for_changes_no_step() {
     }
 }
 
-/// Forces prepared for another integrator are computed anew.
+/// Forces prepared for another integrator are computed again.
 #[test]
 fn integrators_may_follow_each_other() {
     let start = settled();

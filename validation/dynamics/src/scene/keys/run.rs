@@ -125,7 +125,7 @@ pub const OUTPUT: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "What a run writes beside its final state.",
+    about: "What a run writes in addition to its final state.",
     keys: &[
         key("thermo", Count, OPTIONAL,
             "Steps between rows of totals; 100 if left out, 0 for none.", "[output]\nthermo = 50"),
