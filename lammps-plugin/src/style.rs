@@ -5,7 +5,7 @@ mod model;
 use crate::converted::{Converted, times};
 use crate::error::StyleError;
 use crate::units::Scale;
-use psidpd_core::engine::thermostat::PairThermostat;
+use psidpd_core::engine::thermostat::{Effort, PairThermostat};
 use psidpd_core::engine::{
     Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool, Precision, Reason,
     Request, Settings, Step, Surroundings, Tally, Want, at_once,
@@ -22,6 +22,8 @@ pub struct Style {
     engine: Engine,
     /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
     thermostat: Option<PairThermostat>,
+    /// Iterations of the thermostat at earlier temperatures and settings.
+    effort_before: Effort,
     settings: Settings,
     pool: Arc<Pool>,
     kt: f64,
@@ -83,6 +85,7 @@ impl Style {
             model,
             engine,
             thermostat,
+            effort_before: Effort::default(),
             settings,
             pool,
             kt,
@@ -105,6 +108,7 @@ impl Style {
     }
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
+        self.effort_before = self.effort();
         self.engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
         self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &self.settings);
         Ok(())
@@ -155,6 +159,10 @@ impl Style {
     /// The thermostat apart from the forces, with the threads, the species of the types, and room for positions.
     pub(crate) fn thermostat(&mut self) -> (Option<&mut PairThermostat>, &Pool, &[i32], &mut Converted) {
         (self.thermostat.as_mut(), &self.pool, &self.kinds, &mut self.converted)
+    }
+
+    pub(crate) fn effort_before(&self) -> Effort {
+        self.effort_before
     }
 
     /// Describes the computation, and the letters of the coefficients, for the log.
