@@ -286,9 +286,8 @@ void FixSplitting::act()
   const uint64_t inaccurate = pair->effort().inaccurate;
   pair->heat(masses, times * update->dt, uniform, vflag_global != 0, impulses);
   if (inaccurate == before.inaccurate && pair->effort().inaccurate > inaccurate && comm->me == 0)
-    error->warning(FLERR, std::string("Fix ") + style + ": the thermostat is inaccurate, as it ended at its limit of " +
-                              std::to_string(pair->iterations()) +
-                              " iterations: drag is too strong for this timestep; use a smaller gamma or timestep");
+    error->warning(FLERR, std::string("Fix ") + style +
+                              ": the thermostat is inaccurate, as drag is too strong for this timestep; use a smaller gamma or timestep");
   // The virial is that of the mean force over the step.
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += times * impulses[k];

@@ -116,6 +116,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   void check_lost();
   void check_callers();
   void advise();
+  std::string advice();
   // Whether the last evaluation contained this pair.
   bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();

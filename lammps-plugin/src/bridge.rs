@@ -95,7 +95,7 @@ mod ffi {
         iterations: u64,
         /// The most iterations of one update.
         most: usize,
-        /// Updates that ended at the limit of iterations.
+        /// Updates that ended before they were accurate.
         inaccurate: u64,
     }
 

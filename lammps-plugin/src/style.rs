@@ -212,13 +212,9 @@ impl Style {
             let exception = EnginePath::PairSums(Reason::ParticleValues);
             let _ = writeln!(text, "  evaluation    {}; on some steps {exception}", EnginePath::Sweep);
             let Settings { precision, instructions, threads } = self.engine.settings();
-            let faster = match precision {
-                Precision::Double => "; 'precision mixed' is faster",
-                _ => "",
-            };
             let _ = writeln!(
                 text,
-                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank{faster}"
+                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
             );
         }
         text

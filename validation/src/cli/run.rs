@@ -152,9 +152,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 ));
                 if iterations.inaccurate > 0 {
                     warn(&format!(
-                        "the thermostat ended {} updates at its limit of {} iterations, inaccurately: drag is too strong \
-                         for this dt; use a smaller gamma or dt",
-                        iterations.inaccurate, iterations.most
+                        "{} updates of the thermostat are inaccurate: drag is too strong for this dt; use a smaller \
+                         gamma or dt",
+                        iterations.inaccurate
                     ));
                 }
             }

@@ -9,7 +9,7 @@ pub struct Effort {
     pub iterations: u64,
     /// The most iterations of one update.
     pub most: usize,
-    /// Updates that ended at the limit of iterations, before they were accurate.
+    /// Updates that ended before they were accurate, because of too strong drag.
     pub inaccurate: u64,
 }
 

@@ -36,6 +36,12 @@ pub const TOLERANCE: f64 = 2e-2;
 /// The same for drag alone, where no noise makes up for a residual.
 pub const TOLERANCE_OF_DRAG: f64 = 1e-4;
 
+/// Least relative residual. With drag so strong that it should be less, the solution is inaccurate.
+const FINEST: f64 = 1e-6;
+
+/// Drag per mass beyond which the last residual is not added, as that would make it larger.
+const STRONG: f64 = 10.0;
+
 /// Most iterations: with more, drag is so strong that rounding errors stop the convergence.
 pub const MOST: usize = 500;
 
@@ -45,6 +51,8 @@ pub struct Progress {
     /// Squared norm of the present residual.
     now: f64,
     tolerance: f64,
+    /// Drag per mass of the first residual, or 1 if that is more.
+    drag: f64,
     /// Squared norm at which iterations end.
     enough: f64,
     /// Iterations so far.
@@ -138,8 +146,8 @@ impl PairThermostat {
     pub(super) fn advance(&mut self, pool: &Pool, [first, curvature, square]: [f64; 3]) -> bool {
         let progress = &mut self.progress;
         if progress.iterations == 0 {
-            let drag = ((square / first).sqrt() - 1.0).max(1.0);
-            let relative = progress.tolerance / drag;
+            progress.drag = ((square / first).sqrt() - 1.0).max(1.0);
+            let relative = (progress.tolerance / progress.drag).max(FINEST);
             (progress.now, progress.enough) = (first, relative * relative * first);
         }
         progress.iterations += 1;
@@ -149,16 +157,20 @@ impl PairThermostat {
         let beta = next / progress.now;
         progress.now = next;
         if !goes_on {
-            let inaccurate = next.is_nan() || next > progress.enough;
+            let inaccurate =
+                next.is_nan() || next > progress.enough || progress.tolerance < FINEST * progress.drag;
             self.effort.add(progress.iterations, inaccurate);
         }
+        let rest = if self.progress.drag < STRONG { 1.0 } else { 0.0 };
         self.on_planes(pool, |Share { p, image, inverse_mass, part, .. }, set| {
             let Part { residual, solution, .. } = &mut **part;
             match goes_on {
                 true => {
                     vectors::run(set, Advance { alpha, beta, inverse_mass, image, solution, residual, p });
                 }
-                false => vectors::run(set, Finish { alpha, inverse_mass, p, image, residual, solution }),
+                false => {
+                    vectors::run(set, Finish { alpha, rest, inverse_mass, p, image, residual, solution });
+                }
             }
         });
         goes_on

@@ -97,9 +97,10 @@ impl Loop for Advance<'_> {
     }
 }
 
-/// The last step: computes `p ← solution + alpha p` and `solution ← p + M⁻¹ (residual − alpha image)`.
+/// The last step: computes `p ← solution + alpha p` and `solution ← p + rest M⁻¹ (residual − alpha image)`.
 pub struct Finish<'a> {
     pub alpha: f64,
+    pub rest: f64,
     pub inverse_mass: &'a [f64],
     pub p: &'a mut [Wide],
     pub image: &'a [Wide],
@@ -112,12 +113,12 @@ impl Loop for Finish<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Finish { alpha, inverse_mass, p, image, residual, solution } = self;
+        let Finish { alpha, rest, inverse_mass, p, image, residual, solution } = self;
         for ((((s, r), p), image), inverse) in
             solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
         {
             *p = plus(*s, alpha, *p);
-            *s = plus(*p, *inverse, plus(*r, -alpha, *image));
+            *s = plus(*p, rest * *inverse, plus(*r, -alpha, *image));
         }
     }
 }

@@ -34,7 +34,7 @@ pub struct Iterations {
     /// Mean of all updates.
     pub mean: f64,
     pub most: usize,
-    /// Updates that ended at the limit of iterations.
+    /// Updates that ended before they were accurate.
     pub inaccurate: u64,
 }
 
