@@ -23,6 +23,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 using namespace LAMMPS_NS;
@@ -110,7 +111,7 @@ FixSplitting *FixSplitting::find(const Modify *modify)
 
 int FixSplitting::setmask()
 {
-  return INITIAL_INTEGRATE | FINAL_INTEGRATE | PRE_FORCE;
+  return INITIAL_INTEGRATE | FINAL_INTEGRATE | PRE_FORCE | POST_RUN;
 }
 
 PairPsi *FixSplitting::find_pair()
@@ -175,6 +176,7 @@ void FixSplitting::check_others()
 
 void FixSplitting::setup(int vflag)
 {
+  before = pair->effort();
   v_init(vflag);
 }
 
@@ -222,6 +224,21 @@ void FixSplitting::final_integrate()
   }
 }
 
+// Tells the iterations of the thermostat in this run.
+void FixSplitting::post_run()
+{
+  if (!pair || update->whichflag != 1) return;
+  const Effort now = pair->effort();
+  const uint64_t updates = now.updates - before.updates;
+  if (updates > 0 && comm->me == 0) {
+    const double mean = static_cast<double>(now.iterations - before.iterations) / static_cast<double>(updates);
+    char text[200];
+    snprintf(text, sizeof text, "Fix %s: the thermostat acted %llu times, with %.1f iterations on average, %zu at most\n", style,
+             static_cast<unsigned long long>(updates), mean, static_cast<size_t>(now.most));
+    utils::logmesg(lmp, text);
+  }
+}
+
 double FixSplitting::compute_scalar()
 {
   return pair ? pair->iterations() : 0.0;
@@ -266,7 +283,11 @@ void FixSplitting::act()
     const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
     masses[i] = (atom->mask[i] & groupbit) && !held[i] ? force->mvv2e * mass : HUGE_VAL;
   }
+  const uint64_t inaccurate = pair->effort().inaccurate;
   pair->heat(masses, times * update->dt, uniform, vflag_global != 0, impulses);
+  if (inaccurate == before.inaccurate && pair->effort().inaccurate > inaccurate && comm->me == 0)
+    error->warning(FLERR, std::string("Fix ") + style +
+                              ": the thermostat is inaccurate, as drag is too strong for this timestep; use a smaller gamma or timestep");
   // The virial is that of the mean force over the step.
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += times * impulses[k];

@@ -7,6 +7,7 @@
 #define PSIDPD_FIX_SPLITTING_H
 
 #include "fix.h"
+#include "psidpd-lammps/src/bridge.rs.h"
 
 #include <string>
 #include <vector>
@@ -37,6 +38,7 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void pre_force(int vflag) override;
   void initial_integrate(int vflag) override;
   void final_integrate() override;
+  void post_run() override;
   double compute_scalar() override;
 
   // Shifts move with their atoms to other ranks.
@@ -92,6 +94,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
   std::vector<char> held;
   // Masses for the thermostat, infinite for atoms that keep their velocities.
   std::vector<double> masses;
+  // Iterations of the thermostat before this run.
+  Effort before{};
   // Flag of the virial of the present step.
   int vflag_of_step = 0;
   // For force-gradient: the displacement of each atom, and its position before.

@@ -50,8 +50,9 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Applies drag and noise for a time to the velocities of atoms with these masses (energy over squared velocity), at
   // the positions where forces were last computed; adds the virial. Atoms of infinite mass keep their velocities.
   void heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial);
-  // Iterations of the thermostat in its last update.
+  // Iterations of the thermostat in its last update, and of all its updates since the style was set up.
   int iterations() { return style ? static_cast<int>((*style)->iterations()) : 0; }
+  Effort effort() { return style ? psidpd::effort(**style) : Effort{}; }
 
  protected:
   virtual void read_settings(int narg, char **arg) = 0;
@@ -115,6 +116,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   void check_lost();
   void check_callers();
   void advise();
+  std::string advice();
   // Whether the last evaluation contained this pair.
   bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();

@@ -74,14 +74,14 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
     if (owned > 0) std::copy_n(atom->v[0], 3 * owned, vectors.begin());
     forward_vectors();
     const rust::Slice<double> shared{vectors.data(), vectors.size()};
-    Round round = attempt([&] { return thermostat_begin(fluid, {vectors.data(), vectors.size()}); });
+    Round round = attempt([&] { return thermostat_begin(fluid, shared); });
     while (round.wants != Wants::Nothing) {
-      double total = 0.0;
-      if (round.wants == Wants::Total)
-        MPI_Allreduce(&round.part, &total, 1, MPI_DOUBLE, MPI_SUM, world);
+      std::array<double, 3> totals{};
+      if (round.wants == Wants::Totals)
+        MPI_Allreduce(round.parts.data(), totals.data(), 3, MPI_DOUBLE, MPI_SUM, world);
       else
         forward_vectors();
-      round = attempt([&] { return thermostat_go_on(fluid, total, shared, v); });
+      round = attempt([&] { return thermostat_go_on(fluid, totals, shared, v); });
     }
     w = round.virial;
   }

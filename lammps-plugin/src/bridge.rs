@@ -5,7 +5,7 @@ use crate::style::{Style, guard};
 use crate::thermostat::Noise;
 use nalgebra::Matrix3;
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::Need;
+use psidpd_core::engine::thermostat::{Effort, Need};
 use psidpd_core::engine::{
     Around, Mark, PairsOfHost, Path, PeriodicBox, SpecialPair, Step, Surroundings, Tally, Want,
 };
@@ -83,15 +83,25 @@ mod ffi {
     enum Wants {
         /// Nothing: the velocities are final.
         Nothing,
-        /// A sum over all ranks.
-        Total,
+        /// Sums over all ranks.
+        Totals,
         /// Vectors of the ghosts.
         Ghosts,
     }
 
+    /// Iterations of the thermostat since the style was set up.
+    struct Effort {
+        updates: u64,
+        iterations: u64,
+        /// The most iterations of one update.
+        most: usize,
+        /// Updates that ended before they were accurate.
+        inaccurate: u64,
+    }
+
     struct Round {
         wants: Wants,
-        part: f64,
+        parts: [f64; 3],
         /// Virial of drag and noise, set at the end.
         virial: [f64; 6],
     }
@@ -242,15 +252,16 @@ mod ffi {
         /// Changes the velocities of all atoms, and returns the virial.
         fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6]>;
         /// Begins the thermostat on several ranks, with velocities of all atoms and ghosts.
-        fn thermostat_begin(style: &mut Style, vectors: &[f64]) -> Result<Round>;
+        fn thermostat_begin(style: &mut Style, vectors: &mut [f64]) -> Result<Round>;
         fn thermostat_go_on(
             style: &mut Style,
-            total: f64,
+            totals: [f64; 3],
             vectors: &mut [f64],
             v: &mut [f64],
         ) -> Result<Round>;
         /// Iterations of the thermostat in its last update.
         fn iterations(self: &mut Style) -> usize;
+        fn effort(style: &mut Style) -> Effort;
     }
 }
 
@@ -275,26 +286,31 @@ fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleE
     style.act_alone(v)
 }
 
-fn round(need: Need) -> ffi::Round {
-    let (wants, part, virial) = match need {
-        Need::Nothing(virial) => (ffi::Wants::Nothing, 0.0, virial),
-        Need::Total(part) => (ffi::Wants::Total, part, [0.0; 6]),
-        Need::Ghosts => (ffi::Wants::Ghosts, 0.0, [0.0; 6]),
-    };
-    ffi::Round { wants, part, virial }
+fn effort(style: &mut Style) -> ffi::Effort {
+    let Effort { updates, iterations, most, inaccurate } = style.effort();
+    ffi::Effort { updates, iterations, most, inaccurate }
 }
 
-fn thermostat_begin(style: &mut Style, vectors: &[f64]) -> Result<ffi::Round, StyleError> {
+fn round(need: Need) -> ffi::Round {
+    let (wants, parts, virial) = match need {
+        Need::Nothing(virial) => (ffi::Wants::Nothing, [0.0; 3], virial),
+        Need::Totals(parts) => (ffi::Wants::Totals, parts, [0.0; 6]),
+        Need::Ghosts => (ffi::Wants::Ghosts, [0.0; 3], [0.0; 6]),
+    };
+    ffi::Round { wants, parts, virial }
+}
+
+fn thermostat_begin(style: &mut Style, vectors: &mut [f64]) -> Result<ffi::Round, StyleError> {
     style.begin_rounds(vectors).map(round)
 }
 
 fn thermostat_go_on(
     style: &mut Style,
-    total: f64,
+    totals: [f64; 3],
     vectors: &mut [f64],
     v: &mut [f64],
 ) -> Result<ffi::Round, StyleError> {
-    style.next_round(total, vectors, v).map(round)
+    style.next_round(totals, vectors, v).map(round)
 }
 
 #[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.

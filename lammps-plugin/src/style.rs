@@ -5,7 +5,7 @@ mod model;
 use crate::converted::{Converted, times};
 use crate::error::StyleError;
 use crate::units::Scale;
-use psidpd_core::engine::thermostat::PairThermostat;
+use psidpd_core::engine::thermostat::{Effort, PairThermostat};
 use psidpd_core::engine::{
     Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool, Precision, Reason,
     Request, Settings, Step, Surroundings, Tally, Want, at_once,
@@ -22,6 +22,8 @@ pub struct Style {
     engine: Engine,
     /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
     thermostat: Option<PairThermostat>,
+    /// Iterations of the thermostat at earlier temperatures and settings.
+    effort_before: Effort,
     settings: Settings,
     pool: Arc<Pool>,
     kt: f64,
@@ -83,6 +85,7 @@ impl Style {
             model,
             engine,
             thermostat,
+            effort_before: Effort::default(),
             settings,
             pool,
             kt,
@@ -105,6 +108,7 @@ impl Style {
     }
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
+        self.effort_before = self.effort();
         self.engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
         self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &self.settings);
         Ok(())
@@ -157,6 +161,10 @@ impl Style {
         (self.thermostat.as_mut(), &self.pool, &self.kinds, &mut self.converted)
     }
 
+    pub(crate) fn effort_before(&self) -> Effort {
+        self.effort_before
+    }
+
     /// Describes the computation, and the letters of the coefficients, for the log.
     ///
     /// `search` says where pairs come from, and whether LAMMPS lists them; `apart`, whether a fix has the thermostat.
@@ -204,13 +212,9 @@ impl Style {
             let exception = EnginePath::PairSums(Reason::ParticleValues);
             let _ = writeln!(text, "  evaluation    {}; on some steps {exception}", EnginePath::Sweep);
             let Settings { precision, instructions, threads } = self.engine.settings();
-            let faster = match precision {
-                Precision::Double => "; 'precision mixed' is faster",
-                _ => "",
-            };
             let _ = writeln!(
                 text,
-                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank{faster}"
+                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
             );
         }
         text

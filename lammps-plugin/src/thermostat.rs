@@ -4,7 +4,7 @@
 use crate::error::StyleError;
 use crate::style::{Style, guard, triples};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Need, Rank, Stream, Update};
+use psidpd_core::engine::thermostat::{Effort, Need, Rank, Stream, Update};
 use psidpd_core::engine::{Around, Particles};
 
 /// Parameters of the noise of one step.
@@ -71,14 +71,14 @@ impl Style {
         })
     }
 
-    /// Begins the update on several ranks; `vectors` are the velocities of all atoms and ghosts.
+    /// Begins the update on several ranks; `vectors` are the velocities of all atoms and ghosts, which become directions.
     ///
     /// # Errors
     /// Fails if the atoms are not those of the last search for pairs.
-    pub fn begin_rounds(&mut self, vectors: &[f64]) -> Result<Need, StyleError> {
+    pub fn begin_rounds(&mut self, vectors: &mut [f64]) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
-            Ok(thermostat.begin_midpoint(pool, triples(vectors))?)
+            Ok(thermostat.begin_midpoint(pool, vectors.as_chunks_mut::<3>().0)?)
         })
     }
 
@@ -86,11 +86,16 @@ impl Style {
     ///
     /// # Errors
     /// Fails as [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on), and if a velocity is not finite.
-    pub fn next_round(&mut self, total: f64, vectors: &mut [f64], v: &mut [f64]) -> Result<Need, StyleError> {
+    pub fn next_round(
+        &mut self,
+        totals: [f64; 3],
+        vectors: &mut [f64],
+        v: &mut [f64],
+    ) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
             let (vectors, v) = (vectors.as_chunks_mut::<3>().0, v.as_chunks_mut::<3>().0);
-            let need = thermostat.go_on(pool, total, vectors, v)?;
+            let need = thermostat.go_on(pool, totals, vectors, v)?;
             if let Need::Nothing(_) = need {
                 finite(v)?;
             }
@@ -101,6 +106,13 @@ impl Style {
     /// Number of iterations of the last update.
     pub fn iterations(&mut self) -> usize {
         self.thermostat().0.map_or(0, |thermostat| thermostat.iterations())
+    }
+
+    /// Iterations of all updates since the style was set up.
+    pub fn effort(&mut self) -> Effort {
+        let mut effort = self.thermostat().0.map_or(Effort::default(), |thermostat| thermostat.effort());
+        effort += self.effort_before();
+        effort
     }
 }
 

@@ -3,13 +3,18 @@
 //!
 //! `cargo run --release -p psidpd-core --example pace mdpd mixed avx512 1 6050`
 //!
+//! A second line has the same of the thermostat apart from the forces, for the time of one step of two stages,
+//! and the iterations of the midpoint rule.
+//!
 //! With a number of sides as last word the evaluations are those of a rank that has ghosts on 2 (along z), 4
 //! or 6 sides, as each of 2, of 4, and of 8 or more ranks, without the noise of messages.
 
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
-use psidpd_core::engine::{Settings, Sweep, Times};
+use psidpd_core::engine::noise::Law;
+use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update};
+use psidpd_core::engine::{Pool, Settings, Sweep, Times};
 use setup::{Cloud, Rank, choose, faces};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -117,6 +122,50 @@ fn run(arguments: &[String]) -> Result<(), String> {
         "evaluation {all:.1}: sort {sort:.1}, first pass {first:.1}, ψ {excess:.1}, second pass {second:.1}, \
          forces out {forces:.1}; motion {around:.1}; {} B",
         sweep.memory() / count
+    );
+    if let (Any::Cloud(mut cloud), Some(thermostat)) =
+        (particles, PairThermostat::new(sweep.plan(), 1.0, &settings))
+    {
+        time_thermostat(&mut cloud, thermostat, &Pool::new(threads))?;
+    }
+    Ok(())
+}
+
+/// Drag and noise act for six steps of velocity Verlet, as one step of two stages has it.
+const AT_ONCE: f64 = 6.0;
+
+/// Times the parts of the thermostat.
+fn time_thermostat(cloud: &mut Cloud, mut thermostat: PairThermostat, pool: &Pool) -> Result<(), String> {
+    let count = cloud.x.len();
+    let dt = AT_ONCE * cloud.dt();
+    let mut best = [f64::INFINITY; 4];
+    let (mut iterations, mut number) = (0, 0);
+    for _ in 0..ROUNDS {
+        let mut parts = [0.0; 4];
+        for _ in 0..STEPS {
+            number += 1;
+            cloud.drift();
+            let Cloud { domain, x, v, tag, kind, .. } = &mut *cloud;
+            let bodies = Bodies { domain, x, tag, species: kind, mass: &[1.0; 2], frozen: &[] };
+            let start = Instant::now();
+            thermostat.find_pairs(pool, &bodies, dt, false).map_err(|e| e.to_string())?;
+            let found = Instant::now();
+            thermostat.draw(pool, 1, number, Stream(0), Law::Gaussian);
+            let drawn = Instant::now();
+            thermostat.act(pool, Update::Midpoint, v);
+            let end = Instant::now();
+            iterations += thermostat.iterations();
+            let seconds = [end - start, found - start, drawn - found, end - drawn];
+            (0..4).for_each(|k| parts[k] += seconds[k].as_secs_f64());
+        }
+        for (best, seconds) in best.iter_mut().zip(parts) {
+            *best = best.min(seconds * 1e9 / f64::from(STEPS) / count as f64);
+        }
+    }
+    let [all, find, draw, act] = best;
+    println!(
+        "thermostat for {dt} {all:.1}: pairs {find:.1}, noise {draw:.1}, midpoint {act:.1} with {:.2} iterations",
+        iterations as f64 / f64::from(ROUNDS * STEPS)
     );
     Ok(())
 }

@@ -310,7 +310,7 @@ fn precision_is_that_of_the_scene() {
         (folder, line)
     };
     assert!(style(ONE_SPECIES).1.ends_with("dpd/psi 1.0 11 precision double"));
-    assert!(style(&ONE_SPECIES.replace("precision = \"double\"\n", "")).1.ends_with("dpd/psi 1.0 11"));
+    assert!(style(&ONE_SPECIES.replace("precision = \"double\"\n", "")).1.ends_with("11 precision mixed"));
     let (folder, line) =
         style(&ONE_SPECIES.replace("\"double\"", "\"mixed\"").replace("dump   = 25", "dump   = 5"));
     assert!(line.ends_with("dpd/psi 1.0 11 precision mixed"));

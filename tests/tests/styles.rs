@@ -162,9 +162,20 @@ fn what_does_nothing_is_said() {
     let said = outcome(&format!("{base}{style}\n{coeff}\nrun 1\n"), 1).unwrap();
     assert!(!said.contains("WARNING: Pair style"), "{said}");
     // The log lists the settings.
-    assert!(said.contains("'precision mixed' is faster"), "{said}");
+    assert!(said.contains("advice        'precision mixed'"), "{said}");
     let mixed = outcome(&base.replace(style, &format!("{style} precision mixed")), 1).unwrap();
-    assert!(mixed.contains("mixed precision") && !mixed.contains("is faster"), "{mixed}");
+    assert!(mixed.contains("mixed precision") && !mixed.contains("'precision mixed'"), "{mixed}");
+    // Each piece of advice is given once, and to those that it concerns.
+    let heeded =
+        format!("newton off\n{base}").replace("fix 1 all nve", "fix 1 all dpd/splitting aboba").replace(
+            style,
+            &format!("neighbor 0.0 bin\nneigh_modify delay 0 every 20 check no\n{style} precision mixed"),
+        );
+    let heeded = outcome(&heeded, 1).unwrap();
+    for advice in ["'newton off'", "'neighbor 0.0 bin'", "'fix dpd/splitting'"] {
+        assert_eq!(mixed.matches(advice).count(), 1, "{advice}: {mixed}");
+        assert_eq!(heeded.matches(advice).count(), 0, "{advice}: {heeded}");
+    }
 }
 
 /// In two dimensions atoms with different z are refused, whichever rank has them.

@@ -104,6 +104,12 @@ impl Cloud {
         }
     }
 
+    /// Time step.
+    #[allow(dead_code)] // Not every user of this module asks for it.
+    pub fn dt(&self) -> f64 {
+        self.step.dt
+    }
+
     /// Moves particles along their velocities by one step: forces on a lattice would heat it.
     pub fn drift(&mut self) {
         for (x, v) in self.x.iter_mut().zip(&self.v) {

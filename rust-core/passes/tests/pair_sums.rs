@@ -26,7 +26,7 @@ fn list() -> PairList {
 }
 
 fn vectors() -> Vec<Wide> {
-    (0..ALL).map(|k| [uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2), 0.0]).collect()
+    (0..ALL).map(|k| Wide([uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2), 0.0])).collect()
 }
 
 /// Converts the pairs to double precision.
@@ -63,7 +63,7 @@ fn are_plain(list: &PairList) {
         }
         for (name, instructions) in Instructions::ALL {
             let Some(set) = InstructionSet::new(instructions) else { continue };
-            let mut sums = vec![[0.1, 0.1, 0.1, 0.0]; ALL];
+            let mut sums = vec![Wide([0.1, 0.1, 0.1, 0.0]); ALL];
             add_pairs(set, list, &xi, terms, &p, &mut sums);
             for (found, plain) in sums.iter().zip(&plain) {
                 assert_eq!(found[..3], plain[..], "{name}");

@@ -145,6 +145,19 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                     session.particle_steps_per_second
                 ));
             }
+            if let Some(iterations) = timing.sessions.last().and_then(|session| session.thermostat) {
+                say(&format!(
+                    "the thermostat took {:.1} iterations on average, {} at most",
+                    iterations.mean, iterations.most
+                ));
+                if iterations.inaccurate > 0 {
+                    warn(&format!(
+                        "{} updates of the thermostat are inaccurate: drag is too strong for this dt; use a smaller \
+                         gamma or dt",
+                        iterations.inaccurate
+                    ));
+                }
+            }
             let found = headline(out);
             say("");
             say::table_to_whoever_listens(&found.table());

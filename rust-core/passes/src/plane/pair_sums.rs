@@ -4,8 +4,30 @@ use super::list::{ExactPair, Pair, PairList, pairs_of_each};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
-/// A vector in the size of a register; the fourth component is 0.
-pub type Wide = [f64; 4];
+/// A vector in the size of a register, which no line of the cache ends in; the fourth component is 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[repr(C, align(32))]
+pub struct Wide(pub [f64; 4]);
+
+impl Wide {
+    pub const ZERO: Wide = Wide([0.0; 4]);
+}
+
+impl std::ops::Deref for Wide {
+    type Target = [f64; 4];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64; 4] {
+        &self.0
+    }
+}
+
+impl std::ops::DerefMut for Wide {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64; 4] {
+        &mut self.0
+    }
+}
 
 /// Factors of a pair: `a` and `b` of [`add_pairs`].
 #[derive(Debug, Clone, Copy)]

@@ -19,6 +19,7 @@
 //! and its rule in one of these files.
 
 mod bodies;
+mod effort;
 mod forces;
 mod measure;
 mod midpoint;
@@ -35,6 +36,7 @@ mod sequential;
 mod tests;
 
 pub use bodies::Bodies;
+pub use effort::Effort;
 pub use pulls::Pull;
 pub use rank::{Need, Rank};
 
@@ -43,6 +45,7 @@ use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, Places, Pool};
+use midpoint::Progress;
 use part::Part;
 use pass::Sums;
 use planes::Plane;
@@ -91,11 +94,14 @@ pub struct PairThermostat {
     parts: Vec<Part>,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
     impulses: Vec<Vec<f64>>,
-    iterations: usize,
+    progress: Progress,
+    effort: Effort,
     /// Whether distances are stored.
     wants_virial: bool,
     /// State of a solution in rounds with other ranks.
     round: Round,
+    /// Squared norm of the first residual of this rank.
+    first: f64,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
 }
@@ -127,9 +133,11 @@ impl PairThermostat {
             sums: Sums::default(),
             parts: Vec::new(),
             impulses: Vec::new(),
-            iterations: 0,
+            progress: Progress::default(),
+            effort: Effort::default(),
             wants_virial: false,
             round: Round::default(),
+            first: 0.0,
             noise: [PairNoise::default(); 2],
         })
     }
@@ -194,8 +202,8 @@ impl PairThermostat {
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
-        let tags = &self.tag;
-        pool.each(&mut self.planes, |plane| plane.draw(tags, noise[0], law));
+        let (tags, set) = (&self.tag, self.set);
+        pool.each(&mut self.planes, |plane| plane.draw(set, tags, noise[0], law));
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
@@ -237,7 +245,12 @@ impl PairThermostat {
 
     /// Number of iterations of the last implicit update.
     pub fn iterations(&self) -> usize {
-        self.iterations
+        self.progress.iterations
+    }
+
+    /// Iterations of all implicit updates so far.
+    pub fn effort(&self) -> Effort {
+        self.effort
     }
 
     /// Number of pairs in range.

@@ -3,85 +3,122 @@
 use super::pass::Wide;
 use crate::engine::vectors::Loop;
 
-/// Computes `image ← m p + K p`, where `K p` is the sum of `own` and `below`; returns `p · image` of
-/// the particles that are not frozen.
+/// Sets the residual to the sum of `own` and `below`, the solution to zero and `p` to `M⁻¹ r`;
+/// returns `r · M⁻¹ r`.
+pub struct Start<'a> {
+    pub inverse_mass: &'a [f64],
+    pub own: &'a [Wide],
+    /// Contributions of the plane below; empty if it has no pairs with these particles.
+    pub below: &'a [Wide],
+    pub residual: &'a mut Vec<Wide>,
+    pub solution: &'a mut Vec<Wide>,
+    pub p: &'a mut [Wide],
+}
+
+impl Loop for Start<'_> {
+    type Out = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Start { inverse_mass, own, below, residual, solution, p } = self;
+        solution.clear();
+        solution.resize(own.len(), Wide::ZERO);
+        residual.clear();
+        residual.extend_from_slice(own);
+        for (r, below) in residual.iter_mut().zip(below) {
+            *r = plus(*r, 1.0, *below);
+        }
+        let mut sum = Wide::ZERO;
+        for ((p, r), inverse) in p.iter_mut().zip(residual).zip(inverse_mass) {
+            *p = times(Wide([*inverse; 4]), *r);
+            sum = plus(sum, 1.0, times(*p, *r));
+        }
+        total(sum)
+    }
+}
+
+/// Adds `m p` and the contributions of the plane below to the sums of the particles of a plane, which become the
+/// image `(M + K) p`; returns `p · image` and `image · M⁻¹ image` of the particles that are not frozen.
 pub struct Multiply<'a> {
     pub p: &'a [Wide],
     /// Mass of each particle; infinite if it is frozen.
     pub mass: &'a [f64],
-    pub own: &'a [Wide],
+    pub inverse_mass: &'a [f64],
+    pub image: &'a mut [Wide],
     /// Contributions of the plane below; empty if it has no pairs with these particles.
     pub below: &'a [Wide],
-    pub image: &'a mut Vec<Wide>,
 }
 
 impl Loop for Multiply<'_> {
-    type Out = f64;
+    type Out = [f64; 2];
 
     #[inline(always)]
-    fn run(self) -> f64 {
-        let Multiply { p, mass, own, below, image } = self;
-        image.clear();
-        image.extend_from_slice(&own[..p.len()]);
+    fn run(self) -> [f64; 2] {
+        let Multiply { p, mass, inverse_mass, image, below } = self;
         for (image, below) in image.iter_mut().zip(below) {
             *image = plus(*image, 1.0, *below);
         }
-        let mut sum = [0.0; 4];
-        for ((image, p), m) in image.iter_mut().zip(p).zip(mass) {
+        let (mut curvature, mut square) = (Wide::ZERO, Wide::ZERO);
+        for (((image, p), m), inverse) in image.iter_mut().zip(p).zip(mass).zip(inverse_mass) {
             let (inertia, counts) = if m.is_finite() { (*m, 1.0) } else { (0.0, 0.0) };
             *image = plus(*image, inertia, *p);
-            sum = plus(sum, counts, times(*p, *image));
+            curvature = plus(curvature, counts, times(*p, *image));
+            square = plus(square, *inverse, times(*image, *image));
         }
-        total(sum)
+        [total(curvature), total(square)]
     }
 }
 
-/// Computes `solution ← solution + alpha p` and `residual ← residual − alpha image`;
-/// returns `r · M⁻¹ r` of the new residual.
-pub struct Descend<'a> {
+/// Computes `solution ← solution + alpha p`, `residual ← residual − alpha image` and then
+/// `p ← M⁻¹ residual + beta p`.
+pub struct Advance<'a> {
     pub alpha: f64,
-    pub p: &'a [Wide],
+    pub beta: f64,
     pub inverse_mass: &'a [f64],
     pub image: &'a [Wide],
     pub solution: &'a mut [Wide],
     pub residual: &'a mut [Wide],
-}
-
-impl Loop for Descend<'_> {
-    type Out = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let Descend { alpha, p, inverse_mass, image, solution, residual } = self;
-        let mut sum = [0.0; 4];
-        for ((((s, r), p), image), inverse) in
-            solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
-        {
-            *s = plus(*s, alpha, *p);
-            let now = plus(*r, -alpha, *image);
-            *r = now;
-            sum = plus(sum, *inverse, times(now, now));
-        }
-        total(sum)
-    }
-}
-
-/// Computes `p ← M⁻¹ r + beta p`.
-pub struct Direct<'a> {
-    pub beta: f64,
-    pub inverse_mass: &'a [f64],
-    pub residual: &'a [Wide],
     pub p: &'a mut [Wide],
 }
 
-impl Loop for Direct<'_> {
+impl Loop for Advance<'_> {
     type Out = ();
 
     #[inline(always)]
     fn run(self) {
-        let Direct { beta, inverse_mass, residual, p } = self;
-        for ((p, r), inverse) in p.iter_mut().zip(residual).zip(inverse_mass) {
-            *p = plus(times([beta; 4], *p), *inverse, *r);
+        let Advance { alpha, beta, inverse_mass, image, solution, residual, p } = self;
+        for ((((s, r), p), image), inverse) in
+            solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
+        {
+            *s = plus(*s, alpha, *p);
+            *r = plus(*r, -alpha, *image);
+            *p = plus(times(Wide([beta; 4]), *p), *inverse, *r);
+        }
+    }
+}
+
+/// The last step: computes `p ← solution + alpha p` and `solution ← p + rest M⁻¹ (residual − alpha image)`.
+pub struct Finish<'a> {
+    pub alpha: f64,
+    pub rest: f64,
+    pub inverse_mass: &'a [f64],
+    pub p: &'a mut [Wide],
+    pub image: &'a [Wide],
+    pub residual: &'a [Wide],
+    pub solution: &'a mut [Wide],
+}
+
+impl Loop for Finish<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Finish { alpha, rest, inverse_mass, p, image, residual, solution } = self;
+        for ((((s, r), p), image), inverse) in
+            solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
+        {
+            *p = plus(*s, alpha, *p);
+            *s = plus(*p, rest * *inverse, plus(*r, -alpha, *image));
         }
     }
 }
@@ -89,12 +126,12 @@ impl Loop for Direct<'_> {
 /// The vector `a + factor b`.
 #[inline(always)]
 fn plus(a: Wide, factor: f64, b: Wide) -> Wide {
-    std::array::from_fn(|c| a[c] + factor * b[c])
+    Wide(std::array::from_fn(|c| a[c] + factor * b[c]))
 }
 
 #[inline(always)]
 fn times(a: Wide, b: Wide) -> Wide {
-    std::array::from_fn(|c| a[c] * b[c])
+    Wide(std::array::from_fn(|c| a[c] * b[c]))
 }
 
 /// The sum of all four components, the last of which is 0.

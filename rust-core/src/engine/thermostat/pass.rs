@@ -16,7 +16,7 @@ pub struct Sums {
     /// Vector of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     pub p: Vec<Wide>,
     /// Sums by plane: of its own particles, then of those of the next.
-    of_plane: Vec<Vec<Wide>>,
+    pub of_plane: Vec<Vec<Wide>>,
 }
 
 impl Sums {
@@ -25,7 +25,7 @@ impl Sums {
         self.p.clear();
         self.p.extend(order.iter().map(|k| {
             let [x, y, z] = v[*k as usize];
-            [x, y, z, 0.0]
+            Wide([x, y, z, 0.0])
         }));
     }
 
@@ -54,31 +54,48 @@ impl Sums {
             let Plane { found, xi, .. } = plane;
             let count = found.own.len() + found.next.len();
             sums.clear();
-            sums.resize(count, [0.0; 4]);
+            sums.resize(count, Wide::ZERO);
             add_pairs(set, &found.list, xi, terms, &p[found.own.start..][..count], sums);
         });
     }
 
-    /// The sums of the particles of a plane over the pairs of that plane, and over those of the plane
-    /// below; the latter is empty if that has no pairs with them.
-    pub fn halves(&self, planes: &[Plane], number: usize) -> [&[Wide]; 2] {
-        let below = match number {
-            0 => planes.len() - 1,
-            number => number - 1,
-        };
-        let own = &self.of_plane[number][..planes[number].found.own.len()];
-        match planes[below].found.next == planes[number].found.own {
-            true => [own, &self.of_plane[below][planes[below].found.own.len()..]],
-            false => [own, &[]],
-        }
+    /// The sums of the particles of each plane over the pairs of that plane, and over those of the plane
+    /// below; the latter are empty if that has no pairs with them.
+    pub fn halves<'a>(
+        of_plane: &'a mut [Vec<Wide>],
+        planes: &[Plane],
+    ) -> impl Iterator<Item = (&'a mut [Wide], &'a [Wide])> {
+        let (own, next): (Vec<_>, Vec<_>) = of_plane
+            .iter_mut()
+            .zip(planes)
+            .map(|(sums, plane)| {
+                let (own, next) = sums.split_at_mut(plane.found.own.len());
+                (own, &*next)
+            })
+            .unzip();
+        let below: Vec<_> = (0..planes.len())
+            .map(|number| below(planes, number).map_or(&[][..], |(below, _)| next[below]))
+            .collect();
+        own.into_iter().zip(below)
     }
 
     /// The sums of the particles of a plane.
     pub fn of(&self, planes: &[Plane], number: usize) -> impl Iterator<Item = Wide> {
-        let [own, below] = self.halves(planes, number);
-        let zeros = std::iter::repeat(&[0.0; 4]);
-        own.iter().zip(below.iter().chain(zeros)).map(|(a, b)| [0, 1, 2, 3].map(|c| a[c] + b[c]))
+        let own = &self.of_plane[number][..planes[number].found.own.len()];
+        let below = below(planes, number).map_or(&[][..], |(below, count)| &self.of_plane[below][count..]);
+        let zeros = std::iter::repeat(&Wide::ZERO);
+        own.iter().zip(below.iter().chain(zeros)).map(|(a, b)| Wide([0, 1, 2, 3].map(|c| a[c] + b[c])))
     }
+}
+
+/// The plane below, and the number of its own particles, if it has pairs with the particles of a plane.
+fn below(planes: &[Plane], number: usize) -> Option<(usize, usize)> {
+    let below = match number {
+        0 => planes.len() - 1,
+        number => number - 1,
+    };
+    let below_has = &planes[below].found;
+    (below_has.next == planes[number].found.own).then_some((below, below_has.own.len()))
 }
 
 impl Plane {

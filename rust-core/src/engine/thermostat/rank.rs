@@ -5,6 +5,7 @@
 //! ranks, and the rule continues. All ranks decide by the same sums, so that they need the same.
 
 use super::PairThermostat;
+use super::pass::Wide;
 use super::planes::{Plane, second};
 use super::round::Round;
 use crate::engine::error::EngineError;
@@ -32,8 +33,8 @@ pub struct Rank<'a> {
 pub enum Need {
     /// No task: the velocities are final. Contains the virial of this rank, if distances were stored.
     Nothing([f64; 6]),
-    /// Sum this number over all ranks.
-    Total(f64),
+    /// Sum these numbers over all ranks.
+    Totals([f64; 3]),
     /// Copy the vectors of owners to their ghosts.
     Ghosts,
 }
@@ -123,13 +124,13 @@ impl PairThermostat {
     ///
     /// # Errors
     /// Fails if the number of vectors is not that of the particles.
-    pub fn begin_midpoint(&mut self, pool: &Pool, vectors: &[[f64; 3]]) -> Result<Need, EngineError> {
+    pub fn begin_midpoint(&mut self, pool: &Pool, vectors: &mut [[f64; 3]]) -> Result<Need, EngineError> {
         self.check(vectors)?;
-        self.round = Round::First;
-        Ok(Need::Total(self.begin(pool, vectors, true)))
+        self.first = self.begin(pool, vectors, true);
+        Ok(self.show_direction(vectors))
     }
 
-    /// Continues with the result of the host's task: a total, or the `vectors` of ghosts. `v` are the
+    /// Continues with the result of the host's task: totals, or the `vectors` of ghosts. `v` are the
     /// velocities of owned particles, which the last round changes.
     ///
     /// # Errors
@@ -137,7 +138,7 @@ impl PairThermostat {
     pub fn go_on(
         &mut self,
         pool: &Pool,
-        total: f64,
+        totals: [f64; 3],
         vectors: &mut [[f64; 3]],
         v: &mut [[f64; 3]],
     ) -> Result<Need, EngineError> {
@@ -147,23 +148,22 @@ impl PairThermostat {
         }
         match self.round {
             Round::Start => Err(EngineError::Host("the thermostat must begin before it continues")),
-            Round::First => {
-                self.direct(pool, 0.0);
-                Ok(self.next_direction(pool, [total, total], vectors, v))
-            }
-            Round::Direction { first, now } => {
+            Round::Direction => {
                 self.take_ghosts(vectors);
-                self.round = Round::Curvature { first, now };
-                Ok(Need::Total(self.curvature(pool)))
+                self.round = Round::Curvature;
+                let [curvature, square] = self.curvature(pool);
+                Ok(Need::Totals([self.first, curvature, square]))
             }
-            Round::Curvature { first, now } => {
-                self.round = Round::Residual { first, now };
-                Ok(Need::Total(self.descend(pool, now / total)))
-            }
-            Round::Residual { first, now } => {
-                self.direct(pool, total / now);
-                Ok(self.next_direction(pool, [first, total], vectors, v))
-            }
+            Round::Curvature => match self.advance(pool, totals) {
+                true => Ok(self.show_direction(vectors)),
+                false if self.wants_virial => {
+                    vectors[..v.len()].copy_from_slice(v);
+                    self.add_direction(pool, &mut vectors[..v.len()]);
+                    self.round = Round::Middle;
+                    Ok(Need::Ghosts)
+                }
+                false => Ok(self.end(pool, v, [0.0; 6])),
+            },
             Round::Middle => {
                 let virial = self.virial_at(pool, vectors, true);
                 Ok(self.end(pool, v, virial))
@@ -175,32 +175,17 @@ impl PairThermostat {
         if vectors.len() == self.lists.place().len() { Ok(()) } else { Err(CHANGED) }
     }
 
-    /// Returns the direction, or the solution if the residual is small enough.
-    fn next_direction(
-        &mut self,
-        pool: &Pool,
-        [first, now]: [f64; 2],
-        vectors: &mut [[f64; 3]],
-        v: &mut [[f64; 3]],
-    ) -> Need {
-        if self.goes_on(now, first) {
-            for (p, k) in self.sums.p.iter().zip(self.lists.order()) {
-                vectors[*k as usize] = [p[0], p[1], p[2]];
-            }
-            self.round = Round::Direction { first, now };
-            return Need::Ghosts;
+    /// Asks for the direction of ghosts.
+    fn show_direction(&mut self, vectors: &mut [[f64; 3]]) -> Need {
+        for (p, k) in self.sums.p.iter().zip(self.lists.order()) {
+            vectors[*k as usize] = [p[0], p[1], p[2]];
         }
-        self.add_solution(pool, v);
-        if self.wants_virial {
-            vectors[..v.len()].copy_from_slice(v);
-            self.round = Round::Middle;
-            return Need::Ghosts;
-        }
-        self.end(pool, v, [0.0; 6])
+        self.round = Round::Direction;
+        Need::Ghosts
     }
 
     fn end(&mut self, pool: &Pool, v: &mut [[f64; 3]], virial: [f64; 6]) -> Need {
-        self.add_solution(pool, v);
+        self.add_solution(pool, 2.0, v);
         self.round = Round::Start;
         Need::Nothing(virial)
     }
@@ -210,7 +195,7 @@ impl PairThermostat {
         for ((p, k), ghost) in self.sums.p.iter_mut().zip(self.lists.order()).zip(ghosts) {
             if *ghost {
                 let [x, y, z] = vectors[*k as usize];
-                *p = [x, y, z, 0.0];
+                *p = Wide([x, y, z, 0.0]);
             }
         }
     }

@@ -3,14 +3,10 @@
 pub enum Round {
     #[default]
     Start,
-    /// The total of the first residual.
-    First,
-    /// Directions of ghosts, with the squared norms of the residual at first and now.
-    Direction { first: f64, now: f64 },
-    /// The total of the curvature.
-    Curvature { first: f64, now: f64 },
-    /// The total of the residual.
-    Residual { first: f64, now: f64 },
+    /// Directions of ghosts.
+    Direction,
+    /// The totals of the first residual and of the curvature.
+    Curvature,
     /// Velocities of ghosts at the midpoint.
     Middle,
 }

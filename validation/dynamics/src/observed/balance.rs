@@ -140,7 +140,7 @@ fn force_gradient() -> Integrator {
 }
 
 /// Forces of the middle kick are computed at displaced positions and act at the present positions. Counted at
-/// the displaced positions they would transmit a stress of 0.3 across a film without vapour, which the test
+/// the displaced positions they would transmit a stress of 0.09 across a film without vapour, which the test
 /// must be able to see.
 #[test]
 fn displaced_forces_carry_nothing_across_a_film() {
@@ -170,7 +170,7 @@ fn displaced_forces_carry_nothing_across_a_film() {
     }
     let (carried, elsewhere) = (Measured::mean(&carried), Measured::mean(&elsewhere));
     assert!(carried.value.abs() < 6.0 * carried.error && carried.error < 0.08, "{carried:?}");
-    assert!(elsewhere.value.abs() > 4.0 * elsewhere.error, "{elsewhere:?}");
+    assert!(elsewhere.value.abs() > 3.0 * elsewhere.error, "{elsewhere:?}");
 }
 
 /// A film that gravity presses on a wall carries at every height the weight of the particles above it, with

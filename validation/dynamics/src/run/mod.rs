@@ -41,7 +41,7 @@ pub use reorder::INTERVAL as REORDERING;
 pub use runner::{Begin, Runner, Start, run_scene};
 pub use simulation::Simulation;
 pub use summary::Summary;
-pub use timing::{Session, Timing};
+pub use timing::{Iterations, Session, Timing};
 pub use watch::{Deviation, Thermometer};
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Wall times of a run, in a file of their own because they differ from run to run.
 
 use super::error::RunError;
+use psidpd_core::engine::thermostat::Effort;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -22,6 +23,26 @@ pub struct Session {
     pub wall_seconds: f64,
     /// Particles times steps over the wall time.
     pub particle_steps_per_second: f64,
+    /// Iterations of an implicit thermostat; left out without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thermostat: Option<Iterations>,
+}
+
+/// Iterations of the updates of an implicit thermostat.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Iterations {
+    /// Mean of all updates.
+    pub mean: f64,
+    pub most: usize,
+    /// Updates that ended before they were accurate.
+    pub inaccurate: u64,
+}
+
+impl Iterations {
+    pub(super) fn of(effort: Effort) -> Option<Iterations> {
+        let Effort { most, inaccurate, .. } = effort;
+        effort.mean().map(|mean| Iterations { mean, most, inaccurate })
+    }
 }
 
 impl Timing {

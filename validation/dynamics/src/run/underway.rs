@@ -6,7 +6,7 @@ use super::outcome::{Outcome, Progress};
 use super::output::{Output, write_observations};
 use super::simulation::Simulation;
 use super::summary::Summary;
-use super::timing::{Session, Timing};
+use super::timing::{Iterations, Session, Timing};
 use super::watch::Watch;
 use crate::checkpoint::{Checkpoint, CheckpointError, Position, Store, Sums, Thermo};
 use crate::particles::write_data;
@@ -294,6 +294,7 @@ impl<'a> Run<'a> {
             wall_seconds,
             // The clock may not have advanced, and JSON has no infinity.
             particle_steps_per_second: made / wall_seconds.max(1e-9),
+            thermostat: Iterations::of(self.simulation.effort()),
         });
         timing
     }

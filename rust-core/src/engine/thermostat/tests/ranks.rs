@@ -85,21 +85,21 @@ fn by_ranks(
             let mut thermostat = thermostat(model, 1.0, cloud.precision);
             thermostat.find_pairs_of_rank(&pool, &rank, DT, virial).unwrap();
             thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
-            let vectors: Vec<[f64; 3]> = all().map(|(k, _)| cloud.v[k]).collect();
+            let mut vectors: Vec<[f64; 3]> = all().map(|(k, _)| cloud.v[k]).collect();
             let v = piece.owned.iter().map(|k| cloud.v[*k]).collect();
-            let need = thermostat.begin_midpoint(&pool, &vectors).unwrap();
+            let need = thermostat.begin_midpoint(&pool, &mut vectors).unwrap();
             Hand { thermostat, vectors, v, need }
         })
         .collect();
     loop {
         let needs: Vec<Need> = hands.iter().map(|hand| hand.need).collect();
-        let mut total = 0.0;
+        let mut totals = [0.0; 3];
         match needs[0] {
             Need::Nothing(_) => break,
-            Need::Total(_) => {
+            Need::Totals(_) => {
                 for need in &needs {
-                    let Need::Total(part) = need else { panic!("{needs:?}") };
-                    total += part;
+                    let Need::Totals(part) = need else { panic!("{needs:?}") };
+                    (0..3).for_each(|k| totals[k] += part[k]);
                 }
             }
             Need::Ghosts => {
@@ -115,7 +115,7 @@ fn by_ranks(
             }
         }
         for hand in &mut hands {
-            hand.need = hand.thermostat.go_on(&pool, total, &mut hand.vectors, &mut hand.v).unwrap();
+            hand.need = hand.thermostat.go_on(&pool, totals, &mut hand.vectors, &mut hand.v).unwrap();
         }
     }
     let mut v = vec![[f64::NAN; 3]; cloud.x.len()];
@@ -182,7 +182,7 @@ fn ranks_refuse_what_does_not_fit() {
     let mut thermostat = thermostat(model, 1.0, cloud.precision);
     let mut vectors = cloud.v.clone();
     let mut v = cloud.v[1..].to_vec();
-    assert!(thermostat.go_on(&pool, 1.0, &mut vectors, &mut v).is_err());
+    assert!(thermostat.go_on(&pool, [1.0; 3], &mut vectors, &mut v).is_err());
     let wrong = [
         Rank { mass: &mass[1..], ..whole },
         Rank { species_of_kind: &[1], ..whole },
@@ -193,8 +193,8 @@ fn ranks_refuse_what_does_not_fit() {
     assert!(wrong.iter().all(|rank| thermostat.find_pairs_of_rank(&pool, rank, DT, false).is_err()));
     thermostat.find_pairs_of_rank(&pool, &whole, DT, false).unwrap();
     thermostat.draw(&pool, 1, 1, Stream(0), Law::Gaussian);
-    assert!(thermostat.begin_midpoint(&pool, &vectors[1..]).is_err());
-    thermostat.begin_midpoint(&pool, &vectors).unwrap();
-    assert!(thermostat.go_on(&pool, 1.0, &mut vectors[1..], &mut v).is_err());
-    assert!(thermostat.go_on(&pool, 1.0, &mut vectors, &mut v).is_ok());
+    assert!(thermostat.begin_midpoint(&pool, &mut vectors[1..]).is_err());
+    thermostat.begin_midpoint(&pool, &mut vectors).unwrap();
+    assert!(thermostat.go_on(&pool, [1.0; 3], &mut vectors[1..], &mut v).is_err());
+    assert!(thermostat.go_on(&pool, [1.0; 3], &mut vectors, &mut v).is_ok());
 }

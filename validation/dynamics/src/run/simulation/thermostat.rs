@@ -5,7 +5,7 @@ use super::forces::Forces;
 use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update, Warmth};
+use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
 use psidpd_core::engine::{Step, Want};
 
 #[derive(Debug, Clone)]
@@ -13,6 +13,8 @@ pub(super) struct Thermostat {
     on: bool,
     /// `None` if the fluid has none.
     pairs: Option<PairThermostat>,
+    /// Iterations at earlier temperatures and settings.
+    effort_before: Effort,
     /// Of which positions the pairs are known, for what time, and whether with distances.
     found: Option<(u64, f64, bool)>,
     /// Virial of the impulses in the present step.
@@ -40,6 +42,7 @@ impl Thermostat {
         Thermostat {
             on: true,
             pairs,
+            effort_before: Effort::default(),
             found: None,
             impulse_virial: [0.0; 6],
             in_forces: None,
@@ -49,6 +52,7 @@ impl Thermostat {
 
     /// Takes over the temperature and the settings of `forces`.
     pub fn follow(&mut self, forces: &Forces) {
+        self.effort_before = self.effort();
         self.pairs = pairs_of(forces);
         self.found = None;
     }
@@ -65,6 +69,13 @@ impl Thermostat {
 
     pub fn begin_step(&mut self) {
         self.impulse_virial = [0.0; 6];
+    }
+
+    /// Iterations since the start.
+    pub fn effort(&self) -> Effort {
+        let mut effort = self.pairs.as_ref().map_or(Effort::default(), PairThermostat::effort);
+        effort += self.effort_before;
+        effort
     }
 
     /// Virial of the impulses in the present step.
@@ -241,6 +252,11 @@ impl Simulation {
         self.thermostat.kept_forces = kept;
         self.thermostat.impulse_virial = virial;
         done
+    }
+
+    /// Iterations of the thermostat since the start of this session.
+    pub fn effort(&self) -> Effort {
+        self.thermostat.effort()
     }
 
     /// What the thermostat sees of the particles; `None` where it does not act, or sees none.
