@@ -130,9 +130,9 @@ impl CellOrder {
         let (mut rest, counts) = (&mut self.start[1..=cells], SharedSlice::new(&mut self.counts));
         let of_part = |t: usize| (part(cells, t, threads), take(&mut rest, part(cells, t, threads).len()), 0);
         let mut parts: Vec<_> = (0..threads).map(of_part).collect();
-        // SAFETY, here and below: each cell is in the part of one thread, and the counts of a thread are as many as cells.
-        let of_thread = |t: usize, cells_of_part: &Range<usize>| unsafe {
-            counts.slice_mut(cells * t + cells_of_part.start..cells * t + cells_of_part.end)
+        let of_thread = |t: usize, of_part: &Range<usize>| {
+            // SAFETY: each cell is in the part of one thread, and a thread has as many counts as there are cells.
+            unsafe { counts.slice_mut(cells * t + of_part.start..cells * t + of_part.end) }
         };
         pool.each(&mut parts, |(range, ends, sum)| {
             ends.copy_from_slice(of_thread(0, range));

@@ -33,7 +33,7 @@ impl Unit {
 impl CellOrder {
     /// Number of units of each plane: one or an even number, so that the last and the first are in different sets.
     pub fn units_per_plane(&self) -> usize {
-        (self.grid.columns_per_plane / FEWEST_COLUMNS & !1).max(1)
+        ((self.grid.columns_per_plane / FEWEST_COLUMNS) & !1).max(1)
     }
 
     /// Number of units.
