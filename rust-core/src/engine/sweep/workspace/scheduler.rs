@@ -65,10 +65,11 @@ fn vectors_before(place: usize) -> usize {
 /// reads sixteen candidates at once and up to two such groups begin after the last particle.
 fn needed(order: &CellOrder, units: &Range<usize>, planes: usize) -> Range<usize> {
     let Range { start, end } = order.particles_of_units(units);
+    let (start, end) = (vectors_before(start), vectors_before(end));
     let of_slab = order.planes_of(units);
     let behind = (of_slab.start + planes).min(of_slab.end);
     let behind = vectors_before(order.plane_start(behind)) + 4 * VECTOR_PADDING;
-    vectors_before(start)..behind.min(vectors_before(end))
+    start..behind.clamp(start, end)
 }
 
 /// The particles of a slab that its thread fills before any pass begins: those of its first two planes, and of its
