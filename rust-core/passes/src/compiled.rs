@@ -13,6 +13,7 @@ use crate::plane::second::second_pass;
 use crate::simd::{Isa, Kernel, Scalar, run};
 use crate::tally::Tally;
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// A precision of pairs.
 ///
@@ -128,10 +129,11 @@ impl<P: PairPrecision> Passes<P> {
 /// A pass, compiled with or without species, and with or without energies and virials.
 struct With<K, const MULTISPECIES: bool, const TALLY: bool>(K);
 
-/// Arguments of the first pass over a plane.
+/// Arguments of the first pass over columns of a plane.
 pub struct First<'a, P: PairPrecision> {
     pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
     pub plane: usize,
+    pub columns: Range<usize>,
     pub sums: PlaneSums<'a>,
     pub buffers: &'a mut PairBuffers<P::Scalar>,
     pub in_range: &'a mut InRangePairs<P::Scalar>,
@@ -144,9 +146,11 @@ impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) -> Tally {
-        let First { data, plane, sums, buffers, in_range } = self.0;
+        let First { data, plane, columns, sums, buffers, in_range } = self.0;
         // SAFETY: the caller of `PairPrecision::first` fulfils the contract of `first_pass`.
-        unsafe { first_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, plane, sums, buffers, in_range) }
+        unsafe {
+            first_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, plane, columns, sums, buffers, in_range)
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Sums over the pairs of each particle.
 //!
-//! Each plane has its own accumulators, for its particles and for those of the next plane. No other
-//! plane writes to them, so that sums do not depend on the order of planes and threads.
+//! Each plane has its own accumulators, for its particles and for those of the next plane, in one or two sets
+//! between which its blocks of columns alternate. No particle of a set gets additions from two blocks, so that sums
+//! do not depend on the order of blocks, planes and threads.
 
 use crate::simd::OFFSET_BITS;
 use std::marker::PhantomData;
@@ -27,18 +28,18 @@ pub struct PlaneSums<'a> {
 }
 
 impl<'a> PlaneSums<'a> {
-    /// The accumulators of a plane whose first particle is `first`. Each particle has one of forces
-    /// and, if there are several `variables`, as many of densities as quads hold them.
+    /// The accumulators of a plane; `forces` and `densities` are the places of those of its particle `first`. Each
+    /// particle has one of forces and, if there are several `variables`, as many of densities as quads hold them.
     pub fn new(
         first: usize,
-        forces: &'a mut [Accumulator],
-        densities: &'a mut [Accumulator],
+        forces: *mut Accumulator,
+        densities: *mut Accumulator,
         variables: usize,
     ) -> PlaneSums<'a> {
         let quads = variables.div_ceil(4);
         PlaneSums {
-            forces: forces.as_mut_ptr().wrapping_sub(first).cast(),
-            densities: densities.as_mut_ptr().wrapping_sub(quads * first).cast(),
+            forces: forces.wrapping_sub(first).cast(),
+            densities: densities.wrapping_sub(quads * first).cast(),
             variables,
             borrowed: PhantomData,
         }

@@ -1,4 +1,5 @@
-//! The first pass over a plane: the pairs of its particles with each other and with the next plane, the
+//! The first pass over columns of a plane: the pairs of their particles with each other, with the next column
+//! and with the next plane, the
 //! forces without density terms, and the weights.
 
 use super::buffers::PairBuffers;
@@ -16,17 +17,20 @@ use crate::pair_batch::step_constants::StepConstants;
 use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::{Isa, Reals};
 use crate::tally::Tally;
+use std::ops::Range;
 
-/// Does the first pass over `plane`, and writes to `in_range` the pairs that the second pass needs.
+/// Does the first pass over `columns` of `plane`, and writes to `in_range` the pairs that the second pass needs.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. Arrays have the sizes that the types in [`PassData`]
 /// state; the particles of the plane, of the next one and the padding are filled, and no thread writes
-/// them. The sums are those of the plane, and zero.
+/// them. The sums are those of the plane; they are zero, and no other thread accesses them, for all particles of
+/// these columns and of the columns next to them.
 #[inline(always)]
 pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     plane: usize,
+    columns: Range<usize>,
     sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
@@ -50,7 +54,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
             in_range,
             tally: Tally::default(),
         };
-        let groups = each_batch::<I, _>(cells, plane, A::Reals::LANES, search, &mut pass);
+        let groups = each_batch::<I, _>(cells, plane, columns, A::Reals::LANES, search, &mut pass);
         let tally = pass.tally;
         batch.counts.searched += groups;
         tally

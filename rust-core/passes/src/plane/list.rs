@@ -140,7 +140,8 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
         // SAFETY: the caller of `list_pairs` promises filled arrays; a plane has a first column.
         unsafe {
             let first = inputs.cells.column(plane, 0)[0];
-            let end = inputs.cells.column(plane, inputs.cells.grid.columns_per_plane - 1)[1];
+            let columns = inputs.cells.grid.columns_per_plane;
+            let end = inputs.cells.column(plane, columns - 1)[1];
             let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
             let mut lister = Lister::<I, MULTISPECIES> {
                 inputs,
@@ -151,7 +152,7 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
                 per_distance,
                 list,
             };
-            each_batch::<I, _>(&inputs.cells, plane, I::F32::LANES, search, &mut lister);
+            each_batch::<I, _>(&inputs.cells, plane, 0..columns, I::F32::LANES, search, &mut lister);
             lister.begin_at(end);
         }
     }

@@ -1,4 +1,4 @@
-//! The traversal of a plane: its search groups, and the batches of their pairs.
+//! The traversal of columns of a plane: their search groups, and the batches of their pairs.
 
 use crate::cells::sorted::SortedCells;
 use crate::pair_search::buffers::SearchBuffers;
@@ -6,6 +6,7 @@ use crate::pair_search::cell_ranges::{CellRanges, PlaneSearch, StencilColumns};
 use crate::pair_search::clusters::SEARCH_GROUP;
 use crate::pair_search::find::FindPairs;
 use crate::simd::{Isa, run};
+use std::ops::Range;
 
 /// The work that a pass does with each batch of pairs.
 pub trait BatchVisitor<I: Isa> {
@@ -16,8 +17,8 @@ pub trait BatchVisitor<I: Isa> {
     unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]);
 }
 
-/// Finds the pairs of the particles of `plane` with each other and with the next plane, and calls `visitor`
-/// for successive sets of `lanes` i-particles, in the order of cells; returns the number of search groups.
+/// Finds the pairs of the particles in `columns` of `plane` with each other, with the next column and with the
+/// next plane, and calls `visitor` for successive sets of `lanes` i-particles, in the order of cells; returns the number of search groups.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. Particles of the plane, of the next one and the padding
@@ -26,6 +27,7 @@ pub trait BatchVisitor<I: Isa> {
 pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
     cells: &SortedCells,
     plane: usize,
+    columns: Range<usize>,
     lanes: usize,
     buffers: &mut SearchBuffers,
     visitor: &mut V,
@@ -33,12 +35,11 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
     // SAFETY: columns are those of the grid, and groups and batches those of a column;
     // `SortedParticles::make_room` pads the arrays.
     unsafe {
-        let grid = cells.grid;
         let search = PlaneSearch::new(cells, plane);
         let mut ranges = CellRanges::default();
         let mut groups = 0;
-        let mut column = 0;
-        while column < grid.columns_per_plane {
+        let mut column = columns.start;
+        while column < columns.end {
             let stencil = StencilColumns::new(cells, &search, plane, column);
             let [mut first, end] = cells.column(plane, column);
             if !cells.ghosts.is_empty() && stencil.only_ghosts() {

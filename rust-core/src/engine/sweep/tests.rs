@@ -341,12 +341,12 @@ fn many() -> Fluid {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     for fluid in [shipped("warren2003-set6.toml"), many(), shipped("van-der-waals-2d.toml")] {
-        for domain in boxes(fluid.dimensions, 7.3) {
+        for domain in boxes(fluid.dimensions, 10.3 * fluid.cutoff()) {
             let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), 1500, 3);
             for (precision, instructions) in every() {
                 let mut one = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
                 let (force, tally) = swept(&mut one, &cloud, Want::TOTALS);
-                for threads in [2, 3, 7] {
+                for threads in [2, 3, 7, 64] {
                     let mut more = Sweep::new(&fluid, settings(precision, instructions, threads)).unwrap();
                     let (here, totals) = swept(&mut more, &cloud, Want::TOTALS);
                     assert!(
@@ -383,12 +383,15 @@ fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
         let engines = (1..=5)
             .map(|t| Sweep::new(&fluid, settings(Precision::Double, Instructions::best(), t)).unwrap());
         let mut engines: Vec<Sweep> = engines.collect();
-        for (planes, periodic) in
-            [2, 9, 3, 12, 4, 7, 5, 6, 8].into_iter().flat_map(|l| [(l, true), (l, false)])
+        for (n, (planes, periodic)) in
+            [2, 9, 3, 12, 4, 7, 5, 6, 8].into_iter().flat_map(|l| [(l, true), (l, false)]).enumerate()
         {
-            let lengths = [3.0, 3.0, planes as f64 + 0.3].map(|l| l * fluid.cutoff());
-            let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, periodic]).unwrap();
-            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * planes, planes as u64);
+            // A plane is one unit, two or four.
+            let columns = [3.0, 10.4, 20.2][n % 3];
+            let lengths = [3.0, columns, planes as f64 + 0.3].map(|l| l * fluid.cutoff());
+            let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, n % 4 < 2, periodic]).unwrap();
+            let count = (8.0 * columns) as usize * planes;
+            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), count, planes as u64);
             for x in &mut cloud.x {
                 // The density decreases with height.
                 x[2] *= x[2] / lengths[2];

@@ -14,6 +14,7 @@ mod scheduler;
 mod slopes;
 mod sorted_particles;
 mod thread_slab;
+mod units;
 
 pub use cell_order::{CellOrder, extremes};
 pub use forces::ForceSink;
@@ -37,7 +38,7 @@ use psidpd_passes::noise::PairNoise;
 use psidpd_passes::pair_batch::inputs::PairInputs;
 use psidpd_passes::plane::data::PassData;
 use psidpd_threads::Pool;
-use scheduler::{PassInput, Scheduler, thread_slabs};
+use scheduler::{PassInput, Scheduler};
 use slopes::SlopeArrays;
 use sorted_particles::SharedParticles;
 use std::ops::Range;
@@ -109,15 +110,13 @@ impl<P: PairPrecision> Workspace<P> {
         out: ForceSink,
         times: &mut Times,
     ) -> Result<(), EngineError> {
-        let planes = thread_slabs(&self.order, pool.threads());
-        self.up_to_slopes(pool, plan, input, out, &planes)?;
-        self.on_slabs(&planes, |scheduler, slabs, accumulators| {
-            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `up_to_slopes` has computed the slopes of all particles and copies.
-            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_at_ends(out, slab, sums) });
-            drop(work);
-            let sums = accumulators.sums();
-            pool.each(slabs, |slab| scheduler.forces_of_first(out, slab, sums));
+        let slabs = self.order.thread_slabs(pool.threads());
+        self.up_to_slopes(pool, plan, input, out, &slabs)?;
+        self.on_slabs(&slabs, |scheduler, slabs| {
+            // SAFETY: `up_to_slopes` has computed the slopes of all particles and copies; no other work runs.
+            pool.each(slabs, |slab| unsafe { scheduler.second_at_ends(slab) });
+            // SAFETY: all passes are done; no other work runs.
+            pool.each(slabs, |slab| unsafe { scheduler.forces_at_ends(out, slab) });
         });
         self.finish(times)
     }
@@ -130,11 +129,11 @@ impl<P: PairPrecision> Workspace<P> {
         plan: &Plan,
         input: &Input,
         out: ForceSink,
-        planes: &[Range<usize>],
+        units: &[Range<usize>],
     ) -> Result<(), EngineError> {
         let width = self.fluid.width();
-        self.accumulators.lay_out(&self.order, planes, width);
-        self.results.make_room(&self.order, planes.len(), width);
+        self.accumulators.lay_out(&self.order, units, width);
+        self.results.make_room(&self.order, units.len(), width);
         let excess = ExcessInput::new(plan, input);
         if excess.is_none() {
             self.results.excess.fill(0.0);
@@ -142,7 +141,7 @@ impl<P: PairPrecision> Workspace<P> {
         {
             let Workspace { fluid, order, particles, results, threads, .. } = self;
             let particles = &particles.share();
-            let slabs = results.split(order, planes, width, threads);
+            let slabs = results.split(order, units, width, threads);
             let mut slabs: Vec<_> = slabs.into_iter().enumerate().collect();
             pool.each(&mut slabs, |(t, slab)| {
                 Scheduler::<P>::fill_start(particles, fluid, order, input, slab, *t == 0);
@@ -150,14 +149,11 @@ impl<P: PairPrecision> Workspace<P> {
         }
         self.particles.copy_first_plane(&self.order);
         let input = &PassInput { input, excess, out };
-        self.on_slabs(planes, |scheduler, slabs, accumulators| {
-            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `fill_start` has filled the starts of all slabs, and the copies exist; no other work runs.
-            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.interior(input, slab, sums) });
-            drop(work);
-            let sums = accumulators.sums();
+        self.on_slabs(units, |scheduler, slabs| {
+            // SAFETY: `fill_start` has filled the ends of all slabs, and the copies exist; no other work runs.
+            pool.each(slabs, |slab| unsafe { scheduler.interior(input, slab) });
             // SAFETY: the interior of all slabs is done; no other work runs.
-            pool.each(slabs, |slab| unsafe { scheduler.excess_of_first(input, slab, sums) });
+            pool.each(slabs, |slab| unsafe { scheduler.excess_at_ends(input, slab) });
         });
         self.slopes.copy_first_plane(&self.order);
         match self.threads.iter_mut().find_map(|state| state.fault.take()) {
@@ -166,16 +162,16 @@ impl<P: PairPrecision> Workspace<P> {
         }
     }
 
-    /// Lends all arrays to the threads, to each its slab of planes.
+    /// Lends all arrays to the threads, to each its slab of units.
     fn on_slabs(
         &mut self,
-        planes: &[Range<usize>],
-        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut AccumulatorArrays),
+        units: &[Range<usize>],
+        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>]),
     ) {
         let Workspace { fluid, order, particles, excluded, accumulators, slopes, results, threads, .. } =
             self;
         let (particles, excluded) = (&particles.share(), excluded.share());
-        let slopes = slopes.share();
+        let (slopes, sums) = (slopes.share(), accumulators.share());
         let SharedParticles { x, fixed16_scale, fixed16, packed, species, ghosts } = *particles;
         let (geometry, grid, start) = (&order.geometry, &order.grid, &order.start[..]);
         let (terms, thermostat) = (&fluid.terms, self.thermostat);
@@ -195,9 +191,9 @@ impl<P: PairPrecision> Workspace<P> {
             slopes: slopes.slopes,
         };
         let passes = Passes::new(fluid.set, &fluid.terms, self.totals);
-        let mut slabs = results.split(order, planes, fluid.width(), threads);
-        let scheduler = &Scheduler { fluid, passes, order, data, particles, slopes };
-        work(scheduler, &mut slabs, accumulators);
+        let mut slabs = results.split(order, units, fluid.width(), threads);
+        let scheduler = &Scheduler { fluid, passes, order, data, particles, slopes, sums };
+        work(scheduler, &mut slabs);
     }
 
     /// Adds the times of the caller's thread; fails for a force that is not finite, and names the lowest tag.

@@ -47,8 +47,13 @@ fn both(threads: usize) -> [Settings; 2] {
 
 #[test]
 fn a_small_box_has_the_forces_of_the_plain_engine() {
-    for fluid in fluids() {
-        let cloud = cloud(&fluid);
+    // The planes of the second box are two units each.
+    let wide = PeriodicBox::orthogonal([0.0; 3], [2.1, 10.2, 2.3], [true; 3]).unwrap();
+    for (fluid, domain) in fluids().into_iter().flat_map(|f| [(f.clone(), None), (f, Some(&wide))]) {
+        let cloud = match domain {
+            None => cloud(&fluid),
+            Some(wide) => Cloud::new(wide.clone(), 3, fluid.species.len(), 70, 9),
+        };
         let (force, tally) = plain(&fluid, &cloud);
         for settings in [1, 2].into_iter().flat_map(both) {
             let mut sweep = Sweep::new(&fluid, settings).unwrap();

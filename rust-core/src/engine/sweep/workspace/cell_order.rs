@@ -5,6 +5,7 @@ mod extremes;
 mod fractions;
 
 use super::input::{Input, VECTOR_PADDING};
+use super::thread_slab::take;
 use crate::engine::error::EngineError;
 use crate::engine::vectors;
 use count::{Count, CountRange, NO_CELL};
@@ -83,7 +84,7 @@ impl CellOrder {
         self.fixed32.resize(self.all, [0; 3]);
         self.counts.resize(pool.threads() * grid.cell_count(), 0);
         self.count(pool, set, input)?;
-        self.sum_counts();
+        self.sum_counts(pool);
         let crowded = |plane| (self.plane(plane).1 + self.next_plane(plane)) >> J_CODE_BITS > 0;
         if (0..grid.planes).any(crowded) {
             return Err(EngineError::Host("two neighbouring planes of cells contain 2^25 particles or more"));
@@ -119,39 +120,48 @@ impl CellOrder {
         parts.into_iter().try_for_each(|(_, done)| done)
     }
 
-    /// Turns counts into the start of each thread's particles of a cell.
-    fn sum_counts(&mut self) {
-        let cells = self.grid.cell_count();
+    /// Turns counts into the start of each thread's particles of a cell. Each thread does a part of the cells: it
+    /// first counts their particles, and then knows how many there are before its part.
+    fn sum_counts(&mut self, pool: &Pool) {
+        let (cells, threads) = (self.grid.cell_count(), pool.threads());
         let per_plane = self.grid.columns_per_plane * self.grid.cells_per_column;
         self.start.resize(cells + 1 + if self.is_periodic() { per_plane } else { 0 }, 0);
-        let [first, rest @ ..] = &mut self.start[..] else { return };
-        *first = 0;
+        self.start[0] = 0;
+        let (mut rest, counts) = (&mut self.start[1..=cells], SharedSlice::new(&mut self.counts));
+        let of_part = |t: usize| (part(cells, t, threads), take(&mut rest, part(cells, t, threads).len()), 0);
+        let mut parts: Vec<_> = (0..threads).map(of_part).collect();
+        let of_thread = |t: usize, of_part: &Range<usize>| {
+            // SAFETY: each cell is in the part of one thread, and a thread has as many counts as there are cells.
+            unsafe { counts.slice_mut(cells * t + of_part.start..cells * t + of_part.end) }
+        };
+        pool.each(&mut parts, |(range, ends, sum)| {
+            ends.copy_from_slice(of_thread(0, range));
+            for t in 1..threads {
+                let added = ends.iter_mut().zip(of_thread(t, range));
+                added.for_each(|(end, count)| *end += *count);
+            }
+            *sum = ends.iter().sum();
+        });
+        let mut all = 0;
+        for (_, _, sum) in &mut parts {
+            all += std::mem::replace(sum, all);
+        }
         // The array first has the number of particles in each cell, then its start, and last its end,
         // which is the start of the next.
-        let ends = &mut rest[..cells];
-        ends.copy_from_slice(&self.counts[..cells]);
-        for counts in self.counts.chunks_exact(cells).skip(1) {
-            for (end, count) in ends.iter_mut().zip(counts) {
-                *end += count;
+        pool.each(&mut parts, |(range, ends, next)| {
+            for end in ends.iter_mut() {
+                *next += std::mem::replace(end, *next);
             }
-        }
-        let mut sum = 0;
-        for end in &mut *ends {
-            let many = *end;
-            *end = sum;
-            sum += many;
-        }
-        for counts in self.counts.chunks_exact_mut(cells) {
-            for (end, count) in ends.iter_mut().zip(counts) {
-                let many = *count;
-                *count = *end;
-                *end += many;
+            for t in 0..threads {
+                for (end, count) in ends.iter_mut().zip(of_thread(t, range)) {
+                    *end += std::mem::replace(count, *end);
+                }
             }
-        }
-        self.order.resize(sum as usize, 0);
+        });
+        self.order.resize(all as usize, 0);
         // These are the cells of the copy of the first plane.
         for cell in cells + 1..self.start.len() {
-            self.start[cell] = sum + self.start[cell - cells];
+            self.start[cell] = all + self.start[cell - cells];
         }
     }
 

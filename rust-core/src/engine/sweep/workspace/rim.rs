@@ -2,11 +2,10 @@
 
 use super::Workspace;
 use super::forces::ForceSink;
-use super::scheduler::thread_slabs;
 use super::thread_slab::take;
 use crate::engine::error::EngineError;
 use psidpd_passes::compiled::PairPrecision;
-use psidpd_threads::Pool;
+use psidpd_threads::{Pool, part};
 use std::ops::Range;
 
 /// Half of the virial of a pair with a ghost counts here; the rank of the ghost counts the other half.
@@ -20,10 +19,10 @@ impl<P: PairPrecision> Workspace<P> {
     /// Fails for a force that is not finite, and names the lowest tag.
     pub fn add_rim(&mut self, pool: &Pool, slopes: &[f64], out: ForceSink) -> Result<(), EngineError> {
         let (order, width, totals) = (&self.order, self.fluid.width(), self.totals);
-        let planes = thread_slabs(order, pool.threads());
         let (rims, mut tallies) = (&self.results.rims[..], &mut self.results.tallies[..]);
-        let slab = |planes: Range<usize>| (take(&mut tallies, planes.len()), planes, None::<i32>);
-        let mut slabs: Vec<_> = planes.into_iter().map(slab).collect();
+        let (blocks, threads) = (order.units_per_plane(), pool.threads());
+        let slab = |planes: Range<usize>| (take(&mut tallies, blocks * planes.len()), planes, None::<i32>);
+        let mut slabs: Vec<_> = (0..threads).map(|t| part(order.grid.planes, t, threads)).map(slab).collect();
         let host = |k: u32| {
             // Copies follow the last particle.
             let k = k as usize;
@@ -31,9 +30,11 @@ impl<P: PairPrecision> Workspace<P> {
             order.order[copied] as usize
         };
         pool.each(&mut slabs, |(tallies, planes, lost)| {
-            for (plane, tally) in planes.clone().zip(tallies.iter_mut()) {
+            for (plane, tally) in planes.clone().zip(tallies.iter_mut().step_by(blocks)) {
                 let before = if plane > 0 { plane - 1 } else { order.grid.planes - 1 };
-                for (rim, list) in [(&rims[before], 1), (&rims[plane], 0)] {
+                let of_plane =
+                    |plane: usize, list| rims[blocks * plane..][..blocks].iter().map(move |rim| (rim, list));
+                for (rim, list) in of_plane(before, 1).chain(of_plane(plane, 0)) {
                     for (k, pair) in rim.pairs[list].iter().enumerate() {
                         let slope = slopes[width * host(pair.ghost) + pair.slope as usize];
                         // SAFETY: the owned particle is of this plane, which only this thread has.

@@ -1,6 +1,7 @@
 //! The data of a single thread.
 
 use super::cell_order::CellOrder;
+use super::units::Unit;
 use crate::engine::error::EngineError;
 use crate::engine::excess_pass::ExcessPass;
 use crate::engine::sweep::times::Times;
@@ -12,8 +13,9 @@ use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
 use std::ops::Range;
 
-/// Number of planes of a thread slab whose pairs are in memory at once: the first, the last, and two between.
-pub const KEPT_PLANES: usize = 4;
+/// Number of planes of a thread slab whose pairs are in memory at once: the first two and the last two, where a part
+/// of a plane may be of another slab, and two between.
+pub const KEPT_PLANES: usize = 6;
 
 /// The state of a thread that lasts from one evaluation to the next.
 pub struct ThreadState<T> {
@@ -42,12 +44,12 @@ impl<T: Scalar> ThreadState<T> {
     }
 }
 
-/// Results of the passes: for each plane and for each particle.
+/// Results of the passes: for each unit and for each particle.
 #[derive(Default)]
 pub struct PlaneResults<T> {
     /// Pairs for the second pass, of a few planes of each thread slab.
     in_range: Vec<InRangePairs<T>>,
-    /// The rim of each plane, if there are ghosts.
+    /// The rim of each unit, if there are ghosts.
     pub rims: Vec<Rim<T>>,
     pub tallies: Vec<Tally>,
     /// The densities of each particle, and ψ, in the order of cells.
@@ -55,9 +57,9 @@ pub struct PlaneResults<T> {
     pub excess: Vec<f64>,
 }
 
-/// The planes of one thread, and the data that only this thread accesses. Each plane is in exactly one slab.
+/// The units of one thread, and the data that only this thread accesses. Each unit is in exactly one slab.
 pub struct ThreadSlab<'a, T> {
-    pub planes: Range<usize>,
+    pub units: Range<usize>,
     /// First particle of the slab.
     pub first: usize,
     pub state: &'a mut ThreadState<T>,
@@ -72,15 +74,15 @@ pub struct ThreadSlab<'a, T> {
 impl<T: Scalar> PlaneResults<T> {
     /// Makes room for all particles of an order, `width` densities each, and for the pairs of a few planes of each slab.
     pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize) {
-        self.in_range.resize_with(KEPT_PLANES * slabs, InRangePairs::default);
-        self.rims.resize_with(order.grid.planes, Rim::default);
+        self.in_range.resize_with(KEPT_PLANES * order.units_per_plane() * slabs, InRangePairs::default);
+        self.rims.resize_with(order.units(), Rim::default);
         self.tallies.clear();
-        self.tallies.resize(order.grid.planes, Tally::default());
+        self.tallies.resize(order.units(), Tally::default());
         self.excess.resize(order.particles(), 0.0);
         self.densities.resize(width * order.particles(), 0.0);
     }
 
-    /// Splits planes and their results by thread.
+    /// Splits units and their results by thread.
     pub fn split<'a>(
         &'a mut self,
         order: &CellOrder,
@@ -91,15 +93,15 @@ impl<T: Scalar> PlaneResults<T> {
         let (mut in_range, mut tallies) = (&mut self.in_range[..], &mut self.tallies[..]);
         let (mut densities, mut excess) = (&mut self.densities[..], &mut self.excess[..]);
         let mut rims = &mut self.rims[..];
-        let slab = |(planes, state): (&Range<usize>, &'a mut ThreadState<T>)| {
-            let particles = order.particles_of(planes);
+        let slab = |(units, state): (&Range<usize>, &'a mut ThreadState<T>)| {
+            let particles = order.particles_of_units(units);
             ThreadSlab {
-                planes: planes.clone(),
+                units: units.clone(),
                 first: particles.start,
                 state,
-                in_range: take(&mut in_range, KEPT_PLANES),
-                rims: take(&mut rims, planes.len()),
-                tallies: take(&mut tallies, planes.len()),
+                in_range: take(&mut in_range, KEPT_PLANES * order.units_per_plane()),
+                rims: take(&mut rims, units.len()),
+                tallies: take(&mut tallies, units.len()),
                 densities: take(&mut densities, width * particles.len()),
                 excess: take(&mut excess, particles.len()),
             }
@@ -123,17 +125,17 @@ pub fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 impl<T> ThreadSlab<'_, T> {
-    /// The buffers of a pass over a plane of the slab, its pairs for the second pass, its rim, and its energies and virials.
-    pub fn plane(
+    /// The buffers of a pass over a unit of the slab, its pairs for the second pass, at place `kept` of its plane, its
+    /// rim, and its energies and virials.
+    pub fn unit(
         &mut self,
-        plane: usize,
+        kept: usize,
+        order: &CellOrder,
+        unit: &Unit,
     ) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Rim<T>, &mut Tally) {
-        let number = plane - self.planes.start;
-        let kept = match plane {
-            _ if plane == self.planes.start => 0,
-            _ if plane + 1 == self.planes.end => 1,
-            _ => 2 + plane % 2,
-        };
-        (&mut self.state.buffers, &mut self.in_range[kept], &mut self.rims[number], &mut self.tallies[number])
+        let blocks = order.units_per_plane();
+        let number = unit.plane * blocks + unit.block - self.units.start;
+        let in_range = &mut self.in_range[kept * blocks + unit.block];
+        (&mut self.state.buffers, in_range, &mut self.rims[number], &mut self.tallies[number])
     }
 }
