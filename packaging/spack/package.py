@@ -13,7 +13,7 @@ class Psidpd(CargoPackage):
     license("GPL-2.0-or-later")
 
     version("main", branch="main")
-    version("0.1.0", tag="v0.1.0")
+    version("0.2.0", tag="v0.2.0")
 
     variant("eos", default=False, description="Equations of state of real liquids")
 
