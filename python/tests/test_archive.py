@@ -1,12 +1,25 @@
 """The archive of the sources that pip makes, from which the package is built elsewhere."""
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
 from pathlib import Path
 
+import pytest
 from conftest import ROOT
+
+SITE = "https://github.com/psidpd/psidpd"
+
+
+@pytest.mark.parametrize("page", ["python/README.md", "rust-core/README.md"])
+def test_links_of_a_registry_s_page_are_absolute_and_lead_to_files(page):
+    links = re.findall(r"\]\(([^)]*)\)", (ROOT / page).read_text())
+    assert links
+    for link in links:
+        path = re.fullmatch(SITE + "(?:/(?:blob|raw)/main/(.*))?", link)
+        assert path and (ROOT / (path.group(1) or "README.md")).is_file(), link
 
 
 def test_cargo_takes_the_lock_file_of_the_archive(tmp_path):

@@ -8,13 +8,13 @@ import sys
 import pytest
 from conftest import ROOT
 
-PAGES = [page for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))] if "```python" in page.read_text()]
+PAGES = [page for page in [ROOT / "README.md", ROOT / "python" / "README.md", *sorted((ROOT / "docs").glob("*.md"))] if "```python" in page.read_text()]
 
 # The page on output needs files of a run, which tests/tests/read_back.rs reads. Notebooks are run by test_notebooks.py.
 ELSEWHERE = {"output.md", *(page.name for page in (ROOT / "docs").glob("notebook-*.md"))}
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if p.name not in ELSEWHERE], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name not in ELSEWHERE], ids=lambda page: str(page.relative_to(ROOT)))
 def test_the_python_of_a_page_runs(page):
     blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.M | re.S)
     environment = dict(os.environ, MPLBACKEND="agg")
