@@ -103,11 +103,11 @@ fn schema() -> String {
 
 fn reference() -> String {
     let mut text = "# The model file\n\n\
-        What a model file may say, key by key. A model file is TOML; it says what the particles are and how they\n\
-        interact. Unknown keys are errors. Numbers may be written as formulas of the parameters and `kT`\n\
-        everywhere. Editors that know JSON schemas (taplo, Even Better TOML) complete and check model files\n\
-        with `#:schema model.schema.json` in the first line; the schema is `rust-core/schema/model.schema.json`.\n\n\
-        The examples leave out what every model needs: a title, species (one, `A`), and the density `n` where\n\
+        This page lists the keys of the model file. A model file is TOML; it describes the particles and their\n\
+        interactions. Unknown keys are errors. Numbers may be formulas of the parameters and `kT` where the key\n\
+        says so. Editors that know JSON schemas (taplo, Even Better TOML) complete and check model files with\n\
+        `#:schema model.schema.json` in the first line; the schema is `rust-core/schema/model.schema.json`.\n\n\
+        The examples leave out what every model needs: a title, the species (one, `A`), and the density `n` if\n\
         psi uses it.\n\n\
         This page is written from the table of keys in `rust-core/model/src/keys.rs`.\n"
         .to_owned();

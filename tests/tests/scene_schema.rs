@@ -117,11 +117,11 @@ fn schema() -> String {
 
 fn reference() -> String {
     let mut text = "# The scene file\n\n\
-        What a scene file may say, key by key. A scene file is TOML; it says which fluid is run, in which box, from\n\
-        which start, for how many steps. Unknown keys are errors, with line and key. Editors that know JSON schemas\n\
-        (taplo, Even Better TOML) complete and check scene files with `#:schema scene.schema.json` in the first\n\
-        line; the schema is `validation/schema/scene.schema.json`.\n\n\
-        Five lines are a scene:\n\n\
+        This page lists the keys of the scene file. A scene file is TOML; it states the fluid, the box, the initial\n\
+        state and the number of steps. Unknown keys are errors that name line and key. Editors that know JSON\n\
+        schemas (taplo, Even Better TOML) complete and check scene files with `#:schema scene.schema.json` in the\n\
+        first line; the schema is `validation/schema/scene.schema.json`.\n\n\
+        A scene needs five keys:\n\n\
         ```toml\n\
         model   = \"fluid.toml\"\n\
         kT      = 1.0\n\
@@ -129,12 +129,12 @@ fn reference() -> String {
         density = 3.0\n\
         steps   = 1000\n\
         ```\n\n\
-        `psidpd new NAME --template …` writes one to begin with, `psidpd check SCENE` says what it will do, and\n\
-        `validation/scenes/` has one for every system of the papers, small ones that take seconds and, in `full/`,\n\
-        those of the papers' own size.\n\n\
+        `psidpd new NAME --template …` writes a scene as a starting point, `psidpd check SCENE` says what a scene\n\
+        will do, and `validation/scenes/` has a scene for every system of the papers: small ones that take seconds\n\
+        and, in `full/`, those of the papers' own size.\n\n\
         The examples below leave out what every scene needs. Their model has two species, `A` and `B`, in three\n\
-        dimensions. In two dimensions everything that has a number for each direction has two, and there are no\n\
-        cylinders. What is measured is in `[observe]`, which has [a page of its own](observables.md).\n\n\
+        dimensions. In two dimensions every array with a number for each direction has two numbers, and cylinders\n\
+        do not exist. The keys of `[observe]`, which set what is measured, have [their own page](observables.md).\n\n\
         This page is written from the tables of keys in `validation/dynamics/src/scene/keys/`.\n"
         .to_owned();
     // Writing to a String cannot fail.

@@ -28,13 +28,13 @@ pub const TOP: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "What the model is called and which particles it has.",
+    about: "The name of the model and its particles.",
     keys: keys! {
         "title": ValueKind::Text, REQUIRED,
-            "What the model is called."
+            "The name of the model."
             => "title = \"Warren 2003, set 6\"";
         "reference": ValueKind::Text, OPTIONAL,
-            "Where it comes from."
+            "The source of the model."
             => "reference = \"Phys. Rev. E 68, 066702 (2003), Table 2\"";
         "dimensions": ValueKind::Dimensions, OPTIONAL,
             "The space the particles live in; 3 if left out."
@@ -51,8 +51,8 @@ pub const UNITS: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "What the numbers of the model stand for, in SI. LAMMPS's `dpd/psi` needs it in other units than `lj`; \
-            nothing else looks at it. The unit of time is `length sqrt(mass/energy)`.",
+    about: "What the numbers of the model stand for, in SI. LAMMPS's `dpd/psi` needs this table in units other \
+            than `lj`; nothing else uses it. The unit of time is `length sqrt(mass/energy)`.",
     keys: keys! {
         "length": ValueKind::Positive, REQUIRED,
             "The unit of length in metres."
@@ -72,9 +72,9 @@ pub const PARAMETERS: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "Constants, for every formula and every number of the file. They may refer to each other in \
-            any order. `kT` is not among them, nor in their formulas: the host gives the temperature, and all other \
-            formulas see it as `kT`.",
+    about: "Constants, for every formula and every number of the file. They may refer to each other in any \
+            order. `kT` is not a parameter and cannot appear in formulas of parameters: the host gives the \
+            temperature, and all other formulas know it as `kT`.",
     keys: keys! {
         "NAME": ValueKind::Parameter, OPTIONAL,
             "A constant."
@@ -89,41 +89,41 @@ pub const DENSITY: Table = Table {
     array: false,
     forms: ("", &[]),
     about: "A weighted local density `n_B(i) = sum over j of species B of w(r_ij)`, with `[w] = 1`. A density \
-            `n` of species A, B gives formulas the variables `n_A`, `n_B` and `n = n_A + n_B`. \
-            Any number of densities.",
+            `n` of species A, B gives formulas the variables `n_A`, `n_B` and `n = n_A + n_B`. A model may have \
+            any number of densities.",
     keys: keys! {
         "kernel": ValueKind::Choice(kernels), REQUIRED,
             "The weight function `w`."
             => "[density.n]\nkernel = \"wendland-c2\"\nrange = 1.0";
         "force_kernel": ValueKind::Choice(kernels), OPTIONAL,
-            "The kernel whose slope is the force; `kernel` if left out. Another one gives a force without \
-             potential, which heats: LAMMPS's `mdpd` is `lucy` with `quadratic`."
+            "The kernel whose slope gives the force; `kernel` if left out. A kernel that differs from `kernel` \
+             gives a force without potential, which heats: LAMMPS's `mdpd` is `lucy` with `quadratic`."
             => "[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange = 0.75";
         "range": ValueKind::NumberOrFormula, REQUIRED,
             "The distance at which `w` vanishes."
             => "[density.n]\nkernel = \"quadratic\"\nrange = \"3*rc/4\"\n[parameters]\nrc = 1.0";
         "self": ValueKind::Flag, OPTIONAL,
-            "Whether `w(0)` counts in a particle's own density; false if left out. With it the mean of `n` is \
-             the density plus `w(0)` (Trofimov)."
+            "Whether `w(0)` counts in a particle's own density; false if left out. With `self = true` the mean \
+             of `n` is the density plus `w(0)` (Trofimov)."
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nself = true";
         "correction": ValueKind::Correction, OPTIONAL,
-            "Trofimov's corrected density, a polynomial of the weighted one in ascending powers. For mixtures \
-             by `\"A|B\"`, the density of A felt by B; pairs left out are not corrected. Formulas get the \
-             corrected densities."
+            "Trofimov's corrected density, a polynomial of the weighted density in ascending powers. For \
+             mixtures a table by `\"A|B\"`, the density of A felt by B; pairs left out are not corrected. \
+             Formulas use the corrected densities."
             => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\ncorrection = { \
              \"A|A\" = [1.57, 1.0], \"A|B\" = [0.13, 1.0], \"B|A\" = [0.13, 1.0], \"B|B\" = [1.57, 1.0] }";
         "bounds": ValueKind::Bounds, OPTIONAL,
-            "Where psi is used as written. For a (corrected) density `x` outside, with `x_c` the nearer bound \
-             and `d = x - x_c`, it is `psi + d psi' + d^2 psi''/2` at `x_c`: psi' goes on linearly. The rule \
-             applies to each partial density of a formula, one after the other, and to the total of a table or \
-             pressure. How often it was used is counted."
+            "The range of densities in which psi is used as written. For a (corrected) density `x` outside it, \
+             with `x_c` the nearer bound and `d = x - x_c`, psi is `psi + d psi' + d^2 psi''/2` at `x_c`: psi' \
+             continues linearly. The rule applies to each partial density of a formula, one after the other, \
+             and to the total of a table or pressure. The number of evaluations outside the bounds is counted."
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.05, \
              20.0]\n[excess_free_energy]\nA = \"kT*ln(n)\"";
         "below": ValueKind::Choice(continuations), OPTIONAL,
-            "How psi' goes on below the lower bound: `linear`, as above, if left out; `constant`, without the \
-             last term, which makes the force there a pair force as in plain DPD, the way out that Trofimov \
-             suggests where psi is singular in thin regions. It keeps the force conservative, but the fluid \
-             does not follow its equation of state there."
+            "How psi' continues below the lower bound: `linear`, as above, if left out; `constant`, without the \
+             last term, which makes the force there a pair force as in standard DPD. Trofimov suggests it where \
+             psi is singular in thin regions. The force stays conservative, but the fluid does not follow its \
+             equation of state there."
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.5, 20.0]\nbelow = \
              \"constant\"\n[excess_free_energy]\nA = \"kT*ln(n)\"";
     },
@@ -135,10 +135,11 @@ pub const EXCESS: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "`psi`, the excess free energy per particle, of every species: energy units, and forces are \
-            `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, `pi`, \
-            `+ - * / ^` (or `**`), `ln` (or `log`: the natural logarithm), `log10`, `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min`, `max`. Left out \
-            altogether, there is none; a species that has none beside others gets `\"0\"`.",
+    about: "`psi`, the excess free energy per particle, of every species, in units of energy; forces are \
+            `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, \
+            `pi`, `+ - * / ^` (or `**`), `ln` (or `log`: the natural logarithm), `log10`, `exp`, `sqrt`, `sin`, \
+            `cos`, `tanh`, `abs`, `min`, `max`. Without this table no species has a psi; if only some species \
+            have one, write `\"0\"` for the others.",
     keys: keys! {
         "SPECIES": ValueKind::Excess, OPTIONAL,
             "psi of one species."
@@ -157,32 +158,31 @@ pub const CURVES: Table = Table {
             equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
     keys: keys! {
         "table": ValueKind::TableFile, OPTIONAL,
-            "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; a first row that is not numeric names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
-             its exact slope; beyond the ends psi' goes on linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the \
-             environment the file may be anywhere."
+            "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; a first row that is \
+             not numeric is a header. psi is the cubic spline through the rows (not a knot), and psi' its exact \
+             slope; beyond the ends psi' continues linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the environment \
+             the file may be anywhere."
             => "[excess_free_energy]\nA = { table = \"psi.csv\" }";
         "pressure": ValueKind::Words("string with a formula, or `{ table = \"FILE\" }`"), OPTIONAL,
-            "The required equation of state, for one species: a formula of `rho` and `kT`, or a table with rows of `rho` and \
-             `p`, measured at the kT of the run. `psi' = (p - rho kT)/rho^2`; psi is its integral, from a density where \
-             it is finite. Beyond the ends of a table psi' goes on linearly."
+            "The target equation of state, for one species: a formula of `rho` and `kT`, or a table with rows \
+             of `rho` and `p`, measured at the kT of the run. `psi' = (p - rho kT)/rho^2`; psi is the integral \
+             of psi', from a density where it is finite. Beyond the ends of a table psi' continues linearly."
             => "[excess_free_energy]\nA = { pressure = \"rho*kT/(1 - 0.016*rho) - 0.03*rho^2\" }";
         "density": ValueKind::Text, OPTIONAL,
-            "The density it depends on, needed where there are several."
+            "The density that psi depends on, required if the model has several."
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[density.m]\nkernel = \"quadratic\"\nrange = \
              0.75\n[excess_free_energy]\nA = { table = \"psi.csv\", density = \"m\" }";
         "slopes": ValueKind::Slopes, OPTIONAL,
             "A many-body force that is stated and not derived: formulas of the densities, by their variables, \
-             that stand where `dpsi/dn` would; those left out are 0. Unless they are the slopes of one psi, \
-             the force has no potential, does work around closed loops and heats. It exists to reproduce such \
-             laws: that of LAMMPS's `mdpd` with coefficients by pair of types has none (Warren's no-go \
-             theorem, Phys. Rev. E 87, 045303). Densities with `bounds` are refused; theory and `export eam` \
-             do not apply."
+             that replace `dpsi/dn`; slopes left out are 0. Unless they are the slopes of one psi, the force \
+             has no potential, does work around closed loops and heats. This key exists to reproduce such laws: \
+             LAMMPS's `mdpd` with coefficients by pair of types has no potential (Warren's no-go theorem, Phys. \
+             Rev. E 87, 045303). Densities with `bounds` are refused; theory and `export eam` do not apply."
             => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange \
              = 0.75\n[excess_free_energy]\nA = { slopes = { n_A = \"1.6*n\", n_B = \"1.2*n\" }, energy = \
              \"0.8*n_A*n + 0.6*n_B*n\" }\nB = { slopes = { n_A = \"1.2*n\", n_B = \"1.6*n\" } }";
         "energy": ValueKind::Formula, OPTIONAL,
-            "With `slopes`: what is reported as energy of a particle, 0 if left out. The force is not its \
-             gradient."
+            "With `slopes`: the reported energy of a particle, 0 if left out. The force is not its gradient."
             => "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }";
     },
 };
@@ -193,8 +193,9 @@ pub const PAIR: Table = Table {
     title: "",
     array: true,
     forms: ("form", FORMS),
-    about: "A pair potential `phi(r)`, added to the many-body terms; any number of them. In a model with \
-            interactions every two species must have one, of strength 0 if they do not interact.",
+    about: "A pair potential `phi(r)`, added to the many-body terms; a model may have any number of them. In a \
+            model with interactions every two species need an interaction, through psi or a pair potential; \
+            write strength 0 if they do not interact.",
     keys: &joined::<{ PAIR_KEYS.len() + count(FORM_KEYS) }>(PAIR_KEYS, FORM_KEYS),
 };
 
@@ -203,7 +204,7 @@ const PAIR_KEYS: &[Key] = keys! {
         "The two species."
         => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1.0";
     "form": ValueKind::Choice(forms), REQUIRED,
-        "Which potential; the keys of each form say more."
+        "The form of the potential; the keys of each form describe it."
         => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
          0.8\nrange_B = 1.0";
 };
@@ -219,7 +220,7 @@ pub const THERMOSTAT: Table = Table {
             all must.",
     keys: keys! {
         "between": ValueKind::Between, OPTIONAL,
-            "The two species; every pair without a thermostat of its own if left out."
+            "The two species. If left out, the thermostat acts on every pair without a thermostat of its own."
             => "species = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n[[thermostat]]\nbetween = \
              [\"A\", \"B\"]\ngamma = 9.0\nrange = 1.0";
         "gamma": ValueKind::NumberOrFormula, REQUIRED,
@@ -240,8 +241,8 @@ pub const LITERATURE: Table = Table {
     title: "",
     array: true,
     forms: ("", &[]),
-    about: "Measured values that were published for the fluid, by temperature: each a value and its error. Nothing is \
-            computed from them; `theory`, `run` and reports show them next to theory and measurements.",
+    about: "Published values of the fluid, by temperature, each with its error. They do not affect a run; \
+            `theory`, `run` and reports show them next to theory and measurements.",
     keys: keys! {
         "kT": ValueKind::Positive, REQUIRED,
             "The temperature."

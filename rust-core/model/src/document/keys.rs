@@ -150,8 +150,8 @@ impl ValueKind {
         };
         let words = match self {
             ValueKind::Text => "string",
-            ValueKind::File => "name of a file, from the folder of this one on",
-            ValueKind::TableFile => "name of a file in the folder of this one or below",
+            ValueKind::File => "path of a file, relative to the folder of this one",
+            ValueKind::TableFile => "path of a file in the folder of this one or below",
             ValueKind::Number => "number",
             ValueKind::NumberOrFormula => "number, or string with a formula of the parameters and `kT`",
             ValueKind::Parameter => "number, or string with a formula of other parameters",

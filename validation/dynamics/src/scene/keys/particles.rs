@@ -22,14 +22,14 @@ pub const INITIAL: Table = Table {
     title: "",
     array: false,
     forms: ("kind", KINDS),
-    about: "One thing to start from: the whole box, a slab, a ball or a cylinder of fluid, or a state that another \
-            run has left.",
+    about: "One initial region or state: the whole box, a slab, a sphere or a cylinder of fluid, or the state \
+            of another run.",
     keys: &[
         key("kind", Choice(|| KINDS.to_vec()), REQUIRED,
-            "`random`: the whole box, at random. `lattice`: the whole box, on a lattice, for fluids that must not \
-             start with particles on top of each other. `slab`, `sphere`, `cylinder`: that region. `data`: a \
-             LAMMPS data file with its box; types are species. `checkpoint`: a checkpoint, or the folder of a run, \
-             with its box; the clock starts again at 0.",
+            "`random`: the whole box, at random positions. `lattice`: the whole box, on a lattice, for fluids \
+             whose particles must not overlap at the start. `slab`, `sphere`, `cylinder`: a region of that \
+             shape. `data`: a LAMMPS data file with its box; types are species. `checkpoint`: a checkpoint, or \
+             the folder of a run, with its box; time starts again at 0.",
             "[initial]\nkind = \"lattice\"\ndensity = 3.0"),
         density(FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0"),
         count(FILLED, "[initial]\nkind = \"random\"\ncount = 500"),
@@ -52,12 +52,13 @@ pub const INITIAL: Table = Table {
         form_key(SAVED, "file", File, REQUIRED,
             "The file.", "[initial]\nkind = \"data\"\nfile = \"start.data\""),
         form_key(SAVED, "frozen_ids", Ids, OPTIONAL,
-            "The particles that never move, by the ids of the file. Parts of a scene are numbered one after the \
-             other, from 1.",
+            "The particles that never move, by the ids of the file. Ids of a scene with parts count from 1, \
+             part by part.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nfrozen_ids = [1, 2]"),
         key("velocities", Choice(|| vec!["thermal", "zero", "keep"]), OPTIONAL,
-            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: none. `keep`, for a file \
-             only: those of the file. If left out, a checkpoint keeps its own velocities, and everything else is thermal.",
+            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: particles at rest. \
+             `keep`, for a file only: the velocities of the file. If left out, a checkpoint keeps its own \
+             velocities, and everything else is thermal.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"keep\""),
         velocity(
             FILLED,
@@ -71,22 +72,23 @@ pub const PART: Table = Table {
     title: "",
     array: true,
     forms: ("shape", SHAPES),
-    about: "Several things to start from, instead of `[initial]`: regions that do not overlap, each filled with \
-            particles. Two drops that meet are two spheres with velocities, and the impact parameter is the \
-            distance of their centres across these; a pendant drop is a cylinder under a frozen one; a wall is a \
-            frozen layer; phases that have separated are parts of one species each. Particles are numbered part \
-            by part.",
+    about: "Several initial regions, instead of `[initial]`: they do not overlap, and each is filled with \
+            particles. Two colliding drops are two spheres with velocities, and the impact parameter is the \
+            distance of their centres normal to the velocities; a pendant drop is a cylinder under a frozen \
+            cylinder; a wall is a frozen layer; separated phases are parts of one species each. Particles are \
+            numbered part by part.",
     keys: &[
         key("shape", Choice(|| SHAPES.to_vec()), REQUIRED,
-            "`box`: between two corners. `slab`: across the box. `layer`: a slab at a face. `sphere`: a disc in two \
-             dimensions. `cylinder`. `rest`: what the other parts leave of the box.",
+            "`box`: a block between two corners. `slab`: a slab across the box. `layer`: a slab at a face. \
+             `sphere`: a sphere, in two dimensions a disc. `cylinder`: a cylinder. `rest`: the box without the \
+             other parts.",
             "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n[[part]]\nshape = \"rest\"\ndensity = 0.1"),
         key("name", Text, OPTIONAL,
-            "What the part is called, for body forces; `part 1`, `part 2` … if left out.",
+            "The name of the part, for body forces; `part 1`, `part 2` … if left out.",
             "[[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0"),
         key("frozen", Flag, OPTIONAL,
-            "Whether its particles never move. They act on the others through every force, drag and noise included; \
-             temperature and momentum are those of the others. False if left out.",
+            "Whether its particles never move. They act on the moving particles through every force, drag and \
+             noise included; temperature and momentum count only the moving particles. False if left out.",
             "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0\nfrozen = true\n\
              [[part]]\nshape = \"rest\"\ndensity = 3.0"),
         density(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0"),
@@ -114,7 +116,7 @@ pub const PART: Table = Table {
             "[[part]]\nshape = \"layer\"\nface = \"xhi\"\nthickness = 2.0\ndensity = 3.0",
         ),
         form_key(&["layer"], "face", Choice(|| names(&FACES)), REQUIRED,
-            "The face it lies at.",
+            "The face of the box at which the layer lies.",
             "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0"),
         at("[[part]]\nshape = \"slab\"\nthickness = 3.0\nat = 2.0\ndensity = 3.0"),
         radius("[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0"),
@@ -123,7 +125,8 @@ pub const PART: Table = Table {
         ),
         length("[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
         form_key(&[], "velocities", Choice(|| vec!["thermal", "zero"]), OPTIONAL,
-            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: none. Thermal if left out.",
+            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: particles at rest. \
+             Thermal if left out.",
             "[[part]]\nshape = \"box\"\ndensity = 3.0\nvelocities = \"zero\""),
         velocity(
             &[],
@@ -137,11 +140,11 @@ type Forms = &'static [&'static str];
 
 const fn density(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "density", Positive, OPTIONAL,
-        "Number density where it is filled; that of the scene if left out.", example)
+        "Number density of the region; that of the scene if left out.", example)
 }
 
 const fn count(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "count", Count, OPTIONAL, "Number of particles, instead of a density.", example)
+    form_key(forms, "count", Count, OPTIONAL, "Number of particles, instead of `density`.", example)
 }
 
 const fn composition(forms: Forms, example: &'static str) -> Key {
@@ -151,28 +154,28 @@ const fn composition(forms: Forms, example: &'static str) -> Key {
 }
 
 const fn species(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "species", Text, OPTIONAL, "The one species there, instead of a composition.", example)
+    form_key(forms, "species", Text, OPTIONAL, "The only species of the region, instead of a composition.", example)
 }
 
 const fn lattice(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "lattice", Choice(lattices), OPTIONAL,
-        "The lattice that particles are put on: `sc`, `bcc`, `fcc`, or in two dimensions `square`, `hexagonal`. In a \
-         block it is stretched to fit with whole cells. Sites left over are vacancies, spread evenly. At random \
-         if left out; `sc` or `square` for `kind = \"lattice\"`.",
+        "The lattice of the initial positions: `sc`, `bcc`, `fcc`, or in two dimensions `square`, `hexagonal`. \
+         In a block the lattice is stretched to fit with whole cells. Surplus sites are vacancies, spread \
+         evenly. Positions are random if left out; `sc` or `square` for `kind = \"lattice\"`.",
         example)
 }
 
 const fn min_distance(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "min_distance", Positive, OPTIONAL,
-        "The least distance of random particles from each other and from parts before: closer positions are \
-         redrawn. A scene without room for its particles is refused; there is room up to about 0.75 density^(-1/3), \
-         in two dimensions 0.7 density^(-1/2).",
+        "The minimum distance of random particles from each other and from earlier parts: closer positions are \
+         redrawn. A scene without room for its particles is refused; distances up to about 0.75 density^(-1/3) \
+         are possible, in two dimensions 0.7 density^(-1/2).",
         example)
 }
 
 const fn axis(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "axis", Choice(|| names(&AXES)), OPTIONAL,
-        "Direction of the normal of a slab, of the axis of a cylinder; the last if left out.", example)
+        "Direction of the normal of a slab or of the axis of a cylinder; the last direction if left out.", example)
 }
 
 const fn thickness(forms: Forms, example: &'static str) -> Key {
@@ -181,7 +184,7 @@ const fn thickness(forms: Forms, example: &'static str) -> Key {
 
 const fn at(example: &'static str) -> Key {
     form_key(&["slab"], "at", Number, OPTIONAL,
-        "Where its middle is, along its normal; in the middle of the box if left out.", example)
+        "Position of the middle of the slab along its normal; the middle of the box if left out.", example)
 }
 
 const fn radius(example: &'static str) -> Key {
@@ -189,7 +192,7 @@ const fn radius(example: &'static str) -> Key {
 }
 
 const fn center(example: &'static str) -> Key {
-    form_key(ROUND, "center", Point, OPTIONAL, "The middle; that of the box if left out.", example)
+    form_key(ROUND, "center", Point, OPTIONAL, "The centre; that of the box if left out.", example)
 }
 
 const fn length(example: &'static str) -> Key {
@@ -198,5 +201,5 @@ const fn length(example: &'static str) -> Key {
 
 const fn velocity(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "velocity", Point, OPTIONAL,
-        "A velocity that is added to those of all its particles.", example)
+        "A velocity that is added to the velocities of all particles of the region.", example)
 }

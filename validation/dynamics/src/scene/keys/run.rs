@@ -12,11 +12,11 @@ pub const BODY_FORCE: Table = Table {
     title: "",
     array: true,
     forms: ("", &[]),
-    about: "An acceleration from outside; any number of them, which add up. Potential energies and virials do not \
-            count it.",
+    about: "An external acceleration. A scene may have several, which add up. Potential energies and virials do \
+            not include it.",
     keys: &[
         key("acceleration", Point, REQUIRED,
-            "The acceleration; the force is the mass times this. Gravity, for example.",
+            "The acceleration, for example gravity; the force is the mass times the acceleration.",
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]"),
         key("reversed_along", Choice(|| names(&AXES)), OPTIONAL,
             "A direction along which the second half of the box has the opposite acceleration: two Poiseuille \
@@ -34,7 +34,7 @@ pub const BODY_FORCE: Table = Table {
 };
 
 const STAGE_INTEGRATOR: Key = Key {
-    about: "How a step is made; as the top level says if left out.",
+    about: "The integrator; that of the top level if left out.",
     example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"",
     ..INTEGRATOR
 };
@@ -58,25 +58,25 @@ const STAGE_THERMOSTAT_STEP: Key = Key {
 };
 
 const STAGE_THERMOSTAT_EVERY: Key = Key {
-    about: "Steps from one thermostat to the next; as at the top level.",
+    about: "Number of steps between applications of the thermostat; as at the top level.",
     example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_every = 4",
     ..THERMOSTAT_EVERY
 };
 
 const STAGE_NOISE: Key = Key {
-    about: "The law of the noise of the integrator; as at the top level.",
+    about: "The distribution of the noise of the integrator; as at the top level.",
     example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nnoise = \"uniform\"",
     ..NOISE
 };
 
 const STAGE_SWEEPS: Key = Key {
-    about: "Sweeps in a step of `monte-carlo`; as at the top level.",
+    about: "Number of sweeps in a step of `monte-carlo`; as at the top level.",
     example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nsweeps = 10",
     ..SWEEPS
 };
 
 const STAGE_MAX_MOVE: Key = Key {
-    about: "The furthest trial move of `monte-carlo`; as at the top level.",
+    about: "The largest trial move of `monte-carlo`; as at the top level.",
     example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nmax_move = 0.1",
     ..MAX_MOVE
 };
@@ -86,12 +86,12 @@ pub const STAGE: Table = Table {
     title: "",
     array: true,
     forms: ("", &[]),
-    about: "Parts of a run under conditions of their own, one after the other: instead of `steps`.",
+    about: "The stages of a run, one after the other, each with its own conditions; they replace `steps`.",
     keys: &[
         key("name", Text, REQUIRED,
-            "What the stage is called.", "[[stage]]\nname = \"equilibrate\"\nsteps = 500"),
+            "The name of the stage.", "[[stage]]\nname = \"equilibrate\"\nsteps = 500"),
         key("steps", Count, REQUIRED,
-            "How many steps, 1 at least.",
+            "Number of steps, at least 1.",
             "[[stage]]\nname = \"equilibrate\"\nsteps = 500\n[[stage]]\nname = \"produce\"\nsteps = 2000"),
         key("dt", Positive, OPTIONAL,
             "The time step; that of the top level if left out.",
@@ -105,11 +105,11 @@ pub const STAGE: Table = Table {
         STAGE_SWEEPS,
         STAGE_MAX_MOVE,
         key("kT", Temperature, OPTIONAL,
-            "The temperature; that of the top level if left out. Two make a ramp, `[from, to]`, in levels of equal \
-             steps; the last level is at `to`.",
+            "The temperature; that of the top level if left out. Two temperatures, `[from, to]`, make a ramp in \
+             levels of equal steps; the last level is at `to`.",
             "[[stage]]\nname = \"quench\"\nsteps = 1000\nkT = [2.0, 1.0]"),
         key("levels", Count, OPTIONAL,
-            "How many levels a ramp has; 20 if left out.",
+            "Number of levels of a ramp; 20 if left out.",
             "[[stage]]\nname = \"quench\"\nsteps = 1000\nkT = [2.0, 1.0]\nlevels = 50"),
         key("thermostat", Flag, OPTIONAL,
             "Whether dissipative and random forces act; true if left out.",
@@ -128,17 +128,17 @@ pub const OUTPUT: Table = Table {
     about: "What a run writes in addition to its final state.",
     keys: &[
         key("thermo", Count, OPTIONAL,
-            "Steps between rows of totals; 100 if left out, 0 for none.", "[output]\nthermo = 50"),
+            "Number of steps between rows of totals; 100 if left out, 0 for no rows.", "[output]\nthermo = 50"),
         key("dump", Count, OPTIONAL,
-            "Steps between frames with every particle; 0, for none, if left out.", "[output]\ndump = 500"),
+            "Number of steps between frames with every particle; 0, no frames, if left out.", "[output]\ndump = 500"),
         key("xyz", Count, OPTIONAL,
-            "Steps between frames with every particle as extended XYZ; 0, for none, if left out.",
+            "Number of steps between frames with every particle as extended XYZ; 0, no frames, if left out.",
             "[output]\nxyz = 500"),
         key("snapshot", Count, OPTIONAL,
-            "Steps between pictures of the particles; 0, for none, if left out.", "[output]\nsnapshot = 1000"),
+            "Number of steps between pictures of the particles; 0, no pictures, if left out.", "[output]\nsnapshot = 1000"),
         key("checkpoint", Count, OPTIONAL,
-            "Steps between checkpoints, from which an interrupted run goes on; every ten minutes if left out, 0 for \
-             none but at the end.",
+            "Number of steps between checkpoints, from which an interrupted run continues; every ten minutes if \
+             left out, 0 for a checkpoint only at the end.",
             "[output]\ncheckpoint = 10000"),
     ],
 };

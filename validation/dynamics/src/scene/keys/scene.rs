@@ -8,19 +8,19 @@ use psidpd_core::engine::Precision;
 use psidpd_core::engine::noise::Law;
 
 pub(super) const INTEGRATOR: Key = key("integrator", Choice(|| names(&Integrator::NAMED)), OPTIONAL,
-    "How a step is made; `velocity-verlet` if left out, in which the dissipative force sees the half-step \
-     velocity, as in LAMMPS. `monte-carlo` makes trial moves without time. `docs/integrators.md` states each, says what is exact in \
-     it and which step it allows.",
+    "The integrator; `velocity-verlet` if left out, in which the dissipative force uses the half-step velocity, \
+     as in LAMMPS. `monte-carlo` makes trial moves without time. `docs/integrators.md` states each integrator, \
+     what is exact in it and which step it allows.",
     "integrator = \"groot-warren\"");
 
 pub(super) const LAMBDA: Key = key("lambda", Number, OPTIONAL,
-    "The parameter of `groot-warren`, from 0 to 1, 0.65 if left out, which is velocity Verlet with 0.5; and that of \
-     `two-stage`, from 0 to 0.5, 0.21 if left out, and of `force-gradient`, 1/6 if left out.",
+    "The parameter of `groot-warren`, from 0 to 1, 0.65 if left out (0.5 is velocity Verlet); of `two-stage`, \
+     from 0 to 0.5, 0.21 if left out; and of `force-gradient`, 1/6 if left out.",
     "integrator = \"groot-warren\"\nlambda = 0.5");
 
 pub(super) const GRADIENT: Key = key("gradient", Number, OPTIONAL,
-    "The parameter ξ of `force-gradient`, from 0 to 1; 1/24 if left out, with which the step is of fourth order without \
-     thermostat.",
+    "The parameter ξ of `force-gradient`, from 0 to 1; 1/24 if left out, which makes the step fourth-order \
+     without a thermostat.",
     "integrator = \"force-gradient\"\ngradient = 0.045");
 
 pub(super) const THERMOSTAT_STEP: Key = key("thermostat_step", Choice(|| names(&THERMOSTAT_STEPS)), OPTIONAL,
@@ -29,23 +29,25 @@ pub(super) const THERMOSTAT_STEP: Key = key("thermostat_step", Choice(|| names(&
     "integrator = \"aboba\"\nthermostat_step = \"pairwise\"");
 
 pub(super) const THERMOSTAT_EVERY: Key = key("thermostat_every", Count, OPTIONAL,
-    "Steps from one thermostat to the next in `aboba`, `baoab`, `two-stage` and `force-gradient`, each for as many time steps; 1 if left \
-     out.",
+    "Number of steps between applications of the thermostat in `aboba`, `baoab`, `two-stage` and \
+     `force-gradient`; each application covers as many time steps; 1 if left out.",
     "integrator = \"two-stage\"\nthermostat_every = 2");
 
 pub(super) const NOISE: Key = key("noise", Choice(|| names(&Law::ALL)), OPTIONAL,
-    "The law of the noise where it acts apart from the forces; `gaussian` if left out. With `uniform` the distribution of \
-     velocities is not quite that of Maxwell at large time steps. The noise of `velocity-verlet` and \
-     `groot-warren` is uniform, that of `lowe-andersen` Gaussian.",
+    "The distribution of the noise in integrators that apply it apart from the forces; `gaussian` if left out. \
+     With `uniform` the distribution of velocities differs slightly from Maxwell's at large time steps. The \
+     noise of `velocity-verlet` and `groot-warren` is uniform, that of `lowe-andersen` Gaussian.",
     "integrator = \"aboba\"\nnoise = \"uniform\"");
 
 pub(super) const SWEEPS: Key = key("sweeps", Count, OPTIONAL,
-    "Sweeps in a step of `monte-carlo`, each with one trial move for every particle that moves; 1 if left out.",
+    "Number of sweeps in a step of `monte-carlo`, each with one trial move for every particle that moves; 1 if \
+     left out.",
     "integrator = \"monte-carlo\"\nsweeps = 10");
 
 pub(super) const MAX_MOVE: Key = key("max_move", Positive, OPTIONAL,
-    "The furthest that a trial move of `monte-carlo` goes along each direction. If left out it is found, for 40 % of accepted \
-     moves, in the first stage of Monte Carlo, or in the first quarter of the only one.",
+    "The largest trial move of `monte-carlo` along each direction. If left out, it is adjusted so that 40 % of \
+     the moves are accepted, in the first stage of Monte Carlo, or in the first quarter of the stage if there \
+     is only one.",
     "integrator = \"monte-carlo\"\nmax_move = 0.1");
 
 pub const TOP: Table = Table {
@@ -53,36 +55,37 @@ pub const TOP: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "Which fluid, how warm, in which box, for how long. A scene needs a model, kT, a box, something in it \
-            (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
+    about: "The fluid, its temperature, the box and the length of the run. A scene needs a model, kT, a box, \
+            particles (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
     keys: &[
         key("title", Text, OPTIONAL,
-            "What the scene is called; the title of the model if left out.",
+            "The name of the scene; the title of the model if left out.",
             "title = \"A drop of Warren's liquid\""),
-        key("model", File, REQUIRED, "The model file: the fluid.", "model = \"fluid.toml\""),
+        key("model", File, REQUIRED, "The model file, which describes the fluid.", "model = \"fluid.toml\""),
         key("kT", Positive, REQUIRED,
-            "The temperature: of the initial velocities, of the thermostat, and in the formulas of the model.",
+            "The temperature of the initial velocities, of the thermostat, and in the formulas of the model.",
             "kT = 1.0"),
         key("seed", Count, OPTIONAL,
             "Seed of the initial state and of the noise; 1 if left out. The same file gives the same run.",
             "seed = 4711"),
         key("box", Box, OPTIONAL,
-            "The box, from the origin along the axes: one length for all edges, one for each, or a table. A start \
-             from a file takes its box from there.",
+            "The box, from the origin along the axes: one length for all edges, one for each, or a table. A \
+             scene that starts from a file takes the box from the file.",
             "box = [8.0, 8.0, 16.0]"),
         key("density", Positive, OPTIONAL,
-            "Number density of everything that is filled and has no density or count of its own. Without \
-             `[initial]` and `[[part]]` the whole box is filled, at random and with equal shares of the species.",
+            "Number density of every region that has no density or count of its own. Without `[initial]` and \
+             `[[part]]` particles fill the whole box, at random positions and with equal shares of the species.",
             "density = 3.0"),
-        key("steps", Count, OPTIONAL, "Steps of a run of one stage, named `produce`.", "steps = 2000"),
+        key("steps", Count, OPTIONAL, "Number of steps of a run with one stage, named `produce`.", "steps = 2000"),
         key("equilibrate", Count, OPTIONAL,
-            "Steps of a stage `equilibrate` before it.", "equilibrate = 500\nsteps = 2000"),
+            "Number of steps of a stage `equilibrate` before `produce`.", "equilibrate = 500\nsteps = 2000"),
         key("dt", Positive, OPTIONAL, "The time step; 0.01 if left out.", "dt = 0.02"),
         INTEGRATOR,
         key("precision", Choice(|| names(&Precision::ALL)), OPTIONAL,
-            "Precision in which `psidpd run` computes pair forces; `mixed` if left out: single precision, with positions \
-             exact to 2⁻³² of the box and sums in double precision. The option `--precision` overrides it. A deck \
-             for LAMMPS takes it over if it is given; pair styles are in double precision otherwise.",
+            "Precision in which `psidpd run` computes pair forces; `mixed` if left out: single precision, with \
+             positions exact to 2⁻³² of the box and sums in double precision. The option `--precision` \
+             overrides it. A deck for LAMMPS uses this key if it is given; otherwise its pair styles compute in \
+             double precision.",
             "precision = \"double\""),
         LAMBDA,
         GRADIENT,
@@ -99,15 +102,17 @@ pub const BOX: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "The box, where it needs more than lengths.",
+    about: "The box, if it needs more than lengths.",
     keys: &[
         key("lengths", Lengths, OPTIONAL,
-            "Lengths of its edges; left out in a start from a file, needed otherwise.",
+            "Lengths of its edges; required, except in a scene that starts from a file, where they are left \
+             out.",
             "[box]\nlengths = [8.0, 8.0, 16.0]"),
         key("boundary", EachOf(|| names(&BOUNDARIES)), OPTIONAL,
-            "What happens at its faces; `periodic` if left out, or as it was in a checkpoint, or a `final.data`, that is started from. A \
-             face that reflects puts a particle as far inside as it was outside and reverses its velocity across the \
-             face; nothing acts through it. For a wall of particles freeze a `layer` in front of it.",
+            "The boundary at its faces; if left out, `periodic`, or the boundary of the checkpoint or \
+             `final.data` that the scene starts from. A reflecting face puts a particle as far inside as it was \
+             outside and reverses its velocity across the face; no force acts through it. For a wall of \
+             particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
     ],
 };
@@ -117,6 +122,6 @@ pub const MASSES: Table = Table {
     title: "",
     array: false,
     forms: ("", &[]),
-    about: "Masses of the species; 1, or what a data file says, for those left out.",
+    about: "Masses of the species; 1, or the mass in the data file, for species left out.",
     keys: &[key("SPECIES", Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
 };
