@@ -20,6 +20,7 @@
 extern crate self as psidpd_core;
 
 pub mod engine;
+mod free_energy;
 pub mod maximum;
 pub mod memory;
 pub mod theory;

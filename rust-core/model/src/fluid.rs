@@ -1,3 +1,4 @@
+use super::continuation::Bounds;
 use super::curve::Curve;
 use super::expression::Formula;
 use super::kernel::Kernel;
@@ -87,62 +88,6 @@ pub struct WeightedDensity {
     pub correction: Vec<Polynomial>,
     /// Bounds of the corrected density; ψ is continued outside.
     pub bounds: Option<Bounds>,
-}
-
-/// The interval where ψ is used as written, and its continuation outside.
-///
-/// For a variable `x` out of `[low, high]`, with `x_c` the nearer bound and `δ = x − x_c`,
-///
-/// ```text
-/// ψ(x) = ψ(x_c) + δ ∂ψ/∂x(x_c) + ½ δ² ∂²ψ/∂x²(x_c)
-/// ```
-///
-/// so that ψ′ continues linearly; below `low` the last term is left out if ψ′ is to stay constant. With
-/// several variables out of bounds the rule applies to each in turn, in any order. A table or an
-/// equation of state is bounded in the total density it depends on, a formula in each partial density.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
-    /// The lowest value at which ψ is used as written.
-    pub low: f64,
-    /// The highest value at which ψ is used as written.
-    pub high: f64,
-    /// The continuation of ψ′ below `low`.
-    pub below: Continuation,
-}
-
-/// The continuation of ψ′ below the lower bound of a density.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Continuation {
-    /// ψ′ keeps its slope at the bound.
-    #[default]
-    Linear,
-    /// ψ′ keeps its value at the bound: particles in thin regions repel each other as in standard DPD, by a
-    /// pair force `−(ψ_i′ + ψ_j′) w′` that no longer depends on the density. Trofimov, Nies and Michels, J.
-    /// Chem. Phys. 117, 9383 (2002), sections IV A and V, suggest this where ψ is singular at low density.
-    Constant,
-}
-
-impl Bounds {
-    /// The highest power of δ in the continuation: 2 where ψ′ is linear, 1 where it is constant.
-    pub fn order(&self, beyond: f64) -> usize {
-        if beyond < 0.0 && self.below == Continuation::Constant { 1 } else { 2 }
-    }
-
-    /// The nearest value within the bounds.
-    pub fn clamp(&self, x: f64) -> f64 {
-        x.clamp(self.low, self.high)
-    }
-
-    /// The excess `δ = x − x_c`: negative below the bounds, positive above, 0 within.
-    pub fn beyond(&self, x: f64) -> f64 {
-        if x < self.low {
-            x - self.low
-        } else if x > self.high {
-            x - self.high
-        } else {
-            0.0
-        }
-    }
 }
 
 /// A polynomial by its coefficients in ascending powers.

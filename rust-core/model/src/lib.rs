@@ -18,16 +18,15 @@ pub mod kernel;
 pub mod keys;
 pub mod pair;
 
+mod continuation;
 mod file;
 mod fluid;
 mod number;
 mod presets;
 
+pub use continuation::{Bounds, Continuation, Stray, continuation};
 pub use file::{KNOWN_FUNCTIONS, Model, Published, Units};
-pub use fluid::{
-    Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat,
-    WeightedDensity,
-};
+pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity};
 pub use presets::{
     ForceLaw, PresetError, SplinePair, WarrenPair, lucy_mdpd, lucy_mdpd_text, spline_dpd, spline_dpd_text,
     warren_ab, warren_ab_text,

@@ -3,7 +3,7 @@
 use super::vectors::{self, Loop};
 use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
-use crate::model::{Bounds, Fluid, StatedSlopes};
+use crate::model::{Bounds, Fluid, StatedSlopes, Stray, continuation};
 use psidpd_passes::instruction_set::InstructionSet;
 
 /// `ψ_α` as a function of the densities with a pass.
@@ -42,11 +42,9 @@ pub struct FormulaPlan {
 }
 
 /// A variable with bounds, beyond which ψ continues linearly or quadratically.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 struct BoundedVariable {
     variable: usize,
-    /// Index of its slope.
-    slope: usize,
     bounds: Bounds,
 }
 
@@ -57,9 +55,9 @@ pub struct ExcessWork {
     registers: Vec<f64>,
     point: Vec<f64>,
     expansion: Expansion,
-    outside: Vec<Outside>,
+    outside: Vec<Stray>,
     /// Pairs of a lane and a variable out of bounds, lane by lane.
-    strays: Vec<Stray>,
+    strays: Vec<LaneStray>,
     /// The variables, moved to their bounds if out of them; used only if there are strays.
     moved: Vec<f64>,
     totals: Vec<f64>,
@@ -69,18 +67,10 @@ pub struct ExcessWork {
 
 /// One bounded variable of one lane, out of its bounds by `beyond`.
 #[derive(Debug, Clone, Copy)]
-struct Stray {
+struct LaneStray {
     lane: usize,
     bounded: usize,
     beyond: f64,
-}
-
-/// A stray within a lane: `ε = beyond`, up to the power `order`.
-#[derive(Debug, Clone, Copy)]
-struct Outside {
-    slope: usize,
-    beyond: f64,
-    order: usize,
 }
 
 impl ExcessPlan {
@@ -103,11 +93,7 @@ impl ExcessPlan {
             .filter_map(|(slope, &variable)| {
                 let bounds = fluid.densities[variable / count].bounds?;
                 // A linear ψ needs no continuation.
-                outputs[1 + slope].is_constant().is_none().then_some(BoundedVariable {
-                    variable,
-                    slope,
-                    bounds,
-                })
+                outputs[1 + slope].is_constant().is_none().then_some(BoundedVariable { variable, bounds })
             })
             .collect();
         Ok(ExcessPlan::Formula(FormulaPlan {
@@ -232,9 +218,8 @@ impl CurvePlan {
         self.curve.block(totals, curve);
         if let Some(bounds) = self.bounds.filter(|_| count != [0; 2]) {
             for (lane, delta) in beyond.iter().enumerate().filter(|(_, delta)| **delta != 0.0) {
-                let curvature = if bounds.order(*delta) == 2 { curve.curvature[lane] } else { 0.0 };
-                curve.psi[lane] += delta * (curve.slope[lane] + 0.5 * delta * curvature);
-                curve.slope[lane] += delta * curvature;
+                let at_bound = [curve.psi[lane], curve.slope[lane], curve.curvature[lane]];
+                [curve.psi[lane], curve.slope[lane], _] = bounds.continued(at_bound, *delta);
             }
         }
         psi.copy_from_slice(&curve.psi);
@@ -288,14 +273,14 @@ impl FormulaPlan {
     }
 
     /// Moves variables to their bounds and lists them, lane by lane.
-    fn clamp(&self, lanes: usize, at: &mut [f64], strays: &mut Vec<Stray>) -> [u64; 2] {
+    fn clamp(&self, lanes: usize, at: &mut [f64], strays: &mut Vec<LaneStray>) -> [u64; 2] {
         for (bounded, variable) in self.bounded.iter().enumerate() {
             let values = &mut at[variable.variable * lanes..][..lanes];
             for (lane, value) in values.iter_mut().enumerate() {
                 let beyond = variable.bounds.beyond(*value);
                 if beyond != 0.0 {
                     *value = variable.bounds.clamp(*value);
-                    strays.push(Stray { lane, bounded, beyond });
+                    strays.push(LaneStray { lane, bounded, beyond });
                 }
             }
         }
@@ -321,27 +306,23 @@ impl FormulaPlan {
             point.extend(moved.chunks_exact(lanes).map(|values| values[lane]));
             outside.clear();
             outside.extend(stray.iter().map(|s| {
-                let BoundedVariable { slope, bounds, .. } = &self.bounded[s.bounded];
-                Outside { slope: *slope, beyond: s.beyond, order: bounds.order(s.beyond) }
+                let BoundedVariable { variable, bounds } = self.bounded[s.bounded];
+                Stray { variable, beyond: s.beyond, order: bounds.order(s.beyond) }
             }));
             let mut along = [0; Expansion::MOST];
-            for (along, o) in along.iter_mut().zip(outside.iter()) {
-                *along = self.variables[o.slope];
-            }
+            along.iter_mut().zip(outside.iter()).for_each(|(along, o)| *along = o.variable);
             let along = &along[..outside.len()];
             let coefficients = expansion.coefficients(&self.outputs[0], point, along);
-            psi[lane] = continued(coefficients, outside, None);
+            psi[lane] = continuation(coefficients, outside, &[]);
             if slopes.is_empty() {
                 continue;
             }
-            for (k, o) in outside.iter().enumerate() {
-                slopes[o.slope * lanes + lane] = continued(coefficients, outside, Some(k));
+            for (slope, v) in self.variables.iter().enumerate().filter(|(_, v)| along.contains(v)) {
+                slopes[slope * lanes + lane] = continuation(coefficients, outside, &[*v]);
             }
-            for (slope, output) in self.outputs[1..].iter().enumerate() {
-                if outside.iter().all(|o| o.slope != slope) {
-                    let coefficients = expansion.coefficients(output, point, along);
-                    slopes[slope * lanes + lane] = continued(coefficients, outside, None);
-                }
+            for (slope, v) in self.variables.iter().enumerate().filter(|(_, v)| !along.contains(v)) {
+                let coefficients = expansion.coefficients(&self.outputs[1 + slope], point, along);
+                slopes[slope * lanes + lane] = continuation(coefficients, outside, &[*v]);
             }
         }
     }
@@ -363,27 +344,4 @@ impl<'o, O: Iterator<Item = &'o mut [f64]>> Loop for EvaluateBlock<'_, O> {
     fn run(self) {
         self.program.eval_block_into(self.lanes, self.at, self.outputs, self.registers);
     }
-}
-
-/// The sum `Σ c_m Π δ_k^{m_k}`, or its derivative with respect to one variable's `δ`.
-fn continued(coefficients: &[f64], outside: &[Outside], derivative: Option<usize>) -> f64 {
-    let mut sum = 0.0;
-    for (index, coefficient) in coefficients.iter().enumerate() {
-        let mut rest = index;
-        let mut term = *coefficient;
-        for (k, o) in outside.iter().enumerate() {
-            let power = rest % 3;
-            rest /= 3;
-            term *= match (derivative == Some(k), power) {
-                (_, power) if power > o.order => 0.0,
-                (false, 0) | (true, 1) => 1.0,
-                (false, 1) => o.beyond,
-                (false, _) => o.beyond * o.beyond,
-                (true, 0) => 0.0,
-                (true, _) => 2.0 * o.beyond,
-            };
-        }
-        sum += term;
-    }
-    sum
 }

@@ -1,8 +1,8 @@
 use super::TheoryError;
-use super::free_energy::{FreeEnergy, Psi};
 use super::radial::Radial;
-use crate::model::Fluid;
+use crate::free_energy::{FreeEnergy, Psi};
 use crate::model::pair::PairForm;
+use crate::model::{ExcessFreeEnergy, Fluid};
 
 /// The mean-field theory of a fluid at one temperature.
 ///
@@ -103,7 +103,7 @@ impl MeanField {
             dimensions: d,
             kt: fluid.kt,
             species: fluid.species.clone(),
-            free_energy: FreeEnergy::new(fluid)?,
+            free_energy: free_energy_of(fluid)?,
             shift,
             isolated,
             kernels,
@@ -271,4 +271,16 @@ impl MeanField {
         let found = self.species.len();
         if found == expected { Ok(()) } else { Err(TheoryError::Species { expected, found }) }
     }
+}
+
+/// Most operations of all second derivatives of one ψ: more take seconds for each state.
+const MOST_OPERATIONS: usize = 20_000;
+
+fn free_energy_of(fluid: &Fluid) -> Result<FreeEnergy, TheoryError> {
+    let name = |alpha: usize| fluid.species[alpha].clone();
+    let is_stated = |e: &ExcessFreeEnergy| matches!(e, ExcessFreeEnergy::Slopes(_));
+    if let Some(alpha) = fluid.excess.iter().position(is_stated) {
+        return Err(TheoryError::NoFreeEnergy(name(alpha)));
+    }
+    FreeEnergy::new(fluid, MOST_OPERATIONS).map_err(|alpha| TheoryError::TooLarge(name(alpha)))
 }

@@ -24,7 +24,6 @@ mod binary;
 mod coexistence;
 mod correlations;
 mod critical;
-mod free_energy;
 mod interface;
 mod limit;
 mod line;

@@ -1,6 +1,6 @@
-use super::free_energy::Psi;
 use super::search::{minimum, spaced, turning_point};
 use super::{MeanField, TheoryError};
+use crate::free_energy::Psi;
 use crate::model::Fluid;
 
 /// A density at which ψ or its derivative is not a finite number.

@@ -4,12 +4,13 @@ use super::Model;
 use super::density::DensityEntry;
 use super::excess::ExcessEntry;
 use super::interaction::{PairTable, ThermostatEntry};
+use crate::continuation::Bounds;
 use crate::curve::pressure_table;
 use crate::curve::{Curve, CurveForm, Pressure};
 use crate::document::{FileError, FileErrorKind, Located, Source};
 use crate::expression::{Ast, ErrorKind, Expansion, ExpressionError, Formula, Variables};
 use crate::fluid::{
-    Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
+    ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
 };
 use crate::kernel::Kernel;
 use crate::number::formula_error;

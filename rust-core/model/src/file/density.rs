@@ -1,7 +1,7 @@
 use super::names::check_identifier;
 use super::species_index;
+use crate::continuation::Continuation;
 use crate::document::{FileError, FileErrorKind, Located, Section, Value};
-use crate::fluid::Continuation;
 use crate::kernel::KernelKind;
 use crate::number::Number;
 use std::collections::BTreeMap;

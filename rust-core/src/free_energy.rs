@@ -1,10 +1,9 @@
-//! ψ and its derivatives for the theory. Only this module of the theory knows how a fluid stores its
-//! excess free energies, and how they continue beyond the bounds of a density.
+//! ψ of one particle and its derivatives, for the theory and for measurements. The engine evaluates blocks of particles
+//! instead; both continue ψ beyond the bounds of a density by [`crate::model::continuation`].
 
-use super::TheoryError;
 use crate::model::curve::Curve;
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
-use crate::model::{Bounds, ExcessFreeEnergy, Fluid};
+use crate::model::{Bounds, ExcessFreeEnergy, Fluid, StatedSlopes, Stray, continuation};
 
 /// The `ψ_α` of a fluid with exact first and second derivatives.
 #[derive(Debug, Clone)]
@@ -23,10 +22,12 @@ enum Excess {
     Formula { program: Program, outputs: Vec<Formula> },
     /// A function of the total of one density.
     Curve(Curve),
+    /// There is no ψ: the energy and the slopes are stated.
+    Stated(StatedSlopes),
 }
 
 /// Value and derivatives of `ψ_α` at one point.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Psi {
     /// Value `ψ_α`.
     pub value: f64,
@@ -37,22 +38,23 @@ pub struct Psi {
 }
 
 impl FreeEnergy {
-    /// The free energies of `fluid`.
-    pub fn new(fluid: &Fluid) -> Result<FreeEnergy, TheoryError> {
+    /// The free energies of `fluid`; fails with the index of a species whose second derivatives have more than `most`
+    /// operations, or grow beyond the limits of formulas.
+    pub fn new(fluid: &Fluid, most: usize) -> Result<FreeEnergy, usize> {
         let variables = fluid.variables();
         let excess = fluid
             .excess
             .iter()
-            .zip(&fluid.species)
-            .map(|(excess, name)| match excess {
-                ExcessFreeEnergy::Formula(psi) => differentiated(psi, variables)
+            .enumerate()
+            .map(|(alpha, excess)| match excess {
+                ExcessFreeEnergy::Formula(psi) => differentiated(psi, variables, most)
                     .map(|outputs| Excess::Formula {
                         program: Program::new(&outputs.iter().collect::<Vec<_>>()),
                         outputs,
                     })
-                    .map_err(|_| TheoryError::TooLarge(name.clone())),
+                    .map_err(|_| alpha),
                 ExcessFreeEnergy::Curve(curve) => Ok(Excess::Curve(curve.clone())),
-                ExcessFreeEnergy::Slopes(_) => Err(TheoryError::NoFreeEnergy(name.clone())),
+                ExcessFreeEnergy::Slopes(law) => Ok(Excess::Stated(law.clone())),
             })
             .collect::<Result<Vec<_>, _>>()?;
         let bounds = fluid.densities.iter().map(|d| d.bounds).collect();
@@ -61,62 +63,67 @@ impl FreeEnergy {
 
     /// `ψ_α` of species `alpha` at the corrected densities `x`, density-major, continued where these are out of bounds.
     pub fn at(&self, alpha: usize, x: &[f64]) -> Psi {
-        match &self.excess[alpha] {
-            Excess::Formula { program, outputs } => {
-                let strays = self.strays(outputs, x);
-                if strays.is_empty() {
-                    self.of_formula(program, x)
-                } else {
-                    self.continued(outputs, &strays, x)
-                }
-            }
-            Excess::Curve(curve) => self.of_curve(curve, x),
-        }
+        let mut psi = Psi::default();
+        self.evaluate(alpha, x, &mut psi, &mut Work::default());
+        psi
     }
 
     /// The value of `ψ_α` only.
     pub fn value(&self, alpha: usize, x: &[f64]) -> f64 {
         match &self.excess[alpha] {
-            Excess::Formula { outputs, .. } => {
-                let strays = self.strays(outputs, x);
-                if strays.is_empty() {
-                    outputs[0].value(x)
-                } else {
-                    self.continued(outputs, &strays, x).value
-                }
-            }
-            Excess::Curve(curve) => self.of_curve(curve, x).value,
+            Excess::Formula { outputs, .. } if self.strays(outputs, x).is_empty() => outputs[0].value(x),
+            _ => self.at(alpha, x).value,
         }
     }
 
-    fn of_curve(&self, curve: &Curve, x: &[f64]) -> Psi {
+    /// Computes [`FreeEnergy::at`] in the arrays of `psi`. Stated slopes have second derivatives of zero.
+    pub fn evaluate(&self, alpha: usize, x: &[f64], psi: &mut Psi, work: &mut Work) {
+        let n = self.variables;
+        psi.gradient.clear();
+        psi.gradient.resize(n, 0.0);
+        psi.hessian.clear();
+        psi.hessian.resize(n * n, 0.0);
+        match &self.excess[alpha] {
+            Excess::Formula { program, outputs } => {
+                let strays = self.strays(outputs, x);
+                let Work { values, registers } = work;
+                values.resize(outputs.len(), 0.0);
+                if strays.is_empty() {
+                    program.eval(x, values, registers);
+                } else {
+                    self.continued(outputs, &strays, x, values);
+                }
+                psi.value = values[0];
+                psi.gradient.copy_from_slice(&values[1..=n]);
+                let places = (0..n).flat_map(|u| (u..n).map(move |v| [u, v]));
+                for ([u, v], entry) in places.zip(&values[1 + n..]) {
+                    psi.hessian[u * n + v] = *entry;
+                    psi.hessian[v * n + u] = *entry;
+                }
+            }
+            Excess::Curve(curve) => self.of_curve(curve, x, psi),
+            Excess::Stated(law) => {
+                psi.value = law.energy.value(x);
+                psi.gradient.iter_mut().zip(&law.slopes).for_each(|(to, slope)| *to = slope.value(x));
+            }
+        }
+    }
+
+    fn of_curve(&self, curve: &Curve, x: &[f64], psi: &mut Psi) {
         let n = self.variables;
         let own = curve.density * self.species..(curve.density + 1) * self.species;
         let total = x[own.clone()].iter().sum();
         let [value, slope, curvature] = match self.bounds[curve.density] {
             Some(bounds) if bounds.beyond(total) != 0.0 => {
-                let [psi, slope, curvature] = curve.at(bounds.clamp(total));
-                let delta = bounds.beyond(total);
-                let curvature = if bounds.order(delta) == 2 { curvature } else { 0.0 };
-                [psi + delta * (slope + 0.5 * delta * curvature), slope + delta * curvature, curvature]
+                bounds.continued(curve.at(bounds.clamp(total)), bounds.beyond(total))
             }
             _ => curve.at(total),
         };
-        let mut psi = Psi { value, gradient: vec![0.0; n], hessian: vec![0.0; n * n] };
+        psi.value = value;
         for u in own.clone() {
             psi.gradient[u] = slope;
-            for v in own.clone() {
-                psi.hessian[u * n + v] = curvature;
-            }
+            psi.hessian[u * n..][own.clone()].fill(curvature);
         }
-        psi
-    }
-
-    fn of_formula(&self, program: &Program, x: &[f64]) -> Psi {
-        let n = self.variables;
-        let mut out = vec![0.0; 1 + n + n * (n + 1) / 2];
-        program.eval(x, &mut out, &mut Vec::new());
-        Psi { value: out[0], gradient: out[1..=n].to_vec(), hessian: symmetric(n, &out[1 + n..]) }
     }
 
     /// The variables out of bounds in which ψ is not linear.
@@ -133,7 +140,7 @@ impl FreeEnergy {
 
     /// The continuation of [`Bounds`]: a polynomial of second order in each variable that is out of
     /// bounds, whose coefficients are ψ and its derivatives at the bounds.
-    fn continued(&self, outputs: &[Formula], strays: &[Stray], x: &[f64]) -> Psi {
+    fn continued(&self, outputs: &[Formula], strays: &[Stray], x: &[f64], values: &mut [f64]) {
         let n = self.variables;
         let mut edge = x.to_vec();
         strays.iter().for_each(|s| edge[s.variable] -= s.beyond);
@@ -147,63 +154,24 @@ impl FreeEnergy {
                 [u] => 1 + u,
                 [u, v, ..] => 1 + n + u * n - u * (u + 1) / 2 + v,
             };
-            let powers: Vec<usize> = along.iter().map(|v| by.iter().filter(|u| *u == v).count()).collect();
-            polynomial(expansion.coefficients(&outputs[output], &edge, &along), strays, &powers)
+            continuation(expansion.coefficients(&outputs[output], &edge, &along), strays, by)
         };
-        let value = derivative(&[]);
-        let gradient = (0..n).map(|u| derivative(&[u])).collect();
+        values[0] = derivative(&[]);
+        (0..n).for_each(|u| values[1 + u] = derivative(&[u]));
         let pairs = (0..n).flat_map(|u| (u..n).map(move |v| [u, v]));
-        let hessian: Vec<f64> = pairs.map(|pair| derivative(&pair)).collect();
-        Psi { value, gradient, hessian: symmetric(n, &hessian) }
+        values[1 + n..].iter_mut().zip(pairs).for_each(|(to, pair)| *to = derivative(&pair));
     }
 }
 
-/// A variable that is out of bounds.
-struct Stray {
-    variable: usize,
-    beyond: f64,
-    /// The highest power of `beyond` in the continuation.
-    order: usize,
+/// Scratch arrays of [`FreeEnergy::evaluate`].
+#[derive(Debug, Default)]
+pub struct Work {
+    values: Vec<f64>,
+    registers: Vec<f64>,
 }
-
-/// The derivative of `Σ c_m Π δ_k^{m_k}`, of order `derivative[k]` with respect to each `δ_k`.
-fn polynomial(coefficients: &[f64], strays: &[Stray], derivative: &[usize]) -> f64 {
-    let mut sum = 0.0;
-    for (index, coefficient) in coefficients.iter().enumerate() {
-        let mut rest = index;
-        let mut term = *coefficient;
-        for (stray, times) in strays.iter().zip(derivative) {
-            let power = rest % 3;
-            rest /= 3;
-            if power > stray.order || power < *times {
-                // The term is set to zero, as 0 times an infinite coefficient would be NaN.
-                term = 0.0;
-                continue;
-            }
-            let factor: usize = (power - times + 1..=power).product();
-            term *= factor as f64 * stray.beyond.powi((power - times) as i32);
-        }
-        sum += term;
-    }
-    sum
-}
-
-/// A symmetric matrix from its upper triangle, row by row.
-fn symmetric(n: usize, triangle: &[f64]) -> Vec<f64> {
-    let mut matrix = vec![0.0; n * n];
-    let pairs = (0..n).flat_map(|u| (u..n).map(move |v| [u, v]));
-    for ([u, v], entry) in pairs.zip(triangle) {
-        matrix[u * n + v] = *entry;
-        matrix[v * n + u] = *entry;
-    }
-    matrix
-}
-
-/// Most operations of all second derivatives of one ψ: more take seconds for each state.
-const MOST_OPERATIONS: usize = 20_000;
 
 /// ψ, its gradient, and the upper triangle of its Hessian.
-fn differentiated(psi: &Formula, variables: usize) -> Result<Vec<Formula>, TooLarge> {
+fn differentiated(psi: &Formula, variables: usize, most: usize) -> Result<Vec<Formula>, TooLarge> {
     let mut formulas = vec![psi.clone()];
     for v in 0..variables {
         formulas.push(psi.derivative(v)?);
@@ -213,7 +181,7 @@ fn differentiated(psi: &Formula, variables: usize) -> Result<Vec<Formula>, TooLa
         for v in u..variables {
             let second = formulas[1 + u].derivative(v)?;
             operations += second.operations();
-            if operations > MOST_OPERATIONS {
+            if operations > most {
                 return Err(TooLarge);
             }
             formulas.push(second);
