@@ -404,7 +404,7 @@ fn style_evaluate(
 }
 
 fn totals(style: &Style, tally: &Tally) -> ffi::Totals {
-    let [below, above] = style.engine().out_of_bounds().map(|n| n as f64);
+    let [below, above] = style.engine().statistics().out_of_bounds.map(|n| n as f64);
     ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above }
 }
 
@@ -556,10 +556,10 @@ impl Style {
     }
 
     fn particle_energy(&self) -> &[f64] {
-        self.engine().particle_energy()
+        self.engine().results().particle_energy
     }
 
     fn particle_virial(&self) -> &[f64] {
-        self.engine().particle_virial().as_flattened()
+        self.engine().results().particle_virial.as_flattened()
     }
 }

@@ -7,8 +7,8 @@ use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::{Effort, PairThermostat};
 use psidpd_core::engine::{
-    Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool, Precision, Reason,
-    Request, Settings, Step, Surroundings, Tally, Want, at_once,
+    Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, Pending, PeriodicBox, Pool,
+    Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want, at_once,
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
@@ -20,6 +20,8 @@ use std::sync::Arc;
 pub struct Style {
     model: Model,
     engine: Engine,
+    /// The first half of an evaluation, until its second half.
+    pending: Option<Pending>,
     /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
     thermostat: Option<PairThermostat>,
     /// Iterations of the thermostat at earlier temperatures and settings.
@@ -84,6 +86,7 @@ impl Style {
         Ok(Style {
             model,
             engine,
+            pending: None,
             thermostat,
             effort_before: Effort::default(),
             settings,
@@ -266,12 +269,14 @@ impl Style {
     ) -> Result<(), StyleError> {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
-            let Style { engine, scale, converted, .. } = self;
+            let Style { engine, pending, scale, converted, .. } = self;
+            *pending = None;
             let taken = converted.take(scale, x, v, step);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
             let request = Request { particles, v: triples(taken.v), step: taken.step, want };
             let surroundings = Surroundings::Ghosts(around, newton);
-            taken.add_forces(scale, f, |f| engine.first(surroundings, &request, f))
+            *pending = Some(taken.add_forces(scale, f, |f| engine.first(surroundings, &request, f))?);
+            Ok(())
         })
     }
 
@@ -290,18 +295,23 @@ impl Style {
     ) -> Result<(), StyleError> {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
-            let Style { engine, scale, converted, .. } = self;
+            let Style { engine, pending, scale, converted, .. } = self;
+            *pending = None;
             let taken = converted.take(scale, x, &[], None);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
             // For listed pairs the request for energies and virials comes with the second half.
             let request = Request { particles, v: &[], step: None, want: Want::FORCES };
-            Ok(engine.first(Surroundings::Listed(*listed, newton), &request, &mut [])?)
+            *pending = Some(engine.first(Surroundings::Listed(*listed, newton), &request, &mut [])?);
+            Ok(())
         })
     }
 
     /// `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
-        self.engine.slopes_mut()
+        match &mut self.pending {
+            Some(pending) => pending.slopes_mut(),
+            None => self.engine.slopes_mut(),
+        }
     }
 
     /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
@@ -328,10 +338,10 @@ impl Style {
     /// Local densities of owned particles, per unit volume of LAMMPS.
     pub fn local_densities(&mut self) -> &[f64] {
         if self.scale.is_one() {
-            return self.engine.local_densities();
+            return self.engine.results().densities;
         }
         let volume = self.scale.length.powi(self.model.dimensions() as i32);
-        times(self.engine.local_densities(), 1.0 / volume, &mut self.converted.densities)
+        times(self.engine.results().densities, 1.0 / volume, &mut self.converted.densities)
     }
 
     /// ψ of owned particles, in LAMMPS's units of energy.
@@ -372,7 +382,7 @@ impl Style {
     /// Second half of an evaluation: adds the rest of the forces to `f`.
     ///
     /// # Errors
-    /// Fails as [`Engine::second`].
+    /// Fails without a first half, and as [`Pending::finish`].
     #[allow(clippy::too_many_arguments)]
     pub fn forces(
         &mut self,
@@ -386,11 +396,14 @@ impl Style {
         f: &mut [f64],
     ) -> Result<Tally, StyleError> {
         guard(|| {
-            let Style { engine, scale, converted, .. } = self;
+            let Style { engine, pending, scale, converted, .. } = self;
+            let pending = pending.take().ok_or_else(|| {
+                StyleError("the second half of an evaluation needs the first half before it".to_owned())
+            })?;
             let taken = converted.take(scale, x, v, step);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
             let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            Ok(scale.tally(taken.add_forces(scale, f, |f| engine.second(&request, f))?))
+            Ok(scale.tally(taken.add_forces(scale, f, |f| pending.finish(engine, &request, f))?))
         })
     }
 }

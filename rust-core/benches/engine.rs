@@ -9,8 +9,7 @@ mod setup;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use psidpd_core::engine::noise::PairNoise;
-use psidpd_core::engine::pair_sums::PairSums;
-use psidpd_core::engine::{Instructions, Particles, Precision, Step, Surroundings, Want};
+use psidpd_core::engine::{Engine, Instructions, Particles, Precision, Request, Settings, Step, Want};
 use psidpd_core::model::ExcessFreeEnergy;
 use psidpd_core::model::expression::{Formula, Program};
 use setup::{Cloud, SUBJECTS, sweep, uniform};
@@ -45,7 +44,8 @@ fn reference(c: &mut Criterion) {
     group.throughput(Throughput::Elements(COUNT as u64));
     for subject in &SUBJECTS {
         let fluid = subject.fluid();
-        let mut reference = PairSums::new(&fluid).expect("a plan");
+        let mut reference = Engine::new(&fluid, Settings::default()).expect("a plan");
+        reference.use_pair_sums_only(true);
         let mut cloud = Cloud::new(subject, &fluid, COUNT);
         let mut number = 0;
         group.bench_function(subject.name, |b| {
@@ -53,10 +53,9 @@ fn reference(c: &mut Criterion) {
                 number += 1;
                 let Cloud { domain, x, v, tag, kind, force, .. } = &mut cloud;
                 let particles = Particles { owned: COUNT, x, tag, kind };
-                reference.first(Surroundings::Box(domain), &particles, false).expect("densities");
-                let step = Step { seed: 1, number, dt: subject.dt };
-                force.fill([0.0; 3]);
-                reference.second(&particles, v, Some(step), Want::FORCES, force).expect("forces");
+                let step = Some(Step { seed: 1, number, dt: subject.dt });
+                let request = Request { particles, v, step, want: Want::FORCES };
+                reference.forces(domain, &request, force, false).expect("forces");
             });
         });
     }

@@ -10,7 +10,7 @@ use walls_imports::Crate;
 
 /// Rooms of psidpd-core. A file belongs to the room with the longest name that its module path begins with.
 const CORE: &[&[&str]] = &[
-    &["memory"],
+    &["free_energy", "memory"],
     &["theory"],
     // The foundations of the engine.
     &[
@@ -22,10 +22,11 @@ const CORE: &[&[&str]] = &[
         "engine::particles",
         "engine::path",
         "engine::reach",
+        "engine::request",
         "engine::surroundings",
         "engine::vectors",
     ],
-    &["engine::excess", "engine::plan"],
+    &["engine::evaluate", "engine::excess", "engine::plan"],
     &["engine::excess_pass"],
     // The fast engine: one traversal of all cells, without a neighbour list.
     &["engine::sweep::terms", "engine::sweep::times"],
@@ -35,6 +36,8 @@ const CORE: &[&[&str]] = &[
     &["engine::local_energy"],
     // Sums over a list of pairs.
     &["engine::pair_sums"],
+    // The sweep with special pairs, whose forces are sums over a list.
+    &["engine::sweep_path"],
     // The engine as hosts use it.
     &["engine::facade"],
     &["engine"],

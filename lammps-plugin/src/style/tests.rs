@@ -37,12 +37,12 @@ fn densities_of_one_step_leave_later_steps_to_the_sweep() {
     let (x, tag, kind) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [1, 2], [1, 1]);
     let w = 3.0 / std::f64::consts::PI * 0.5;
     s.sum_densities(2, &x, &tag, &kind).unwrap();
-    assert_eq!(s.engine().local_densities(), [0.0; 4]);
+    assert_eq!(s.engine().results().densities, [0.0; 4]);
     for _ in 0..2 {
         s.evaluate(&PeriodicBox::OPEN, &x, &[], &tag, &kind, None, Want::FORCES, &mut [0.0; 6]).unwrap();
         assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
         s.sum_densities(2, &x, &tag, &kind).unwrap();
-        let densities = s.engine().local_densities();
+        let densities = s.engine().results().densities;
         assert_eq!(densities.len(), 4);
         assert!((densities[1] - w).abs() < 1e-14 && densities[0] > 0.0, "{densities:?}");
         assert_eq!(s.engine().path(), Some(EnginePath::Sweep));

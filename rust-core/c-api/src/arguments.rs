@@ -102,10 +102,10 @@ pub(super) unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// Fails if the `length` vectors at `a` overlap those at `b`.
+/// Fails if the `length` vectors at `a`, which may be null, overlap those at `b`.
 pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &str) -> Result<(), Failure> {
     let bytes = length.saturating_mul(size_of::<[f64; 3]>());
-    if bytes > 0 && a.addr().abs_diff(b.addr()) < bytes {
+    if !a.is_null() && a.addr().abs_diff(b.addr()) < bytes {
         return Err(Failure::new(Status::InvalidArgument, format!("{what} overlap")));
     }
     Ok(())

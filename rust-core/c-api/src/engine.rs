@@ -1,6 +1,6 @@
 //! Engines, which compute forces.
 
-use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive, shared};
+use crate::arguments::{Output, array, copied, exclusive, shared};
 use crate::model::Model;
 use crate::settings::{Path, Settings};
 use crate::status::{Failure, Status, c_text, guard};
@@ -19,12 +19,12 @@ pub struct Engine {
 }
 
 /// The results that an engine holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug)]
 pub(super) enum State {
     /// No results, or none since a call failed.
     Nothing,
     /// Results of psidpd_engine_first: psidpd_engine_second may follow.
-    First,
+    First(engine::Pending),
     /// Results of a whole evaluation.
     Whole,
 }
@@ -177,14 +177,9 @@ pub unsafe extern "C" fn psidpd_engine_new(
     })
 }
 
-impl Engine {
-    /// Fails unless the engine is in one of these states.
-    pub(super) fn require(&self, any_of: &[State], call: &str) -> Result<(), Failure> {
-        if any_of.contains(&self.state) {
-            return Ok(());
-        }
-        Err(Failure::new(Status::CallOrder, format!("{call} has not been called, or has failed")))
-    }
+/// The failure of a call that needs another one before.
+pub(super) fn not_before(call: &str) -> Failure {
+    Failure::new(Status::CallOrder, format!("{call} has not been called, or has failed"))
 }
 
 /// What a host needs to know of an engine.
@@ -319,8 +314,8 @@ pub unsafe extern "C" fn psidpd_engine_slopes(
         let (engine, out, out_length) = unsafe {
             (exclusive(engine, "engine")?, Output::new(slopes, "slopes")?, Output::new(length, "length")?)
         };
-        engine.require(&[State::First], "psidpd_engine_first")?;
-        let slopes = engine.engine.slopes_mut();
+        let State::First(pending) = &mut engine.state else { return Err(not_before("psidpd_engine_first")) };
+        let slopes = pending.slopes_mut();
         out_length.put(slopes.len());
         out.put(slopes.as_mut_ptr());
         Ok(())
@@ -336,38 +331,6 @@ impl Tally {
             thermostat_virial: sums.thermostat_virial,
         }
     }
-}
-
-/// Particles, velocities and forces of an evaluation.
-type Arrays<'a> = (engine::Particles<'a>, &'a [[f64; 3]], &'a mut [[f64; 3]]);
-
-/// Checks, as far as possible, the arrays that forces are computed from and the array of forces.
-///
-/// # Safety
-/// The pointers in `lists` are null or at arrays as long as it says; `v` is null or at `3 * lists.all` numbers, and so is
-/// `force`, which overlaps none but perhaps `lists.x` and `v`.
-pub(super) unsafe fn arrays_of<'a>(
-    engine: &Engine,
-    lists: &Particles,
-    v: *const f64,
-    step: Option<engine::Step>,
-    force: *mut f64,
-) -> Result<Arrays<'a>, Failure> {
-    check_apart(force, lists.x, lists.all, "force and particles.x")?;
-    // SAFETY: the caller promises that the pointers in `lists` are null or arrays of these lengths.
-    let particles = unsafe { particles_of(lists)? };
-    let thermal = step.is_some() && engine.engine.plan().needs_velocities();
-    let v = if v.is_null() && !thermal {
-        &[]
-    } else {
-        check_apart(force, v, lists.all, "force and v")?;
-        // SAFETY: the caller promises `3 * lists.all` numbers at `v`; a vector is three consecutive numbers.
-        unsafe { array(v.cast::<[f64; 3]>(), lists.all, "v")? }
-    };
-    // SAFETY: the caller promises `3 * lists.all` numbers at `force`; `check_apart` found that
-    // it overlaps neither `x` nor `v`.
-    let force = unsafe { array_mut(force.cast::<[f64; 3]>(), lists.all, "force")? };
-    Ok((particles, v, force))
 }
 
 /// Arrays of the last evaluation, of which an engine keeps those that were asked for; valid until the next evaluation
@@ -404,9 +367,12 @@ pub unsafe extern "C" fn psidpd_engine_results(engine: *const Engine, results: *
     guard(|| {
         // SAFETY: the caller promises that `engine` is null or not freed and that `results` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(results, "results")?) };
-        engine.require(&[State::First, State::Whole], "psidpd_engine_first or psidpd_engine_evaluate")?;
-        let (density, energy) = (engine.engine.local_densities(), engine.engine.particle_energy());
-        let virial = engine.engine.particle_virial().as_flattened();
+        if let State::Nothing = engine.state {
+            return Err(not_before("psidpd_engine_first or psidpd_engine_evaluate"));
+        }
+        let results = engine.engine.results();
+        let (density, energy) = (results.densities, results.particle_energy);
+        let virial = results.particle_virial.as_flattened();
         out.put(Results {
             density: density.as_ptr(),
             densities: density.len(),

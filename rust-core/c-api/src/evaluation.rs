@@ -1,7 +1,7 @@
 //! Evaluations whose request states at once what to compute.
 
-use crate::arguments::{Output, array, copied, exclusive, flag};
-use crate::engine::{Engine, Particles, State, Step, Tally, arrays_of, particles_of, step_of, want_of};
+use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive, flag};
+use crate::engine::{Engine, Particles, State, Step, Tally, not_before, particles_of, step_of, want_of};
 use crate::status::{Failure, Status, guard};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::{self, Around, DomainError, Newton, PairsOfHost, PeriodicBox, Surroundings};
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
         unsafe {
             let engine = exclusive(engine, "engine")?;
             let domain = copied(r#box, "box")?.domain()?;
-            complete(engine, request, force, tally, |engine, request, force| {
+            complete(engine, request, force, tally, |engine, _, request, force| {
                 engine.forces(&domain, request, force, true)
             })
         }
@@ -225,10 +225,15 @@ pub unsafe extern "C" fn psidpd_engine_second(
         // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
         unsafe {
             let engine = exclusive(engine, "engine")?;
-            engine.require(&[State::First], "psidpd_engine_first")?;
+            if !matches!(engine.state, State::First(_)) {
+                return Err(not_before("psidpd_engine_first"));
+            }
             let first_forces = std::mem::take(&mut engine.first_forces);
-            let done = complete(engine, request, force, tally, |engine, request, force| {
-                let sums = engine.second(request, force)?;
+            let done = complete(engine, request, force, tally, |engine, state, request, force| {
+                let State::First(pending) = state else {
+                    return Err(engine::EngineError::Host("there is no first half"));
+                };
+                let sums = pending.finish(engine, request, force)?;
                 for (force, first) in force.iter_mut().zip(&first_forces) {
                     (0..3).for_each(|c| force[c] += first[c]);
                 }
@@ -252,17 +257,22 @@ unsafe fn complete(
     tally: *mut Tally,
     work: impl FnOnce(
         &mut engine::Engine,
+        State,
         &engine::Request,
         &mut [[f64; 3]],
     ) -> Result<engine::Tally, engine::EngineError>,
 ) -> Result<(), Failure> {
     // SAFETY: the caller promises that the pointers are null or valid.
     let (given, out) = unsafe { (copied(request, "request")?, optional(tally)?) };
-    let (want, step) = (want_of(given.want)?, given.step()?);
-    // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
-    let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
-    engine.state = State::Nothing;
-    let sums = work(&mut engine.engine, &engine::Request { particles, v, step, want }, force)?;
+    let all = given.particles.all;
+    check_apart(force, given.particles.x, all, "force and particles.x")?;
+    check_apart(force, given.v, all, "force and v")?;
+    // SAFETY: the caller promises arrays as long as `request` says; `check_apart` found that `force`, `3 * all` numbers,
+    // overlaps none of those that have as many.
+    let (request, force) =
+        unsafe { (given.checked(engine)?, array_mut(force.cast::<[f64; 3]>(), all, "force")?) };
+    let state = std::mem::replace(&mut engine.state, State::Nothing);
+    let sums = work(&mut engine.engine, state, &request, force)?;
     engine.state = State::Whole;
     if let Some(out) = out {
         out.put(Tally::of(&sums));
@@ -274,8 +284,7 @@ fn first(engine: &mut Engine, surroundings: Surroundings, request: &engine::Requ
     engine.state = State::Nothing;
     engine.first_forces.clear();
     engine.first_forces.resize(request.particles.owned, [0.0; 3]);
-    engine.engine.first(surroundings, request, &mut engine.first_forces)?;
-    engine.state = State::First;
+    engine.state = State::First(engine.engine.first(surroundings, request, &mut engine.first_forces)?);
     Ok(())
 }
 

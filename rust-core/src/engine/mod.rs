@@ -11,6 +11,7 @@
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
+//! sweep_path     the sweep, and special pairs
 //! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
 //! ```
 //!
@@ -20,6 +21,7 @@
 
 mod counts;
 mod error;
+mod evaluate;
 mod excess;
 mod excess_pass;
 mod exclusions;
@@ -32,14 +34,16 @@ mod particles;
 mod path;
 mod plan;
 mod reach;
+mod request;
 mod surroundings;
 mod sweep;
+mod sweep_path;
 pub mod thermostat;
 pub mod vectors;
 
 pub use counts::PassCounts;
 pub use error::EngineError;
-pub use facade::{Engine, Evaluated, Request};
+pub use facade::{Engine, Pending, Statistics};
 #[doc(hidden)]
 pub use fault::Fault;
 pub use images::Images;
@@ -54,6 +58,7 @@ pub use psidpd_passes::settings::{Instructions, Precision, Settings};
 pub use psidpd_passes::tally::{Tally, Want};
 pub use psidpd_threads::{at_once, processors};
 pub use reach::{ReachError, check_reach};
+pub use request::{Evaluated, Request, Results};
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, ThreadCount, Times, part};
 

@@ -1,5 +1,6 @@
 //! The path of an evaluation, and the reason for it.
 
+use psidpd_passes::settings::Settings;
 use std::fmt;
 
 /// The path of an evaluation.
@@ -24,6 +25,17 @@ pub enum Reason {
     Box,
     /// The host has disabled the sweep.
     Asked,
+}
+
+impl Path {
+    /// Describes the path and its settings: "cell sweep, mixed precision, avx2, 2 threads".
+    pub fn describe(self, settings: Settings) -> String {
+        let Settings { precision, instructions, threads } = settings;
+        match self {
+            Path::Sweep => format!("{self}, {precision} precision, {instructions}, {threads} thread(s)"),
+            Path::PairSums(_) => format!("{self}; double precision, 1 thread"),
+        }
+    }
 }
 
 impl fmt::Display for Path {

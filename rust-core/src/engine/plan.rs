@@ -1,11 +1,14 @@
 //! The passes that a fluid needs, derived once.
 
+use super::error::EngineError;
 use super::excess::ExcessPlan;
 use super::fault::Fault;
+use super::particles::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SearchPlan;
+use psidpd_passes::noise::PairNoise;
 use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
@@ -178,6 +181,23 @@ impl Plan {
     /// Whether ghosts need velocities.
     pub fn needs_velocities(&self) -> bool {
         self.thermostat.is_some()
+    }
+
+    /// The noise of a step and its `Δt^{−1/2}`, if drag and noise act in it.
+    ///
+    /// # Errors
+    /// Fails if these act and there are fewer velocities than particles and ghosts.
+    pub(super) fn noise_of(
+        &self,
+        step: Option<Step>,
+        v: &[[f64; 3]],
+        all: usize,
+    ) -> Result<Option<(PairNoise, f64)>, EngineError> {
+        let Some(step) = step.filter(|_| self.needs_velocities()) else { return Ok(None) };
+        if v.len() < all {
+            return Err(EngineError::Host("the velocity array is too short"));
+        }
+        Ok(Some((PairNoise::new(step.seed, step.number), 1.0 / step.dt.sqrt())))
     }
 
     /// Number of species with a ψ that depends on a density.

@@ -1,6 +1,5 @@
 //! Compares the engine with the plain reference, and both with the Hamiltonian.
 
-use super::pair_sums::PairSums;
 use super::*;
 use crate::maximum::largest;
 use crate::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
@@ -54,6 +53,17 @@ fn configuration(count: usize, lengths: [f64; 3], species: usize, dimensions: us
 fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton, step: Option<Step>) -> Outcome {
     let owned = Owned { domain: &c.domain, x: &c.x, v: &c.v, species: &c.species, tag: &c.tag };
     with_images::evaluate(fluid, owned, newton, step)
+}
+
+/// An engine that sums over pairs only.
+fn summing(fluid: &Fluid) -> Engine {
+    let mut engine = Engine::new(fluid, Settings::default()).unwrap();
+    engine.use_pair_sums_only(true);
+    engine
+}
+
+fn request(particles: Particles) -> Request {
+    Request { particles, v: &[], step: None, want: Want::FORCES }
 }
 
 fn warren(species: usize, law: ForceLaw) -> Fluid {
@@ -452,8 +462,8 @@ A = "pi/30*(-40)*n + pi*0.75^4/30*25*m^2"
 "#;
     let two = Model::parse("two", text).unwrap().at(1.0).unwrap();
     let c = configuration(300, [3.1, 4.0, 3.5], 1, 3);
-    let mut engine = PairSums::new(&two).unwrap();
-    assert_eq!(engine.slope_width(), 1);
+    let mut engine = summing(&two);
+    assert_eq!(engine.plan().slope_width(), 1);
     let a = run_engine(&two, &c, Newton::On, None);
     let b = run_engine(&warren(1, ForceLaw::Conservative), &c, Newton::On, None);
     close(a.tally.energy(), b.tally.energy(), a.tally.energy().abs(), "energy");
@@ -462,10 +472,11 @@ A = "pi/30*(-40)*n + pi*0.75^4/30*25*m^2"
     }
     let kind = vec![0; 300];
     let particles = Particles { owned: 300, x: &c.x, tag: &c.tag, kind: &kind };
-    engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
+    let request = request(particles);
     let mut f = vec![[0.0; 3]; 300];
-    engine.second(&particles, &[], None, Want::FORCES, &mut f).unwrap();
-    let counts = engine.counts();
+    let pending = engine.first(Surroundings::ghosts(Newton::On), &request, &mut f).unwrap();
+    pending.finish(&mut engine, &request, &mut f).unwrap();
+    let counts = engine.statistics().counts;
     assert_eq!((counts.density, counts.excess), (1, 1));
     assert_eq!((counts.noise, counts.energy, counts.virial), (0, 0, 0));
 }
@@ -490,16 +501,16 @@ fn linear_psi_is_standard_dpd_and_needs_no_density_pass() {
         close(*f, *g, 1e3, "force");
     }
     assert_eq!(a.counts.excess, 0);
-    assert_eq!(PairSums::new(&psi).unwrap().slope_width(), 0);
+    assert_eq!(summing(&psi).plan().slope_width(), 0);
 }
 
 #[test]
 fn trouble_is_an_error_that_names_the_particle() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = PairSums::new(&fluid).unwrap();
-    let check = |engine: &mut PairSums, x: [[f64; 3]; 2], tag: [i32; 2], kind: [i32; 2]| {
+    let mut engine = summing(&fluid);
+    let check = |engine: &mut Engine, x: [[f64; 3]; 2], tag: [i32; 2], kind: [i32; 2]| {
         let particles = Particles { owned: 2, x: &x, tag: &tag, kind: &kind };
-        engine.first(Surroundings::ghosts(Newton::On), &particles, false)
+        engine.first(Surroundings::ghosts(Newton::On), &request(particles), &mut []).map(drop)
     };
     let fine = [[0.0; 3], [0.5, 0.0, 0.0]];
     assert_eq!(check(&mut engine, fine, [1, 2], [0, 0]), Ok(()));
@@ -510,7 +521,7 @@ fn trouble_is_an_error_that_names_the_particle() {
 
     let text = "title = \"vdw\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                 [excess_free_energy]\nA = \"-ln(1 - n)\"\n";
-    let mut engine = PairSums::new(&Model::parse("vdw", text).unwrap().at(1.0).unwrap()).unwrap();
+    let mut engine = summing(&Model::parse("vdw", text).unwrap().at(1.0).unwrap());
     let on_top = [[0.0; 3], [0.0, 0.0, 0.0]];
     let error = check(&mut engine, on_top, [1, 2], [0, 0]).unwrap_err();
     assert!(matches!(error, EngineError::ExcessFreeEnergy { tag: 1, .. }), "{error}");
@@ -520,25 +531,26 @@ fn trouble_is_an_error_that_names_the_particle() {
 #[test]
 fn a_runaway_particle_costs_no_memory() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = PairSums::new(&fluid).unwrap();
+    let mut engine = summing(&fluid);
     let x = [[0.0; 3], [1e300, -1e250, 3e12], [0.4, 0.0, 0.0]];
     let particles = Particles { owned: 3, x: &x, tag: &[1, 2, 3], kind: &[0, 0, 0] };
-    engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
-    assert!(engine.local_densities()[0] > 0.0);
-    assert_eq!(engine.local_densities()[1], 0.0);
+    let _pending = engine.first(Surroundings::ghosts(Newton::On), &request(particles), &mut []).unwrap();
+    let densities = engine.results().densities;
+    assert!(densities[0] > 0.0 && densities[1] == 0.0);
 }
 
 /// Particles without a species are left out.
 #[test]
 fn unmapped_kinds_are_ignored() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = PairSums::new(&fluid).unwrap();
+    let mut engine = summing(&fluid);
     engine.map_kinds(&[-1, 0, -1]).unwrap();
     let x = [[0.0; 3], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]];
     let particles = Particles { owned: 3, x: &x, tag: &[1, 2, 3], kind: &[1, 2, 1] };
-    engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
+    let request = request(particles);
     let mut f = vec![[0.0; 3]; 3];
-    engine.second(&particles, &[], None, Want::FORCES, &mut f).unwrap();
+    let pending = engine.first(Surroundings::ghosts(Newton::On), &request, &mut f).unwrap();
+    pending.finish(&mut engine, &request, &mut f).unwrap();
     assert_eq!(f[1], [0.0; 3]);
     assert!(f[0][1] != 0.0 && f[0][0] == 0.0);
     assert!(engine.map_kinds(&[0, 1]).is_err());

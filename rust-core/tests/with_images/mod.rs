@@ -1,9 +1,9 @@
 //! Runs the engine as a host with ghosts does: periodic images are ghosts, slopes are copied to them,
 //! and forces, energies and virials are returned to the owners.
 
-use psidpd_core::engine::pair_sums::PairSums;
 use psidpd_core::engine::{
-    Images, Newton, Particles, PassCounts, PeriodicBox, Step, Surroundings, Tally, Want,
+    Engine, Images, Newton, Particles, PassCounts, PeriodicBox, Request, Settings, Statistics, Step,
+    Surroundings, Tally, Want,
 };
 use psidpd_core::model::Fluid;
 
@@ -31,7 +31,8 @@ pub struct Outcome {
 
 /// Evaluates all results, with drag and noise if there is a step.
 pub fn evaluate(fluid: &Fluid, c: Owned, newton: Newton, step: Option<Step>) -> Outcome {
-    let mut engine = PairSums::new(fluid).unwrap();
+    let mut engine = Engine::new(fluid, Settings::default()).unwrap();
+    engine.use_pair_sums_only(true);
     let owned = c.x.len();
     let mut images = Images::default();
     let (mut x, mut v, mut tag) = (c.x.to_vec(), c.v.to_vec(), c.tag.to_vec());
@@ -41,14 +42,16 @@ pub fn evaluate(fluid: &Fluid, c: Owned, newton: Newton, step: Option<Step>) -> 
     images.forward(1, &mut tag);
     images.forward(1, &mut kind);
     let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
-    let width = engine.slope_width();
-    engine.slopes_mut().truncate(owned * width);
-    images.forward(width, engine.slopes_mut());
+    let request = Request { particles, v: &v, step, want: Want::ALL };
     let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.second(&particles, &v, step, Want::ALL, &mut forces).unwrap();
-    let mut energy = engine.particle_energy().to_vec();
-    let mut virial = engine.particle_virial().to_vec();
+    let mut pending = engine.first(Surroundings::ghosts(newton), &request, &mut forces).unwrap();
+    let width = engine.plan().slope_width();
+    let mut slopes = pending.slopes_mut()[..owned * width].to_vec();
+    images.forward(width, &mut slopes);
+    pending.slopes_mut().copy_from_slice(&slopes);
+    let tally = pending.finish(&mut engine, &request, &mut forces).unwrap();
+    let mut energy = engine.results().particle_energy.to_vec();
+    let mut virial = engine.results().particle_virial.to_vec();
     if newton == Newton::On {
         images.reverse(&mut forces);
         // The loop adds energies and virials of ghosts to their owners, three numbers at a time.
@@ -64,13 +67,14 @@ pub fn evaluate(fluid: &Fluid, c: Owned, newton: Newton, step: Option<Step>) -> 
     forces.truncate(owned);
     energy.truncate(owned);
     virial.truncate(owned);
+    let Statistics { counts, out_of_bounds, .. } = engine.statistics();
     Outcome {
         tally,
         forces,
-        densities: engine.local_densities().to_vec(),
+        densities: engine.results().densities.to_vec(),
         energy,
         virial,
-        counts: engine.counts(),
-        out_of_bounds: engine.out_of_bounds(),
+        counts,
+        out_of_bounds,
     }
 }

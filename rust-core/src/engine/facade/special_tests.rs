@@ -2,7 +2,7 @@
 
 use super::tests::*;
 use super::*;
-use crate::engine::{Instructions, Mark, Newton, PairsOfHost, Precision};
+use crate::engine::{Around, Instructions, Mark, Newton, PairsOfHost, Precision};
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
 
@@ -127,7 +127,7 @@ fn values_of_single_particles_and_densities_see_special_pairs() {
     let densities = engine.sum_densities(Surroundings::Box(&cloud.domain), &particles).unwrap().to_vec();
     let (tally, _, expected) = in_box(&mut engine, &cloud, Want::ALL);
     assert_eq!(engine.path(), Some(Path::PairSums(Reason::ParticleValues)));
-    let energy: f64 = engine.particle_energy().iter().sum();
+    let energy: f64 = engine.results().particle_energy.iter().sum();
     for energy in [tally.energy(), energy] {
         assert!((energy / swept.energy() - 1.0).abs() < 1e-11, "{energy} {}", swept.energy());
     }

@@ -1,7 +1,7 @@
 //! Tests the choice of the path, and that all paths give the same results.
 
 use super::*;
-use crate::engine::{Images, Newton, PairsOfHost, Precision};
+use crate::engine::{Around, Images, Newton, PairsOfHost, Precision, Step};
 use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 use psidpd_passes::noise::threefry2x32;
 
@@ -83,7 +83,7 @@ pub(super) type Outcome = (Tally, Vec<[f64; 3]>, Vec<f64>);
 pub(super) fn in_box(engine: &mut Engine, cloud: &Cloud, want: Want) -> Outcome {
     let mut force = vec![[7.0; 3]; cloud.x.len()];
     let tally = engine.forces(&cloud.domain, &cloud.request(want), &mut force, false).unwrap();
-    (tally, force, engine.local_densities().to_vec())
+    (tally, force, engine.results().densities.to_vec())
 }
 
 /// Runs both halves; copies slopes to ghosts and, if ghosts get forces, returns these to the owners.
@@ -98,15 +98,15 @@ pub(super) fn with_ghosts(
     let request = all.request(want);
     let request = Request { particles: Particles { owned, ..request.particles }, ..request };
     let mut force = vec![[0.0; 3]; all.x.len()];
-    engine.first(surroundings, &request, &mut force).unwrap();
+    let mut pending = engine.first(surroundings, &request, &mut force).unwrap();
     let width = engine.plan().slope_width();
-    let mut slopes = engine.slopes_mut()[..owned * width].to_vec();
+    let mut slopes = pending.slopes_mut()[..owned * width].to_vec();
     images.forward(width, &mut slopes);
-    engine.slopes_mut().copy_from_slice(&slopes);
-    let tally = engine.second(&request, &mut force).unwrap();
+    pending.slopes_mut().copy_from_slice(&slopes);
+    let tally = pending.finish(engine, &request, &mut force).unwrap();
     images.reverse(&mut force);
     force.truncate(owned);
-    (tally, force, engine.local_densities().to_vec())
+    (tally, force, engine.results().densities.to_vec())
 }
 
 pub(super) fn agree(a: &Outcome, b: &Outcome) {
@@ -147,11 +147,11 @@ fn every_evaluation_chooses_anew() {
         for (lengths, want, path) in cases {
             let cloud = Cloud::new(lengths, 250, species);
             assert_eq!(engine.path_for(Surroundings::Box(&cloud.domain), want), path);
-            let before = engine.sweep.counts().force;
+            let before = engine.sweep.sweep.counts().force;
             let found = in_box(&mut engine, &cloud, want);
             assert_eq!(engine.path(), Some(path));
-            assert_eq!(engine.sweep.counts().force > before, path == swept, "{path}");
-            assert_eq!(engine.order().is_some(), path == swept);
+            assert_eq!(engine.sweep.sweep.counts().force > before, path == swept, "{path}");
+            assert_eq!(engine.results().order.is_some(), path == swept);
             engine.use_pair_sums_only(true);
             let mut expected = in_box(&mut engine, &cloud, want);
             assert_eq!(engine.path(), Some(plain(Reason::Asked)));
@@ -178,11 +178,14 @@ fn energies_and_virials_of_particles_add_up() {
         let mut engine = engine(&fluid);
         let (tally, _, densities) = in_box(&mut engine, &cloud, Want::ALL);
         assert_eq!(densities.len(), 120 * fluid.variables());
-        assert_eq!((engine.particle_energy().len(), engine.particle_virial().len()), (120, 120));
-        let energy: f64 = engine.particle_energy().iter().sum();
+        assert_eq!(
+            (engine.results().particle_energy.len(), engine.results().particle_virial.len()),
+            (120, 120)
+        );
+        let energy: f64 = engine.results().particle_energy.iter().sum();
         assert!((energy - tally.energy()).abs() < 1e-9 * (1.0 + energy.abs()));
         for k in 0..6 {
-            let sum: f64 = engine.particle_virial().iter().map(|w| w[k]).sum();
+            let sum: f64 = engine.results().particle_virial.iter().map(|w| w[k]).sum();
             assert!((sum - tally.total_virial()[k]).abs() < 1e-8 * (100.0 + sum.abs()));
         }
     }
@@ -241,6 +244,30 @@ fn all_surroundings_give_the_same_forces() {
                 }
             }
         }
+    }
+}
+
+/// A first half is of one evaluation of one engine.
+#[test]
+fn a_first_half_is_finished_by_its_own_evaluation_only() {
+    let cloud = Cloud::new([4.0, 3.5, 3.1], 200, 1);
+    let request = cloud.request(Want::FORCES);
+    let mut force = vec![[0.0; 3]; 200];
+    for pair_sums_only in [false, true] {
+        let mut engines = [0, 1].map(|_| engine(&warren()));
+        engines.iter_mut().for_each(|engine| engine.use_pair_sums_only(pair_sums_only));
+        let [one, other] = &mut engines;
+        let domain = Surroundings::Box(&cloud.domain);
+        let [late, foreign, good] = [(); 3].map(|()| one.first(domain, &request, &mut force).unwrap());
+        assert!(late.finish(one, &request, &mut force).is_err());
+        assert!(foreign.finish(other, &request, &mut force).is_err());
+        assert!(good.finish(one, &request, &mut force).is_ok());
+        let stale = one.first(domain, &request, &mut force).unwrap();
+        in_box(one, &cloud, Want::ALL);
+        assert!(stale.finish(one, &request, &mut force).is_err());
+        // Values of particles that a later evaluation was not asked for are gone.
+        in_box(one, &cloud, Want::FORCES);
+        assert!(one.results().particle_energy.is_empty() && one.results().particle_virial.is_empty());
     }
 }
 

@@ -48,8 +48,9 @@ pub fn add_listed(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::evaluate::Evaluate;
     use crate::engine::pair_sums::PairSums;
-    use crate::engine::{Around, Newton, PeriodicBox, Surroundings, Tally, Want};
+    use crate::engine::{Around, Newton, PeriodicBox, Plan, Request, Surroundings, Tally, Want};
     use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 
     fn model() -> Model {
@@ -64,18 +65,26 @@ mod tests {
             .collect()
     }
 
+    fn sums() -> PairSums {
+        PairSums::of_plan(Plan::new(&model().at(1.0).unwrap()).unwrap())
+    }
+
+    fn request<'a>(particles: &Particles<'a>) -> Request<'a> {
+        Request { particles: *particles, v: &[], step: None, want: Want::TOTALS }
+    }
+
     type Forces = (Tally, Vec<[f64; 3]>);
 
     fn forces(engine: &mut PairSums, particles: &Particles) -> Forces {
         let mut f = vec![[0.0; 3]; particles.x.len()];
-        let tally = engine.second(particles, &[], None, Want::TOTALS, &mut f).unwrap();
+        let tally = engine.second(&request(particles), &mut f).unwrap();
         (tally, f)
     }
 
     fn search(engine: &mut PairSums, particles: &Particles, newton: Newton) {
         let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
         let around = Around { domain: &open, images: &[] };
-        engine.first(Surroundings::Ghosts(around, newton), particles, false).unwrap();
+        engine.first(Surroundings::Ghosts(around, newton), &request(particles), &mut []).unwrap();
     }
 
     fn agree(a: &Forces, b: &Forces) {
@@ -87,7 +96,7 @@ mod tests {
 
     #[test]
     fn all_pairs_listed_are_the_search_and_factors_scale() {
-        let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = sums();
         let x = points();
         let tag: Vec<i32> = (1..=60).collect();
         let kind = vec![0; 60];
@@ -98,14 +107,14 @@ mod tests {
             search(&mut engine, &particles, newton);
             let searched = forces(&mut engine, &particles);
             let listed = PairsOfHost { i: &i, j: &j, factor: &[] };
-            engine.first(Surroundings::Listed(listed, newton), &particles, false).unwrap();
+            engine.first(Surroundings::Listed(listed, newton), &request(&particles), &mut []).unwrap();
             agree(&forces(&mut engine, &particles), &searched);
             let ones = vec![1.0; i.len()];
             engine
                 .first(
                     Surroundings::Listed(PairsOfHost { factor: &ones, ..listed }, newton),
-                    &particles,
-                    false,
+                    &request(&particles),
+                    &mut [],
                 )
                 .unwrap();
             agree(&forces(&mut engine, &particles), &searched);
@@ -114,15 +123,15 @@ mod tests {
             // Forces are the gradient of the energy for any factors.
             let factor: Vec<f64> = (0..i.len()).map(|k| [0.0, 0.3, 1.0][k % 3]).collect();
             let listed = PairsOfHost { factor: &factor, ..listed };
-            engine.first(Surroundings::Listed(listed, newton), &particles, false).unwrap();
+            engine.first(Surroundings::Listed(listed, newton), &request(&particles), &mut []).unwrap();
             let (_, f) = forces(&mut engine, &particles);
             for (k, c) in [(3, 0), (20, 1), (59, 2)] {
                 let energy = [1e-5, -1e-5].map(|h| {
                     let mut x = x.clone();
                     x[k][c] += h;
                     let moved = Particles { x: &x, ..particles };
-                    let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
-                    engine.first(Surroundings::Listed(listed, newton), &moved, false).unwrap();
+                    let mut engine = sums();
+                    engine.first(Surroundings::Listed(listed, newton), &request(&moved), &mut []).unwrap();
                     forces(&mut engine, &moved).0.energy()
                 });
                 let slope = -(energy[0] - energy[1]) / 2e-5;
@@ -133,7 +142,7 @@ mod tests {
 
     #[test]
     fn single_pairs_add_up_to_the_forces() {
-        let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = sums();
         let x = points();
         let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
         let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
@@ -145,7 +154,7 @@ mod tests {
             for j in 0..i {
                 let d: [f64; 3] = std::array::from_fn(|c| x[i][c] - x[j][c]);
                 let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
-                let (energy, force) = engine.single([0, 0], r, Some([i, j]));
+                let (energy, force) = engine.single([0, 0], r, engine.slopes(), [i, j]);
                 phi += energy;
                 for (c, d) in d.iter().enumerate() {
                     sum[i][c] += force * d / r;
@@ -154,31 +163,39 @@ mod tests {
             }
         }
         agree(&(Tally { excess: 0.0, pair: phi, ..tally }, sum), &(Tally { excess: 0.0, ..tally }, f));
-        assert_eq!(engine.single([0, 1], 0.5, None), (0.0, 0.0));
-        let alone = engine.single([0, 0], 0.5, None);
-        assert_eq!(alone, engine.single([0, 0], 0.5, Some([3, 400])));
+        assert_eq!(engine.single([0, 1], 0.5, &[], [0, 0]), (0.0, 0.0));
+        let alone = engine.single([0, 0], 0.5, &[], [0, 0]);
+        assert_eq!(alone, engine.single([0, 0], 0.5, engine.slopes(), [3, 400]));
         assert!((alone.1 + 20.0).abs() < 1e-12);
     }
 
     #[test]
     fn lists_that_make_no_sense_are_refused() {
-        let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = sums();
         let mut x = points();
         let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
         for (i, j, factor) in [(0, 60, 1.0), (50, 0, 1.0), (-1, 0, 1.0)] {
             let particles = Particles { owned: 50, x: &x, tag: &tag, kind: &kind };
             let listed = PairsOfHost { i: &[i], j: &[j], factor: &[factor] };
-            assert!(engine.first(Surroundings::Listed(listed, Newton::On), &particles, false).is_err());
+            assert!(
+                engine
+                    .first(Surroundings::Listed(listed, Newton::On), &request(&particles), &mut [])
+                    .is_err()
+            );
             let uneven = PairsOfHost { factor: &[1.0, 1.0], ..listed };
-            assert!(engine.first(Surroundings::Listed(uneven, Newton::On), &particles, false).is_err());
+            assert!(
+                engine
+                    .first(Surroundings::Listed(uneven, Newton::On), &request(&particles), &mut [])
+                    .is_err()
+            );
         }
         x[7][1] = f64::NAN;
         let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
         let error = engine
             .first(
                 Surroundings::Listed(PairsOfHost { i: &[], j: &[], factor: &[] }, Newton::On),
-                &particles,
-                false,
+                &request(&particles),
+                &mut [],
             )
             .unwrap_err();
         assert_eq!(error, EngineError::Position { tag: 8 });

@@ -36,29 +36,26 @@ pub use in_box::{Pair, for_each_pair};
 
 use super::counts::PassCounts;
 use super::error::EngineError;
+use super::evaluate::Evaluate;
 use super::excess_pass::{ExcessPass, Rows};
 use super::exclusions::Exclusions;
-use super::particles::{Particles, Step};
+use super::particles::Particles;
 use super::plan::Plan;
 use super::reach::check_reach;
+use super::request::{Request, Results};
 use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
-use crate::model::Fluid;
-use crate::model::expression::TooLarge;
 use densities::sum_densities;
 use forces::{ForceInput, ForceOutput, add_forces};
 use in_box::BoxSearch;
 use listed::add_listed;
 use pairs::Pairs;
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::noise::PairNoise;
-use psidpd_passes::tally::{Tally, Want};
+use psidpd_passes::tally::Tally;
 use search::CellSearch;
 use special::scale;
 
 /// The forces of one fluid over a list of pairs, with all results that a host may ask for, and
 /// the arrays of the computation.
-///
-/// An evaluation is [`PairSums::first`], copying slopes from owners to ghosts if there are any, and [`PairSums::second`].
 #[derive(Debug, Clone)]
 pub struct PairSums {
     plan: Plan,
@@ -81,20 +78,10 @@ pub struct PairSums {
     excess_pass: ExcessPass,
     counts: PassCounts,
     owned: usize,
-    /// Whether pairs, densities and slopes belong to one configuration.
-    ready: bool,
 }
 
 impl PairSums {
-    /// Creates the sums for `fluid`; types are species indices unless [`PairSums::map_kinds`] maps them.
-    ///
-    /// # Errors
-    /// Fails as [`Plan::new`].
-    pub fn new(fluid: &Fluid) -> Result<PairSums, TooLarge> {
-        Ok(PairSums::of_plan(Plan::new(fluid)?))
-    }
-
-    /// Creates the sums of a given plan.
+    /// Creates the sums of a given plan; types are species indices unless [`PairSums::map_kinds`] maps them.
     pub fn of_plan(plan: Plan) -> PairSums {
         let kinds = (0..plan.species.len() as i32).collect();
         PairSums {
@@ -115,13 +102,7 @@ impl PairSums {
             excess_pass: ExcessPass::default(),
             counts: PassCounts::default(),
             owned: 0,
-            ready: false,
         }
-    }
-
-    /// The plan of the fluid's passes.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
     }
 
     /// Number of runs of each pass.
@@ -148,11 +129,6 @@ impl PairSums {
         Ok(())
     }
 
-    /// Species of each of the host's types.
-    pub(super) fn kinds(&self) -> &[i32] {
-        &self.kinds
-    }
-
     /// Sets the pairs with reduced strength for later evaluations, by the host's numbers. Within the
     /// cut-off two particles must meet in one image only. The marks of `exclusions` exclude further
     /// pairs. Pairs that a host lists have their factors in its list.
@@ -163,28 +139,8 @@ impl PairSums {
         self.special.extend_from_slice(special);
     }
 
-    /// Finds pairs, sums local densities, either all of the model or those that forces need, and
-    /// evaluates ψ and its slopes for owned particles.
-    ///
-    /// # Errors
-    /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
-    /// lengths, ghosts in an evaluation of the whole box, and pairs of particles that do not exist.
-    pub fn first(
-        &mut self,
-        surroundings: Surroundings,
-        particles: &Particles,
-        all_densities: bool,
-    ) -> Result<(), EngineError> {
-        self.find_pairs(surroundings, particles)?;
-        self.sum_densities(all_densities);
-        self.evaluate_excess(particles.tag)?;
-        self.ready = true;
-        Ok(())
-    }
-
     /// Finds the pairs of another configuration.
     fn find_pairs(&mut self, surroundings: Surroundings, particles: &Particles) -> Result<(), EngineError> {
-        self.ready = false;
         self.take_species(particles)?;
         self.owned = particles.owned;
         let (dimensions, cutoff) = (self.plan.dimensions, self.plan.cutoff);
@@ -194,11 +150,7 @@ impl PairSums {
         let is_closed = |domain: &PeriodicBox| domain.periodic()[..dimensions].contains(&true);
         match surroundings {
             Surroundings::Box(domain) => {
-                if owned < x.len() {
-                    return Err(EngineError::Host(
-                        "ghosts are not allowed in an evaluation of the whole box",
-                    ));
-                }
+                particles.check_no_ghosts()?;
                 check_reach(domain, dimensions, cutoff, owned)?;
                 pairs.clear(owned, Newton::On);
                 box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
@@ -206,9 +158,7 @@ impl PairSums {
                 });
             }
             Surroundings::Ghosts(Around { domain, images }, newton) if is_closed(domain) => {
-                if !images.is_empty() && images.len() != x.len() - owned {
-                    return Err(EngineError::Host("`images` must have one entry per ghost"));
-                }
+                particles.check_images(images)?;
                 check_reach(domain, dimensions, cutoff, x.len())?;
                 pairs.clear(owned, newton);
                 let is_image = |k: usize| k >= owned && images.get(k - owned).is_some_and(|image| *image);
@@ -244,13 +194,7 @@ impl PairSums {
     }
 
     fn take_species(&mut self, particles: &Particles) -> Result<(), EngineError> {
-        let all = particles.x.len();
-        if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
-            return Err(EngineError::Host("particle arrays have different lengths"));
-        }
-        if all > u32::MAX as usize {
-            return Err(EngineError::Host("more than 2^32 particles and ghosts on one rank"));
-        }
+        particles.check(31)?;
         self.species.clear();
         for ((kind, tag), x) in particles.kind.iter().zip(particles.tag).zip(particles.x) {
             let species = usize::try_from(*kind).ok().and_then(|k| self.kinds.get(k));
@@ -282,7 +226,7 @@ impl PairSums {
     /// last pairs that were found. Only in the latter case can forces be computed afterwards.
     ///
     /// # Errors
-    /// Fails as [`PairSums::first`].
+    /// Fails as the first half of an evaluation.
     pub fn sum_all_densities(
         &mut self,
         of: Option<(Surroundings, &Particles)>,
@@ -314,68 +258,50 @@ impl PairSums {
         self.counts.excess += self.plan.evaluated_species();
         self.excess_pass.run(&self.plan, Some(|i| species[i]), |i| tag[i], &mut rows)
     }
+}
 
-    /// Number of slopes per particle that a host copies to ghosts: [`Plan::slope_width`].
-    pub fn slope_width(&self) -> usize {
-        self.plan.slope_width()
-    }
-
-    /// Slopes `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
-    pub fn slopes(&self) -> &[f64] {
-        &self.slopes
-    }
-
-    /// The slopes, for the host to write those of ghosts.
-    pub fn slopes_mut(&mut self) -> &mut Vec<f64> {
-        &mut self.slopes
-    }
-
-    /// Uncorrected local densities of owned particles, one for each density and species, density-major.
-    /// Densities that forces do not need are zero unless they were asked for.
-    pub fn local_densities(&self) -> &[f64] {
-        &self.densities
-    }
-
-    /// ψ of owned particles, without the terms that act as pair potentials.
-    pub fn excess(&self) -> &[f64] {
-        &self.excess
-    }
-
-    /// Adds the forces to `force` and returns the requested totals.
-    ///
-    /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative forces are
-    /// computed. Under [`Newton::On`] forces on ghosts are added too, and the host returns them to the owners.
-    ///
-    /// # Errors
-    /// Fails for a force that is not finite, and for arrays of other lengths than in [`PairSums::first`].
-    pub fn second(
+impl Evaluate for PairSums {
+    fn whole(
         &mut self,
-        particles: &Particles,
-        v: &[[f64; 3]],
-        step: Option<Step>,
-        want: Want,
+        domain: &PeriodicBox,
+        request: &Request,
         force: &mut [[f64; 3]],
+        add: bool,
     ) -> Result<Tally, EngineError> {
+        self.first(Surroundings::Box(domain), request, force)?;
+        if !add {
+            force.fill([0.0; 3]);
+        }
+        self.second(request, force)
+    }
+
+    /// Finds pairs, sums local densities, either all of the model or those that forces need, and
+    /// evaluates ψ and its slopes for owned particles. No forces are added yet.
+    fn first(
+        &mut self,
+        surroundings: Surroundings,
+        request: &Request,
+        _: &mut [[f64; 3]],
+    ) -> Result<(), EngineError> {
+        self.particle_energy.clear();
+        self.particle_virial.clear();
+        self.find_pairs(surroundings, &request.particles)?;
+        self.sum_densities(request.want.densities);
+        self.evaluate_excess(request.particles.tag)
+    }
+
+    /// Adds all forces. Under [`Newton::On`] forces on ghosts are added too, and the host returns them to the owners.
+    fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
+        let Request { particles, v, step, want } = *request;
         let all = self.species.len();
-        let thermostat = step
-            .filter(|_| self.plan.thermostat.is_some())
-            .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
-        let newton = self.pairs.newton();
-        let needed = if newton == Newton::On { all } else { self.owned };
-        if !self.ready {
-            return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
-        }
-        if self.slopes.len() != all * self.plan.slope_width() {
-            return Err(EngineError::Host("slopes were not forwarded to every ghost"));
-        }
         if particles.x.len() != all || particles.owned != self.owned || particles.tag.len() != all {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
-        if force.len() < needed || (thermostat.is_some() && v.len() < all) {
-            return Err(EngineError::Host("force or velocity arrays are too short"));
+        let thermostat = self.plan.noise_of(step, v, all)?;
+        let newton = self.pairs.newton();
+        if force.len() < (if newton == Newton::On { all } else { self.owned }) {
+            return Err(EngineError::Host("the force array is too short"));
         }
-        self.particle_energy.clear();
-        self.particle_virial.clear();
         if want.particle_energy {
             self.particle_energy.resize(all, 0.0);
         }
@@ -420,13 +346,28 @@ impl PairSums {
         }
     }
 
-    /// Energy of each particle and ghost, if the last [`PairSums::second`] was asked for it.
-    pub fn particle_energy(&self) -> &[f64] {
-        &self.particle_energy
+    fn slopes(&self) -> &[f64] {
+        &self.slopes
     }
 
-    /// Virial of each particle and ghost, if the last [`PairSums::second`] was asked for it.
-    pub fn particle_virial(&self) -> &[[f64; 6]] {
-        &self.particle_virial
+    fn slopes_mut(&mut self) -> &mut Vec<f64> {
+        &mut self.slopes
+    }
+
+    fn fetch_slopes(&mut self, all: usize) {
+        self.slopes.resize(self.plan.slope_width() * all, 0.0);
+    }
+
+    fn results(&self) -> Results<'_> {
+        Results {
+            densities: &self.densities,
+            particle_energy: &self.particle_energy,
+            particle_virial: &self.particle_virial,
+            order: None,
+        }
+    }
+
+    fn excess(&mut self) -> &[f64] {
+        &self.excess
     }
 }

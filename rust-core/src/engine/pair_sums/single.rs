@@ -7,22 +7,12 @@ use crate::engine::surroundings::Newton;
 use psidpd_passes::tally::Want;
 
 impl PairSums {
-    /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the
-    /// distance `r`, with the given types.
+    /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the distance `r`, with the given
+    /// types and the slopes of an evaluation, [`Plan::slope_width`](crate::engine::Plan::slope_width) for each particle.
     ///
     /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
-    /// density. The force includes the many-body part, with the slopes of ψ at the densities of the
-    /// last evaluation; without these (`None`, or particles that were not evaluated) it does not.
-    pub fn single(&self, kinds: [i32; 2], r: f64, particles: Option<[usize; 2]>) -> (f64, f64) {
-        match particles {
-            Some(particles) => self.single_at(kinds, r, &self.slopes, particles),
-            None => self.single_at(kinds, r, &[], [0, 0]),
-        }
-    }
-
-    /// Computes the pair as [`PairSums::single`], with the slopes of another evaluation,
-    /// [`Plan::slope_width`](crate::engine::Plan::slope_width) for each particle.
-    pub fn single_at(&self, kinds: [i32; 2], r: f64, slopes: &[f64], particles: [usize; 2]) -> (f64, f64) {
+    /// density. The force includes the many-body part, except for particles without slopes.
+    pub fn single(&self, kinds: [i32; 2], r: f64, slopes: &[f64], particles: [usize; 2]) -> (f64, f64) {
         let species = kinds.map(|k| usize::try_from(k).ok().and_then(|k| self.kinds.get(k)).copied());
         let [Some(a), Some(b)] = species else { return (0.0, 0.0) };
         if a < 0 || b < 0 {

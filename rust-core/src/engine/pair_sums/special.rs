@@ -7,10 +7,10 @@ use crate::engine::error::EngineError;
 use crate::engine::exclusions::Exclusions;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
+use crate::engine::request::Request;
 use crate::engine::surroundings::{Around, Newton, SpecialPair};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::noise::PairNoise;
-use psidpd_passes::tally::{Tally, Want};
+use psidpd_passes::tally::Tally;
 use std::collections::HashMap;
 
 /// Sets the factors of special pairs in the list, and factors of 0 for pairs that marks exclude.
@@ -57,15 +57,12 @@ impl Corrections {
     ///
     /// # Errors
     /// Fails for a pair of particles that do not exist, and for a pair without an owned particle.
-    #[expect(clippy::too_many_arguments)] // What a host knows of its pairs.
     pub fn find(
         &mut self,
-        plan: &Plan,
-        special: &[SpecialPair],
-        excluded: impl Fn(usize, usize) -> bool,
+        (plan, species_of_type): (&Plan, &[i32]),
+        (special, exclusions): (&[SpecialPair], &Exclusions),
         around: Around,
         particles: &Particles,
-        species_of_type: &[i32],
         densities: &mut Vec<f64>,
     ) -> Result<(), EngineError> {
         self.pairs.clear();
@@ -82,7 +79,7 @@ impl Corrections {
             if i >= owned || j >= x.len() {
                 return Err(EngineError::Host("a special pair names a particle that does not exist"));
             }
-            if pair.factor == 0.0 || excluded(i, j) {
+            if pair.factor == 0.0 || exclusions.excludes(i, j) {
                 continue;
             }
             let mut d = std::array::from_fn(|c| x[i][c] - x[j][c]);
@@ -120,17 +117,15 @@ impl Corrections {
     ///
     /// # Errors
     /// Fails for a force that is not finite.
-    #[expect(clippy::too_many_arguments)] // An evaluation is of all these.
     pub fn add_forces(
         &self,
         plan: &Plan,
         slopes: &[f64],
-        particles: &Particles,
-        v: &[[f64; 3]],
-        thermostat: Option<(PairNoise, f64)>,
-        want: Want,
+        request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<Tally, EngineError> {
+        let Request { particles, v, step, want } = *request;
+        let thermostat = plan.noise_of(step, v, particles.x.len())?;
         let input = ForceInput {
             plan,
             list: &self.pairs,

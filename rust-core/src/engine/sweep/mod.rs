@@ -1,4 +1,4 @@
-//! The sweep computes the same forces as [`PairSums`](super::pair_sums::PairSums), by one traversal of
+//! The sweep computes the same forces as [the sums over pairs](super::pair_sums), by one traversal of
 //! all cells, without a neighbour list. `docs/engine.md` explains it with figures. DPD particles move
 //! so fast that a neighbour list would be valid for a few steps only and cost more than it saves.
 //!
@@ -164,12 +164,12 @@ impl Sweep {
     }
 
     /// Numbers of evaluations out of bounds, as
-    /// [`PairSums::out_of_bounds`](super::pair_sums::PairSums::out_of_bounds).
+    /// [`Statistics::out_of_bounds`](super::Statistics::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
     }
 
-    /// Maps types to species, as [`PairSums::map_kinds`](super::pair_sums::PairSums::map_kinds).
+    /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
     ///
     /// # Errors
     /// Fails for a species index out of range.
@@ -181,10 +181,10 @@ impl Sweep {
         Ok(())
     }
 
-    /// For later evaluations: the excluded pairs, and additions to the densities of owned particles, a
-    /// row of [`Plan::slope_width`] for each, or an empty list.
-    pub(super) fn beside_mut(&mut self) -> (&mut Exclusions, &mut Vec<f64>) {
-        (&mut self.exclusions, &mut self.added_densities)
+    /// The plan, the species of types, and for later evaluations the excluded pairs and additions to the densities of
+    /// owned particles, a row of [`Plan::slope_width`] for each, or an empty list.
+    pub(super) fn beside_mut(&mut self) -> (&Plan, &[i32], &mut Exclusions, &mut Vec<f64>) {
+        (&self.plan, &self.species_of_type, &mut self.exclusions, &mut self.added_densities)
     }
 
     /// The excluded pairs.
@@ -214,7 +214,7 @@ impl Sweep {
     ///
     /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want` the sweep computes the totals only;
-    /// [`PairSums`](super::pair_sums::PairSums) computes energies and virials of single particles.
+    /// [the sums over pairs](super::pair_sums) computes energies and virials of single particles.
     ///
     /// # Errors
     /// Fails for a position, ψ or force that is not finite, when some forces may have been written; also for
@@ -230,9 +230,7 @@ impl Sweep {
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
-        if particles.owned < particles.x.len() {
-            return Err(EngineError::Host("ghosts are not allowed in an evaluation of the whole box"));
-        }
+        particles.check_no_ghosts()?;
         self.run(Around { domain, images: &[] }, particles, v, step, want, force, add)?;
         self.slopes.clear();
         Ok(with!(&self.workspace, m => m.tally()))
@@ -277,9 +275,7 @@ impl Sweep {
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
         }
-        if !images.is_empty() && images.len() != self.all - self.owned {
-            return Err(EngineError::Host("`images` must have one entry per ghost"));
-        }
+        particles.check_images(images)?;
         let input =
             Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
                 .excluding(&self.exclusions);
@@ -304,20 +300,10 @@ impl Sweep {
         want: Want,
     ) -> Result<Option<(PairNoise, f64)>, EngineError> {
         self.ready = false;
-        let all = particles.x.len();
-        if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
-            return Err(EngineError::Host("particle arrays have different lengths"));
-        }
         // Thirty-two times an index must fit into a word; copies of a plane have indices too.
-        if all > 1 << 26 {
-            return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
-        }
-        let thermostat = step
-            .filter(|_| self.plan.thermostat.is_some())
-            .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
-        if thermostat.is_some() && v.len() < all {
-            return Err(EngineError::Host("the velocity array is too short"));
-        }
+        particles.check(26)?;
+        let all = particles.x.len();
+        let thermostat = self.plan.noise_of(step, v, all)?;
         (self.owned, self.all, self.want) = (particles.owned, all, want);
         Ok(thermostat)
     }
@@ -341,7 +327,7 @@ impl Sweep {
     }
 
     /// The slopes, for the host to write those of ghosts.
-    pub fn slopes_mut(&mut self) -> &mut [f64] {
+    pub fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.slopes
     }
 
@@ -370,10 +356,8 @@ impl Sweep {
         })
     }
 
-    /// ψ and local densities of owned particles in the host's order, as
-    /// [`PairSums::excess`](super::pair_sums::PairSums::excess) and
-    /// [`PairSums::local_densities`](super::pair_sums::PairSums::local_densities); densities
-    /// that forces do not need are zero.
+    /// ψ and local densities of owned particles in the host's order, as [`Engine::excess`](super::Engine::excess) and
+    /// [`Results::densities`](super::Results::densities); densities that forces do not need are zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));

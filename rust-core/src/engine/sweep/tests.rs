@@ -1,6 +1,5 @@
 use super::*;
-use crate::engine::pair_sums::PairSums;
-use crate::engine::{Images, Instructions, Surroundings};
+use crate::engine::{Engine, Images, Instructions, Request};
 use crate::maximum::largest;
 use crate::model::Model;
 use nalgebra::Matrix3;
@@ -63,11 +62,11 @@ const STEP: Step = Step { seed: 11, number: 5, dt: 0.01 };
 
 /// Computes forces and totals by the reference.
 fn plain(fluid: &Fluid, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
-    let mut reference = PairSums::new(fluid).unwrap();
-    let particles = cloud.particles();
-    reference.first(Surroundings::Box(&cloud.domain), &particles, false).unwrap();
+    let mut reference = Engine::new(fluid, Settings::default()).unwrap();
+    reference.use_pair_sums_only(true);
+    let request = Request { particles: cloud.particles(), v: &cloud.v, step: Some(STEP), want: Want::TOTALS };
     let mut force = vec![[0.0; 3]; cloud.x.len()];
-    let tally = reference.second(&particles, &cloud.v, Some(STEP), Want::TOTALS, &mut force).unwrap();
+    let tally = reference.forces(&cloud.domain, &request, &mut force, false).unwrap();
     (force, tally)
 }
 

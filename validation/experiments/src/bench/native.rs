@@ -41,11 +41,11 @@ pub fn run(
 ) -> Result<Loop, ExperimentError> {
     let mut simulation = simulation(subject, state, settings)?;
     advance(&mut simulation, subject, length.warm_up)?;
-    let before = simulation.engine().times();
+    let before = simulation.engine().statistics().times;
     let start = Instant::now();
     advance(&mut simulation, subject, length.steps)?;
     let seconds = start.elapsed().as_secs_f64();
-    let after = simulation.engine().times();
+    let after = simulation.engine().statistics().times;
     let mut parts = BTreeMap::new();
     if settings.is_some() {
         let named = [

@@ -103,7 +103,7 @@ impl Forces {
 
     /// The order of the particles in the last sweep; `None` before a sweep.
     pub fn order(&self) -> Option<&[u32]> {
-        self.engine.order()
+        self.engine.results().order
     }
 
     pub fn count_out_of_bounds_from(&mut self, earlier: [u64; 2]) {
@@ -125,7 +125,7 @@ impl Forces {
     }
 
     fn out_of_bounds(&self) -> [u64; 2] {
-        let now = self.engine.out_of_bounds();
+        let now = self.engine.statistics().out_of_bounds;
         std::array::from_fn(|k| self.earlier_out_of_bounds[k] + now[k])
     }
 }
@@ -166,7 +166,7 @@ impl Simulation {
     pub fn evaluation(&self) -> String {
         let Forces { engine, all_densities, .. } = &self.forces;
         let want = Want { densities: *all_densities, ..Want::FORCES };
-        engine.describe(engine.path_for(Surroundings::Box(self.domain()), want))
+        engine.path_for(Surroundings::Box(self.domain()), want).describe(engine.settings())
     }
 
     pub fn model(&self) -> &Model {
@@ -193,13 +193,13 @@ impl Simulation {
 
     /// Number of runs of each pass of the engine since the last change of temperature.
     pub fn counts(&self) -> PassCounts {
-        self.forces.engine.counts()
+        self.forces.engine.statistics().counts
     }
 
     /// Local densities of the particles in the last evaluation, if [`Simulation::sum_all_densities`] enabled
     /// them: one for each density and species, density-major.
     pub fn local_densities(&self) -> &[f64] {
-        self.forces.engine.local_densities()
+        self.forces.engine.results().densities
     }
 
     /// Sets whether evaluations compute every density of the model.

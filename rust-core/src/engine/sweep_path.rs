@@ -1,0 +1,181 @@
+//! The sweep, and the special pairs, which it leaves out and sums over a list of pairs add.
+
+use super::error::EngineError;
+use super::evaluate::Evaluate;
+use super::fault::Fault;
+use super::pair_sums::Corrections;
+use super::request::{Request, Results};
+use super::surroundings::{Around, SpecialPair, Surroundings};
+use super::sweep::Sweep;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::tally::{Tally, Want};
+
+/// The forces of one fluid by a sweep, with special pairs.
+#[derive(Debug, Clone)]
+pub struct SweepPath {
+    pub sweep: Sweep,
+    special: Vec<SpecialPair>,
+    /// Whether the sweep leaves the special pairs out.
+    excludes_special: bool,
+    corrections: Corrections,
+    /// ψ of owned particles and their densities in the last evaluation, if they have been fetched.
+    excess: Vec<f64>,
+    densities: Vec<f64>,
+}
+
+impl SweepPath {
+    pub fn new(sweep: Sweep) -> SweepPath {
+        SweepPath {
+            sweep,
+            special: Vec::new(),
+            excludes_special: true,
+            corrections: Corrections::default(),
+            excess: Vec::new(),
+            densities: Vec::new(),
+        }
+    }
+
+    pub fn special(&self) -> &[SpecialPair] {
+        &self.special
+    }
+
+    /// Sets the pairs with reduced strength; those with a factor of 1 are ordinary pairs.
+    pub fn set_special(&mut self, pairs: impl IntoIterator<Item = SpecialPair>) {
+        self.special.clear();
+        self.special.extend(pairs.into_iter().filter(|pair| pair.factor != 1.0));
+        self.excludes_special = false;
+    }
+
+    /// Discards ψ and densities of the last evaluation.
+    pub fn forget(&mut self) {
+        self.excess.clear();
+        self.densities.clear();
+    }
+
+    /// Whether forces need every density of the model.
+    pub fn has_all_densities(&self) -> bool {
+        let plan = self.sweep.plan();
+        plan.density_passes().len() == plan.densities().count()
+    }
+
+    /// Gets all densities of the last evaluation if it computed them; returns whether it did.
+    pub fn fetch_densities(&mut self) -> bool {
+        if self.densities.is_empty() && self.has_all_densities() {
+            self.sweep.local_densities(&mut self.excess, &mut self.densities);
+        }
+        !self.densities.is_empty()
+    }
+
+    /// The densities of owned particles, for those that the sweep did not sum.
+    pub fn densities_mut(&mut self) -> &mut Vec<f64> {
+        &mut self.densities
+    }
+
+    /// Computes the contributions of special pairs, and adds those to the densities.
+    fn begin(&mut self, around: Around, request: &Request) -> Result<(), EngineError> {
+        let SweepPath { sweep, special, corrections, excludes_special, .. } = self;
+        let (plan, species_of_type, exclusions, densities) = sweep.beside_mut();
+        exclusions.check(request.particles.x.len())?;
+        corrections.find(
+            (plan, species_of_type),
+            (special, exclusions),
+            around,
+            &request.particles,
+            densities,
+        )?;
+        if !*excludes_special {
+            exclusions.set(special);
+            *excludes_special = true;
+        }
+        Ok(())
+    }
+
+    /// Adds the forces of special pairs to those of a sweep, whose slopes are complete.
+    fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
+        self.corrections.add_forces(self.sweep.plan(), self.sweep.slopes(), request, force)
+    }
+
+    /// Stores the densities if the request includes them.
+    fn fetch(&mut self, want: Want) {
+        if want.densities {
+            self.sweep.local_densities(&mut self.excess, &mut self.densities);
+        }
+    }
+
+    /// Size in bytes of the arrays over particles and pairs.
+    pub fn memory(&self) -> usize {
+        let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.memory();
+        let numbers = self.excess.capacity() + self.densities.capacity();
+        self.sweep.memory() + special + numbers * size_of::<f64>()
+    }
+}
+
+impl Evaluate for SweepPath {
+    fn whole(
+        &mut self,
+        domain: &PeriodicBox,
+        request: &Request,
+        force: &mut [[f64; 3]],
+        add: bool,
+    ) -> Result<Tally, EngineError> {
+        let Request { particles, v, step, want } = request;
+        self.begin(Around { domain, images: &[] }, request)?;
+        let mut tally = self.sweep.evaluate(domain, particles, v, *step, *want, force, add)?;
+        if !self.corrections.is_empty() {
+            self.sweep.fetch_slopes(particles.owned);
+            tally += self.correct(request, force)?;
+        }
+        self.fetch(*want);
+        let factor = Fault::factor(Fault::Virial, self.sweep.plan().fault);
+        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= factor);
+        Ok(tally)
+    }
+
+    fn first(
+        &mut self,
+        surroundings: Surroundings,
+        request: &Request,
+        force: &mut [[f64; 3]],
+    ) -> Result<(), EngineError> {
+        let around = match surroundings {
+            Surroundings::Ghosts(around, _) => around,
+            Surroundings::Box(domain) => Around { domain, images: &[] },
+            Surroundings::Listed(..) => return Err(EngineError::Host("a sweep finds its pairs itself")),
+        };
+        let Request { particles, v, step, want } = request;
+        self.begin(around, request)?;
+        self.sweep.first(around, particles, v, *step, *want, force)
+    }
+
+    fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
+        let mut tally = self.sweep.second(&request.particles, force)?;
+        if !self.corrections.is_empty() {
+            tally += self.correct(request, force)?;
+        }
+        self.fetch(request.want);
+        Ok(tally)
+    }
+
+    fn slopes(&self) -> &[f64] {
+        self.sweep.slopes()
+    }
+
+    fn slopes_mut(&mut self) -> &mut Vec<f64> {
+        self.sweep.slopes_mut()
+    }
+
+    fn fetch_slopes(&mut self, all: usize) {
+        self.sweep.fetch_slopes(all);
+    }
+
+    fn results(&self) -> Results<'_> {
+        Results { densities: &self.densities, order: Some(self.sweep.order()), ..Results::default() }
+    }
+
+    fn excess(&mut self) -> &[f64] {
+        if self.excess.is_empty() {
+            self.sweep.local_densities(&mut self.excess, &mut Vec::new());
+        }
+        &self.excess
+    }
+}
