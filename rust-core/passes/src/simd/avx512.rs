@@ -1,15 +1,15 @@
 //! Vectors for AVX-512 (F, BW, DQ, VL), with or without VBMI2; with AVX2, FMA and BMI2.
 
-use super::avx2::U32x8;
+use super::avx2::{Avx2, U32x8};
 use super::x86::{Quad4, operators};
 use super::{
-    BroadcastPair, Isa, OFFSET_BITS, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at,
+    BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at,
 };
 use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
-/// The instruction set; with `VBMI2` it compresses bytes.
+/// The instruction set; with `VBMI2` it compresses bytes, without it makes the lists of AVX2.
 #[derive(Clone, Copy)]
 pub struct Avx512<const VBMI2: bool>;
 
@@ -423,38 +423,6 @@ unsafe fn expand_bytes(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
     }
 }
 
-/// Byte offsets of sixteen particles.
-static OFFSETS: Line<[u32; 16]> = Line(offsets());
-
-const fn offsets() -> [u32; 16] {
-    let mut offsets = [0; 16];
-    let mut k = 0;
-    while k < 16 {
-        offsets[k] = (k as u32) << OFFSET_BITS;
-        k += 1;
-    }
-    offsets
-}
-
-/// Expands as [`Isa::expand_mask`], sixteen bits at a time.
-#[inline(always)]
-unsafe fn expand_words(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
-    unsafe {
-        let offsets = _mm512_load_si512((&raw const OFFSETS).cast());
-        let mut found = 0;
-        let mut k = 0;
-        while k < 4 {
-            let mask = (mask >> (16 * k)) as u16;
-            let base = _mm512_set1_epi32(*j_bases.add(k) as i32);
-            let packed = _mm512_maskz_compress_epi32(mask, _mm512_add_epi32(base, offsets));
-            _mm512_storeu_si512(p.add(found).cast(), packed);
-            found += mask.count_ones() as usize;
-            k += 1;
-        }
-        found
-    }
-}
-
 impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
     type F32 = F32x16;
     type F64 = F64x8;
@@ -503,7 +471,7 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
     }
     #[inline(always)]
     unsafe fn expand_mask(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
-        unsafe { if VBMI2 { expand_bytes(j_bases, mask, p) } else { expand_words(j_bases, mask, p) } }
+        unsafe { if VBMI2 { expand_bytes(j_bases, mask, p) } else { Avx2::expand_mask(j_bases, mask, p) } }
     }
     #[inline(always)]
     unsafe fn root_or_more(x: F32x16) -> F32x16 {
