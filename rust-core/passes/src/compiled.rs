@@ -39,43 +39,30 @@ pub trait PairPrecision: Send + Sync + Sized + 'static {
     unsafe fn second(passes: &Passes<Self>, pass: Second<Self>);
 }
 
-impl PairPrecision for Mixed {
-    type Scalar = f32;
-    type PackedParticle = MixedParticle;
-    type On<I: Isa> = Mixed;
+macro_rules! precisions {
+    ($($precision:ident: $scalar:ty, $particle:ty);+) => {$(
+        impl PairPrecision for $precision {
+            type Scalar = $scalar;
+            type PackedParticle = $particle;
+            type On<I: Isa> = $precision;
 
-    #[inline(never)]
-    unsafe fn first(passes: &Passes<Mixed>, pass: First<Mixed>) -> Tally {
-        // SAFETY: the scheduler starts a first pass after it has filled this plane and the next, and
-        // lets no other thread have its sums.
-        unsafe { passes.first(pass) }
-    }
+            #[inline(never)]
+            unsafe fn first(passes: &Passes<$precision>, pass: First<$precision>) -> Tally {
+                // SAFETY: the scheduler starts a first pass after it has filled this plane and the next, and
+                // lets no other thread have its sums.
+                unsafe { passes.first(pass) }
+            }
 
-    #[inline(never)]
-    unsafe fn second(passes: &Passes<Mixed>, pass: Second<Mixed>) {
-        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
-        unsafe { passes.second(pass) }
-    }
+            #[inline(never)]
+            unsafe fn second(passes: &Passes<$precision>, pass: Second<$precision>) {
+                // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
+                unsafe { passes.second(pass) }
+            }
+        }
+    )+};
 }
 
-impl PairPrecision for Double {
-    type Scalar = f64;
-    type PackedParticle = DoubleParticle;
-    type On<I: Isa> = Double;
-
-    #[inline(never)]
-    unsafe fn first(passes: &Passes<Double>, pass: First<Double>) -> Tally {
-        // SAFETY: the scheduler starts a first pass after it has filled this plane and the next, and
-        // lets no other thread have its sums.
-        unsafe { passes.first(pass) }
-    }
-
-    #[inline(never)]
-    unsafe fn second(passes: &Passes<Double>, pass: Second<Double>) {
-        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
-        unsafe { passes.second(pass) }
-    }
-}
+precisions!(Mixed: f32, MixedParticle; Double: f64, DoubleParticle);
 
 /// The passes of one fluid.
 pub struct Passes<P> {
