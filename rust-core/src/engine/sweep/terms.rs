@@ -128,7 +128,8 @@ fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm, factor: f64) {
             });
             set_spline(&mut terms.spline[at], form, entries);
         }
-        PairPotential::Expression(_) | PairPotential::Table(_) => terms.scalar_fallback.push(term.clone()),
+        // The other forms have no vector loops: `PairForm::block` computes the pairs of a batch.
+        _ => terms.scalar_fallback.push(term.clone()),
     }
 }
 
