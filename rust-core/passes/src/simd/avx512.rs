@@ -2,9 +2,7 @@
 
 use super::avx2::{Avx2, U32x8};
 use super::x86::{Quad4, operators};
-use super::{
-    BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at,
-};
+use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
 use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
