@@ -1,7 +1,6 @@
 #include "pair_psi.h"
 
 #include "compat.h"
-#include "fix_splitting.h"
 #include "restart.h"
 
 #include "atom.h"
@@ -9,6 +8,7 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
+#include "fix.h"
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
@@ -105,26 +105,26 @@ void PairPsi::read_temperature(const char *arg)
   const double t = utils::numeric(FLERR, arg, false, lmp);
   if (!(t > 0.0) || !std::isfinite(t))
     stop(std::string("the temperature must be positive, found ") + arg);
-  temperature = t;
+  given.temperature = t;
 }
 
 double PairPsi::kt() const
 {
-  return force->boltz * temperature;
+  return force->boltz * given.temperature;
 }
 
 void PairPsi::read_seed(const char *arg)
 {
   const bigint value = utils::bnumeric(FLERR, arg, false, lmp);
   if (value <= 0) stop(std::string("the seed must be a positive whole number, found ") + arg);
-  seed = static_cast<uint64_t>(value);
+  given.seed = static_cast<uint64_t>(value);
 }
 
 // Reads the keywords that all styles share, at the end of pair_style; the other keywords belong to one style.
 void PairPsi::read_keywords(int first, int narg, char **arg)
 {
-  mixed = false;
-  threads = 1;
+  given.mixed = false;
+  given.threads = 1;
   for (int k = first; k < narg; k += 2) {
     const std::string key = arg[k];
     if (k + 1 >= narg) stop("keyword '" + key + "' needs a value");
@@ -133,10 +133,10 @@ void PairPsi::read_keywords(int first, int narg, char **arg)
     if (key == "precision") {
       if (value != "mixed" && value != "double")
         stop("unknown precision '" + value + "': expected 'mixed' or 'double'");
-      mixed = value == "mixed";
+      given.mixed = value == "mixed";
     } else if (key == "threads") {
       const int count = utils::inumeric(FLERR, value.c_str(), false, lmp);
-      threads = std::max(count, 0);
+      given.threads = std::max(count, 0);
     } else {
       stop("unknown keyword '" + key + "': expected " + keywords());
     }
@@ -146,7 +146,7 @@ void PairPsi::read_keywords(int first, int narg, char **arg)
 void PairPsi::settings(int narg, char **arg)
 {
   read_settings(narg, arg);
-  arguments.assign(arg, arg + narg);
+  given.arguments.assign(arg, arg + narg);
   // init_style() builds an engine with the new settings, and describes it.
   style.reset();
   described = false;
@@ -156,18 +156,17 @@ void PairPsi::settings(int narg, char **arg)
 void PairPsi::refresh()
 {
   if (style && !is_stale() && kt() == built_kt) return;
-  if (!(temperature > 0.0) || !std::isfinite(temperature))
-    stop("the temperature must be positive, found " + std::to_string(temperature));
-  // A new engine has no special pairs and no exclusions.
-  told_special = SIZE_MAX;
-  told_marks = false;
+  if (!(given.temperature > 0.0) || !std::isfinite(given.temperature))
+    stop("the temperature must be positive, found " + std::to_string(given.temperature));
+  special.forget();
+  exclusions.forget();
   std::string trouble;
   try {
     if (!style || is_stale())
       style.emplace(make_style(kt()));
     else
       (*style)->set_temperature(kt());
-    (*style)->configure(mixed, threads);
+    (*style)->configure(given.mixed, given.threads);
   } catch (const std::exception &e) {
     trouble = e.what();
   }
@@ -178,24 +177,23 @@ void PairPsi::refresh()
 void PairPsi::init_style()
 {
   refresh();
-  apart = FixSplitting::find(modify) != nullptr;
+  apart = has_splitting();
   check_host();
   check_callers();
   check_box();
   lost_atoms.begin(atom, world);
   // LAMMPS sizes its buffers by this; later communications never send more.
   comm_forward = static_cast<int>((*style)->variables());
-  asked.assign(static_cast<size_t>(atom->ntypes) * atom->ntypes, 0);
+  exclusions.begin(neighbor, atom->ntypes);
 
   why_listed.clear();
   const auto because = [this](const std::string &text) { why_listed += (why_listed.empty() ? "" : " and ") + text; };
-  if (is_scaled()) {
+  if (SpecialPairs::are_scaled(atom, force)) {
     if (atom->molecular == Atom::TEMPLATE) because("special_bonds with atom_style template");
     if (atom->map_style == Atom::MAP_NONE) because("special_bonds without an atom map");
     if (is_narrow()) because("special_bonds in a box narrower than twice the cut-off");
   }
-  rules = neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol;
-  if (neighbor->nex_type + neighbor->nex_group > most_rules || neighbor->nex_mol > 1)
+  if (neighbor->nex_type + neighbor->nex_group > Exclusions::most_rules || neighbor->nex_mol > 1)
     because("more exclusions of neigh_modify than it can keep");
   if (neighbor->includegroup) because("neigh_modify include");
   // These fixes exclude a group of their own, and do so only after pair styles have requested their lists.
@@ -204,9 +202,9 @@ void PairPsi::init_style()
     for (const char *known : {"gcmc", "widom", "charge/regulation"})
       if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
   }
-  if (!why_listed.empty()) full_list = request_list(neighbor, this, instance_me, 0);
+  if (!why_listed.empty()) listed.full = request_list(neighbor, this, instance_me, 0);
   // With newton off a half list contains the pairs of owned atoms with ghosts on both sides, which is sufficient.
-  if (!why_listed.empty() && !full_list && force->newton_pair)
+  if (!why_listed.empty() && !listed.full && force->newton_pair)
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
   if (!described && comm->me == 0)
@@ -222,8 +220,8 @@ void PairPsi::advise()
     warn("there is no accelerated variant, and the suffix has no effect: use the keywords 'precision mixed' and "
          "'threads'");
   const size_t used = (*style)->threads();
-  if (used < threads)
-    warn("threads " + std::to_string(threads) + " is more than the processors that this process may use: using " +
+  if (used < given.threads)
+    warn("threads " + std::to_string(given.threads) + " is more than the processors that this process may use: using " +
          std::to_string(used) + ", with the same results");
 }
 
@@ -232,7 +230,7 @@ std::string PairPsi::advice()
 {
   std::string text;
   const auto add = [&text](const std::string &line) { text += "  advice        " + line + "\n"; };
-  if (why_listed.empty() && !mixed) add("'precision mixed' evaluates forces some 1.3 times faster");
+  if (why_listed.empty() && !given.mixed) add("'precision mixed' evaluates forces some 1.3 times faster");
   // Bonds and other styles leave forces on ghosts, and need them.
   if (why_listed.empty() && force->pair == this && atom->molecular == Atom::ATOMIC) {
     if (force->newton)
@@ -243,7 +241,7 @@ std::string PairPsi::advice()
           "step, unless a compute or fix needs them");
   }
   const auto is_nve = [](const Fix *fix) { return strcmp(fix->style, "nve") == 0; };
-  if (!apart && why_listed.empty() && rules == 0 && std::any_of(modify->fix, modify->fix + modify->nfix, is_nve))
+  if (!apart && why_listed.empty() && exclusions.rules() == 0 && std::any_of(modify->fix, modify->fix + modify->nfix, is_nve))
     add("'fix dpd/splitting' in place of fix nve takes timesteps six times as long: some 1.5 to 2 times faster, and with "
         "force-gradient more accurate");
   return text;
@@ -253,13 +251,13 @@ std::string PairPsi::search()
 {
   if (why_listed.empty()) {
     std::string text = "own cell list every step; no neighbor list is requested";
-    if (rules > 0) text += "\n  exclusions    pairs that neigh_modify excludes are left out";
-    if (is_scaled())
+    if (exclusions.rules() > 0) text += "\n  exclusions    pairs that neigh_modify excludes are left out";
+    if (SpecialPairs::are_scaled(atom, force))
       text += "\n  special bonds factors above 0 scale phi and w of bonded neighbors, not drag and noise; with 0 they do not "
               "interact\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others";
     return text;
   }
-  return std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
+  return std::string(listed.full ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
       ": pairs that are not in it do not interact, special factors scale phi and w";
 }
 
@@ -269,15 +267,15 @@ double PairPsi::init_one(int i, int j)
     stop("no coefficients for types " + std::to_string(i) + " and " + std::to_string(j) +
          ": this style does not mix them, set them with pair_coeff");
   refresh();
-  asked[static_cast<size_t>(i - 1) * atom->ntypes + j - 1] = 1;
+  exclusions.ask(i, j);
   return (*style)->cutoff();
 }
 
 // Writes the present temperature, which may have changed since pair_style gave it.
 void PairPsi::write_restart_settings(FILE *fp)
 {
-  auto now = arguments;
-  if (!now.empty()) now[0] = exact(temperature);
+  auto now = given.arguments;
+  if (!now.empty()) now[0] = exact(given.temperature);
   write_texts(fp, now);
 }
 
@@ -305,9 +303,7 @@ void PairPsi::read_restart(FILE *fp)
 double PairPsi::memory_usage()
 {
   double bytes = Pair::memory_usage();
-  bytes += (pair_i.capacity() + pair_j.capacity()) * sizeof(int32_t) + pair_factor.capacity() * sizeof(double);
-  bytes += special.capacity() * sizeof(SpecialPair) + marks.capacity() * sizeof(uint32_t);
-  bytes += vectors.capacity() * sizeof(double);
+  bytes += listed.bytes() + special.bytes() + exclusions.bytes() + exchange.vectors.capacity() * sizeof(double);
   if (style) bytes += static_cast<double>((*style)->memory());
   return bytes;
 }

@@ -3,10 +3,13 @@
 #ifndef PSIDPD_PAIR_PSI_H
 #define PSIDPD_PAIR_PSI_H
 
-#include "images.h"
+#include "exclusions.h"
+#include "ghost_exchange.h"
+#include "listed_pairs.h"
 #include "lost_atoms.h"
 #include "pair.h"
 #include "psidpd-lammps/src/bridge.rs.h"
+#include "special_pairs.h"
 
 #include <array>
 #include <cstdint>
@@ -96,17 +99,14 @@ class PairPsi : public LAMMPS_NS::Pair {
   Extent extent() const;
   bool is_alone(const Extent &extent) const;
   void find_images();
-  void find_densities(int all, const Request &request, rust::Slice<double> f);
-  void collect_pairs();
-  // Whether special_bonds gives bonded neighbors factors other than 1.
-  bool is_scaled() const;
+  Atoms atoms(size_t count) const;
+  void find_densities(const Atoms &atoms, const Request &request, rust::Slice<double> f);
   // Whether atoms may see two images of each other.
   bool is_narrow() const;
-  void find_special();
-  // Pairs of types with coefficients that a hybrid gives to other styles alone.
-  std::vector<std::array<int, 2>> pairs_elsewhere() const;
-  void find_exclusions();
-  void tell_special(size_t count);
+  // Passes special pairs, those of owned atoms alone or all, and exclusions to the engine.
+  void tell_left_out(bool owned_alone);
+  // Whether a fix applies drag and noise.
+  bool has_splitting() const;
   void forward();
   void forward_vectors();
   rust::Slice<const bool> left_out(Extent &extent, const Request &request) const;
@@ -135,53 +135,33 @@ class PairPsi : public LAMMPS_NS::Pair {
     stop_here(trouble, file, line);
   }
 
-  double temperature = 0.0;
+  // The arguments of pair_style.
+  struct Given {
+    double temperature = 0.0;
+    uint64_t seed = 0;
+    bool mixed = false;
+    size_t threads = 1;
+    std::vector<std::string> arguments;
+  };
+  Given given;
   double built_kt = 0.0;
-  uint64_t seed = 0;
-  bool mixed = false;
-  size_t threads = 1;
-  std::vector<std::string> arguments;
   bool described = false;
   std::vector<double *> density_rows;
 
-  // Content of a communication: columns of the slopes, flags of images, or vectors.
-  enum class Carries { slopes, images, vectors };
-  Carries carries = Carries::slopes;
-  int first_column = 0;
-
   LostAtoms lost_atoms;
-  Images images;
+  GhostExchange exchange;
   // Whether ghosts are away from the images of their atoms, in this evaluation.
   bool strained = false;
-
-  // Whether a fix applies drag and noise.
+  // Whether a fix applied drag and noise at setup.
   bool apart = false;
-  // Vectors of atoms and ghosts.
-  std::vector<double> vectors;
-
   // Numbers of atoms and ghosts of an evaluation without slopes of ghosts; single() computes those that it needs.
   std::array<int, 2> without_slopes{-1, -1};
 
   // Why pairs come from LAMMPS's neighbor list; empty if the engine finds them.
   std::string why_listed;
-  bool full_list = true;
-  std::vector<int32_t> pair_i, pair_j;
-  std::vector<double> pair_factor;
-  // Bonded neighbors with a factor other than 1. In the first `special_owned` pairs both atoms are of
-  // this rank; the others have ghosts.
-  std::vector<SpecialPair> special;
-  size_t special_owned = 0;
-  // Number of special pairs that the engine has; SIZE_MAX if its pairs are outdated.
-  size_t told_special = SIZE_MAX;
-  // Most rules of neigh_modify for types and groups: a word has room for the two sides of each.
-  static constexpr int most_rules = 16;
-  // Number of pairs of types, groups and molecules that neigh_modify excluded at setup, and the marks of their members.
-  int rules = 0;
-  std::vector<uint32_t> marks;
-  // Whether LAMMPS asked for the cut-off of a pair of types, at row-major places: a hybrid asks for its own pairs only.
-  std::vector<char> asked;
-  bool between_molecules = false;
-  bool told_marks = false;
+  ListedPairs listed;
+  SpecialPairs special;
+  Exclusions exclusions;
 };
 
 }    // namespace psidpd

@@ -45,10 +45,10 @@ void PairPsi::check_host()
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
 }
 
-bool PairPsi::is_scaled() const
+bool PairPsi::has_splitting() const
 {
-  const double *factor = force->special_lj;
-  return atom->molecular != Atom::ATOMIC && (factor[1] != 1.0 || factor[2] != 1.0 || factor[3] != 1.0);
+  return std::any_of(modify->fix, modify->fix + modify->nfix,
+                     [](const Fix *fix) { return strcmp(fix->style, "dpd/splitting") == 0; });
 }
 
 bool PairPsi::is_narrow() const

@@ -3,13 +3,13 @@
 #include "pair_psi.h"
 
 #include "compat.h"
-#include "fix_splitting.h"
 #include "slices.h"
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
 #include "force.h"
+#include "group.h"
 #include "modify.h"
 #include "neighbor.h"
 #include "update.h"
@@ -51,12 +51,10 @@ void PairPsi::find_images()
   const auto closed = extent().closed;
   // All ranks have the same box and so decide alike.
   const bool none = !why_listed.empty() || closed == std::array<bool, 3>{};
-  images.begin(closed, atom->nlocal, none ? 0 : atom->nghost);
+  exchange.images.begin(closed, atom->nlocal, none ? 0 : atom->nghost);
   if (none) return;
-  carries = Carries::images;
   comm_forward = 1;
-  forward_values(comm, this, 0);
-  carries = Carries::slopes;
+  exchange.carry(GhostExchange::Carries::images, [this] { forward_values(comm, this, 0); });
 }
 
 // Flags of the ghosts that are images along closed directions. Where these are not known, the box is
@@ -64,29 +62,34 @@ void PairPsi::find_images()
 rust::Slice<const bool> PairPsi::left_out(Extent &extent, const Request &request) const
 {
   // Images are flagged only along directions that were closed when ghosts were found.
-  if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
-    return {images.flags(), static_cast<size_t>(atom->nghost)};
+  if (!strained && exchange.images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
+    return {exchange.images.flags(), static_cast<size_t>(atom->nghost)};
   extent.closed = {};
   return {};
 }
 
-// Densities and slopes; without a neighbor list also all forces but those of the slopes of ghosts.
-void PairPsi::find_densities(int all, const Request &request, rust::Slice<double> f)
+// The atoms of this rank and the first ghosts, `count` in all.
+Atoms PairPsi::atoms(size_t count) const
 {
-  const size_t owned = atom->nlocal;
-  const auto x = flat(atom->x, all);
-  const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
-  const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
+  Atoms atoms{};
+  atoms.owned = atom->nlocal;
+  atoms.x = flat(atom->x, static_cast<int>(count));
+  atoms.v = flat(atom->v, static_cast<int>(count));
+  atoms.tag = {atom->tag, count};
+  atoms.kind = {atom->type, count};
+  return atoms;
+}
+
+// Densities and slopes; without a neighbor list also all forces but those of the slopes of ghosts.
+void PairPsi::find_densities(const Atoms &atoms, const Request &request, rust::Slice<double> f)
+{
   if (why_listed.empty()) {
     Extent extent = this->extent();
     const auto images = left_out(extent, request);
-    style_densities(**style, extent, images, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
-                    request, f);
+    style_densities(**style, extent, images, force->newton_pair, atoms, request, f);
     return;
   }
-  collect_pairs();
-  densities_of_pairs(**style, owned, x, tag, kind, force->newton_pair, {pair_i.data(), pair_i.size()},
-                     {pair_j.data(), pair_j.size()}, {pair_factor.data(), pair_factor.size()});
+  densities_of_pairs(**style, listed.collect(list, atom, force), force->newton_pair, atoms, request);
 }
 
 // Sends slopes from owners to ghosts.
@@ -95,8 +98,10 @@ void PairPsi::forward()
   const int width = static_cast<int>((*style)->slope_width());
   // Inside a hybrid LAMMPS has sized its buffers before it knew the number of our columns; its buffers fit positions.
   const int most = force->pair == this ? width : 3;
-  for (first_column = 0; first_column < width; first_column += comm_forward) {
-    comm_forward = std::min(most, width - first_column);
+  for (int first = 0; first < width; first += comm_forward) {
+    comm_forward = std::min(most, width - first);
+    exchange.first_column = first;
+    exchange.columns = comm_forward;
     forward_values(comm, this, 0);
   }
 }
@@ -110,33 +115,30 @@ void PairPsi::compute(int eflag, int vflag)
     check_ghosts();
     check_lost();
     if (domain->box_change) check_box();
-    if (why_listed.empty() && neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol != rules)
+    if (why_listed.empty() && !exclusions.are_known(neighbor))
       stop("pairs were excluded after the setup of the style, perhaps by a fix: run again");
-    if (why_listed.empty() && is_scaled() && is_narrow())
+    if (why_listed.empty() && SpecialPairs::are_scaled(atom, force) && is_narrow())
       stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
     find_images();
-    find_special();
-    find_exclusions();
+    special.find(atom, force, why_listed.empty());
+    const std::string trouble = exclusions.find(atom, neighbor, group, setflag, why_listed.empty());
+    if (!trouble.empty()) stop(trouble);
   }
 
   const size_t owned = atom->nlocal;
   const int all = atom->nlocal + atom->nghost;
   const bool newton = force->newton_pair;
-  const auto x = flat(atom->x, all);
-  const auto v = flat(atom->v, all);
-  const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
-  const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
   Style &fluid = **style;
 
   Request request;
   // A minimiser follows the gradient of U, to which drag and noise do not belong.
   request.thermostat = fluid.needs_velocities() && !apart && update->whichflag != 2;
-  request.seed = seed;
+  request.seed = given.seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
   request.dt = update->dt;
   if (request.thermostat && !comm->ghost_velocity)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
-  if (apart != (FixSplitting::find(modify) != nullptr))
+  if (apart != has_splitting())
     stop("fix dpd/splitting was made or removed after the last setup: run without 'pre no'");
   if (request.thermostat && !(update->dt > 0.0))
     stop("the thermostat needs a timestep greater than 0, found " + std::to_string(update->dt));
@@ -152,20 +154,18 @@ void PairPsi::compute(int eflag, int vflag)
   rust::Slice<double> f;
   if (reach > 0) f = {atom->f[0], 3 * reach};
   const Extent box = extent();
-  strained = images.have_moved(atom, domain);
+  strained = exchange.images.have_moved(atom, domain);
   const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
-  tell_special(alone ? special_owned : special.size());
+  tell_left_out(alone);
   Totals totals;
   if (alone) {
-    totals = attempt([&] {
-      return style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
-                            {atom->type, owned}, request, f);
-    });
+    totals = attempt([&] { return style_evaluate(fluid, box, atoms(owned), request, f); });
     without_slopes = {atom->nlocal, atom->nghost};
   } else {
-    attempt([&] { find_densities(all, request, f); });
+    const Atoms with_ghosts = atoms(all);
+    attempt([&] { find_densities(with_ghosts, request, f); });
     forward();
-    totals = attempt([&] { return style_forces(fluid, owned, x, v, tag, kind, request, f); });
+    totals = attempt([&] { return style_forces(fluid, with_ghosts, request, f); });
     without_slopes = {-1, -1};
   }
 
@@ -192,35 +192,21 @@ void PairPsi::compute(int eflag, int vflag)
 
 int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
 {
-  if (carries == Carries::images) {
-    images.pack(n, list, buf, pbc_flag, pbc);
-    return n;
-  }
-  if (carries == Carries::vectors) {
-    for (int i = 0; i < n; i++) buf = std::copy_n(&vectors[3 * list[i]], 3, buf);
-    return 3 * n;
-  }
-  const auto slopes = (*style)->slopes_mut();
-  const size_t width = (*style)->slope_width();
-  for (int i = 0; i < n; i++)
-    for (int k = 0; k < comm_forward; k++) *buf++ = slopes[list[i] * width + first_column + k];
-  return n * comm_forward;
+  return exchange.pack(n, list, buf, pbc_flag, pbc, (*style)->slopes_mut().data(), (*style)->slope_width());
 }
 
 void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
-  if (carries == Carries::images) {
-    images.unpack(n, first, buf);
-    return;
-  }
-  if (carries == Carries::vectors) {
-    std::copy_n(buf, 3 * n, vectors.begin() + 3 * first);
-    return;
-  }
-  auto slopes = (*style)->slopes_mut();
-  const size_t width = (*style)->slope_width();
-  for (int i = first; i < first + n; i++)
-    for (int k = 0; k < comm_forward; k++) slopes[i * width + first_column + k] = *buf++;
+  exchange.unpack(n, first, buf, (*style)->slopes_mut().data(), (*style)->slope_width());
+}
+
+// Passes pairs that are left out, or scaled, to the engine, unless it has them.
+void PairPsi::tell_left_out(bool owned_alone)
+{
+  attempt([&] {
+    exclusions.tell(**style);
+    special.tell(**style, owned_alone);
+  });
 }
 
 // Whether the atoms, their types and their distance are those of the last evaluation.
@@ -272,7 +258,7 @@ double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, d
 void *PairPsi::extract(const char *what, int &dim)
 {
   dim = 0;
-  if (strcmp(what, "T") == 0 || strcmp(what, "temperature") == 0) return &temperature;
+  if (strcmp(what, "T") == 0 || strcmp(what, "temperature") == 0) return &given.temperature;
   return nullptr;
 }
 
@@ -288,9 +274,8 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
   // Forces may not have needed all densities.
-  const size_t all = atom->nlocal + atom->nghost;
-  tell_special(special.size());
-  attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });
+  tell_left_out(false);
+  attempt([&] { psidpd::sum_densities(**style, atoms(atom->nlocal + atom->nghost)); });
   const auto densities = (*style)->densities_of_owned();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;

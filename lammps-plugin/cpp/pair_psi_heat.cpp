@@ -3,7 +3,6 @@
 #include "pair_psi.h"
 
 #include "compat.h"
-#include "slices.h"
 
 #include "atom.h"
 #include "domain.h"
@@ -18,10 +17,10 @@ using namespace psidpd;
 std::string PairPsi::why_not_apart() const
 {
   if (!why_listed.empty()) return "pairs come from a neighbor list, because of " + why_listed;
-  if (rules > 0) return "neigh_modify excludes pairs from interacting";
-  if (!pairs_elsewhere().empty()) return "the hybrid gives pairs of types that this style knows to another style alone";
+  if (exclusions.rules() > 0) return "neigh_modify excludes pairs from interacting";
+  if (!exclusions.pairs_elsewhere(setflag).empty()) return "the hybrid gives pairs of types that this style knows to another style alone";
   const double *factor = force->special_lj;
-  if (is_scaled() && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
+  if (SpecialPairs::are_scaled(atom, force) && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
     return "special_bonds has factors of 0; in DPD bonded atoms interact like all others, with 'special_bonds lj 1 1 1'";
   if (domain->deform_vremap) return "fix deform changes velocities at the edges of the box ('remap v')";
   return {};
@@ -30,10 +29,8 @@ std::string PairPsi::why_not_apart() const
 // Sends vectors from owners to ghosts.
 void PairPsi::forward_vectors()
 {
-  carries = Carries::vectors;
   comm_forward = 3;
-  forward_values(comm, this, 0);
-  carries = Carries::slopes;
+  exchange.carry(GhostExchange::Carries::vectors, [this] { forward_values(comm, this, 0); });
 }
 
 void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial)
@@ -42,7 +39,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   const size_t owned = atom->nlocal;
   const int all = atom->nlocal + atom->nghost;
   Heat what;
-  what.seed = seed;
+  what.seed = given.seed;
   what.step = static_cast<uint64_t>(update->ntimestep);
   what.uniform = uniform;
   what.time = time;
@@ -55,8 +52,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   if (!alone) flags = attempt([&] { return left_out(box, forces); });
   const size_t reach = alone ? owned : all;
   const bool acts = attempt([&] {
-    return thermostat_pairs(fluid, box, flags, flat(atom->x, static_cast<int>(reach)), {atom->tag, reach},
-                            {atom->type, reach}, {masses.data(), owned}, what);
+    return thermostat_pairs(fluid, box, flags, atoms(reach), {masses.data(), owned}, what);
   });
   if (!acts) return;
   rust::Slice<double> v;
@@ -70,6 +66,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   if (alone) {
     w = attempt([&] { return thermostat_alone(fluid, v); });
   } else {
+    auto &vectors = exchange.vectors;
     vectors.resize(3 * static_cast<size_t>(all));
     if (owned > 0) std::copy_n(atom->v[0], 3 * owned, vectors.begin());
     forward_vectors();

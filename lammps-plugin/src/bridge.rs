@@ -1,5 +1,6 @@
 //! The style's interface to C++. Errors and panics arrive there as exceptions.
 
+use crate::converted::triples;
 use crate::error::StyleError;
 use crate::style::{Style, guard};
 use crate::thermostat::Noise;
@@ -7,7 +8,8 @@ use nalgebra::Matrix3;
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Effort, Need};
 use psidpd_core::engine::{
-    Around, Mark, PairsOfHost, Path, PeriodicBox, SpecialPair, Step, Surroundings, Tally, Want,
+    Around, Mark, Newton, PairsOfHost, Particles, Path, PeriodicBox, Request, SpecialPair, Step,
+    Surroundings, Tally, Want,
 };
 use psidpd_core::model::{SplinePair, WarrenPair};
 
@@ -35,6 +37,22 @@ mod ffi {
         edges: [f64; 6],
         /// Periodic directions along which this rank has all of the box.
         closed: [bool; 3],
+    }
+
+    /// The atoms of a rank, owned ones first, and ghosts if they take part. `v` may be empty if drag and noise do not act.
+    struct Atoms<'a> {
+        owned: usize,
+        x: &'a [f64],
+        v: &'a [f64],
+        tag: &'a [i32],
+        kind: &'a [i32],
+    }
+
+    /// Pairs that LAMMPS lists.
+    struct Listed<'a> {
+        i: &'a [i32],
+        j: &'a [i32],
+        factor: &'a [f64],
     }
 
     /// A pair with reduced strength: an atom, and another atom or ghost.
@@ -161,58 +179,36 @@ mod ffi {
         /// Whether this rank can compute the request without images along the closed directions of the box.
         fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
         /// Computes all forces, without ghosts.
-        #[allow(clippy::too_many_arguments)]
         fn style_evaluate(
             style: &mut Style,
             extent: &Extent,
-            x: &[f64],
-            v: &[f64],
-            tag: &[i32],
-            kind: &[i32],
+            atoms: &Atoms,
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
         /// Adds all forces but those of the slopes of ghosts. `images` flags ghosts to be left out: see `Around`.
-        #[allow(clippy::too_many_arguments)]
         fn style_densities(
             style: &mut Style,
             extent: &Extent,
             images: &[bool],
-            owned: usize,
-            x: &[f64],
-            v: &[f64],
-            tag: &[i32],
-            kind: &[i32],
             newton: bool,
+            atoms: &Atoms,
             request: &Request,
             f: &mut [f64],
         ) -> Result<()>;
-        #[allow(clippy::too_many_arguments)]
+        /// Computes densities and slopes over pairs that LAMMPS lists; adds no forces yet.
         fn densities_of_pairs(
             style: &mut Style,
-            owned: usize,
-            x: &[f64],
-            tag: &[i32],
-            kind: &[i32],
+            listed: &Listed,
             newton: bool,
-            i: &[i32],
-            j: &[i32],
-            factor: &[f64],
+            atoms: &Atoms,
+            request: &Request,
         ) -> Result<()>;
         fn slopes_mut(self: &mut Style) -> &mut [f64];
         /// Copies slopes of owned particles after an evaluation without ghosts, and makes room for those of ghosts.
         fn fetch_slopes(self: &mut Style, all: usize) -> Result<()>;
-        #[allow(clippy::too_many_arguments)]
-        fn style_forces(
-            style: &mut Style,
-            owned: usize,
-            x: &[f64],
-            v: &[f64],
-            tag: &[i32],
-            kind: &[i32],
-            request: &Request,
-            f: &mut [f64],
-        ) -> Result<Totals>;
+        fn style_forces(style: &mut Style, atoms: &Atoms, request: &Request, f: &mut [f64])
+        -> Result<Totals>;
         /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of particles by it.
         fn energy_unit(self: &Style) -> f64;
         /// One unit of velocity of the model in the units of LAMMPS.
@@ -221,7 +217,7 @@ mod ffi {
         /// Virials, six numbers for each particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Sums all densities at the positions of the last evaluation.
-        fn sum_densities(self: &mut Style, owned: usize, x: &[f64], tag: &[i32], kind: &[i32]) -> Result<()>;
+        fn sum_densities(style: &mut Style, atoms: &Atoms) -> Result<()>;
         /// Densities of owned particles, a row of [`variables`] for each.
         fn densities_of_owned(self: &mut Style) -> &[f64];
         /// ψ of owned particles.
@@ -238,14 +234,11 @@ mod ffi {
 
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
         /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
-        #[allow(clippy::too_many_arguments)]
         fn thermostat_pairs(
             style: &mut Style,
             extent: &Extent,
             images: &[bool],
-            x: &[f64],
-            tag: &[i32],
-            kind: &[i32],
+            atoms: &Atoms,
             mass: &[f64],
             heat: &Heat,
         ) -> Result<bool>;
@@ -265,21 +258,19 @@ mod ffi {
     }
 }
 
-#[allow(clippy::too_many_arguments)]
 fn thermostat_pairs(
     style: &mut Style,
     extent: &ffi::Extent,
     images: &[bool],
-    x: &[f64],
-    tag: &[i32],
-    kind: &[i32],
+    atoms: &ffi::Atoms,
     mass: &[f64],
     heat: &ffi::Heat,
 ) -> Result<bool, StyleError> {
     let ffi::Heat { seed, step, uniform, time, virial } = *heat;
     let noise = Noise { seed, step, law: if uniform { Law::Uniform } else { Law::Gaussian } };
     let domain = style.scale().domain(domain_of(extent)?);
-    style.find_thermostat_pairs(Around { domain: &domain, images }, x, tag, kind, mass, time, virial, noise)
+    let around = Around { domain: &domain, images };
+    style.find_thermostat_pairs(around, &particles_of(atoms), mass, time, virial, noise)
 }
 
 fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
@@ -367,16 +358,32 @@ fn warren_style(
     Style::from_coefficients(kt, &pairs, types, dimensions, masses).map(Box::new)
 }
 
-fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
+fn particles_of<'a>(atoms: &ffi::Atoms<'a>) -> Particles<'a> {
+    Particles { owned: atoms.owned, x: triples(atoms.x), tag: atoms.tag, kind: atoms.kind }
+}
+
+fn request_of<'a>(atoms: &ffi::Atoms<'a>, request: &ffi::Request) -> Request<'a> {
     let step = Step { seed: request.seed, number: request.step, dt: request.dt };
-    let want = Want {
+    Request {
+        particles: particles_of(atoms),
+        v: triples(atoms.v),
+        step: request.thermostat.then_some(step),
+        want: want_of(request),
+    }
+}
+
+fn want_of(request: &ffi::Request) -> Want {
+    Want {
         energy: request.energy,
         virial: request.virial,
         particle_energy: request.particle_energy,
         particle_virial: request.particle_virial,
         densities: false,
-    };
-    (request.thermostat.then_some(step), want)
+    }
+}
+
+fn newton_of(newton: bool) -> Newton {
+    if newton { Newton::On } else { Newton::Off }
 }
 
 /// The box, with periods along the closed directions only.
@@ -386,20 +393,15 @@ fn domain_of(extent: &ffi::Extent) -> Result<PeriodicBox, StyleError> {
     PeriodicBox::new(extent.origin, edges, extent.closed).map_err(|e| StyleError(e.to_string()))
 }
 
-#[allow(clippy::too_many_arguments)]
 fn style_evaluate(
     style: &mut Style,
     extent: &ffi::Extent,
-    x: &[f64],
-    v: &[f64],
-    tag: &[i32],
-    kind: &[i32],
+    atoms: &ffi::Atoms,
     request: &ffi::Request,
     f: &mut [f64],
 ) -> Result<ffi::Totals, StyleError> {
-    let (step, want) = wanted(request);
     let domain = style.scale().domain(domain_of(extent)?);
-    let tally = style.evaluate(&domain, x, v, tag, kind, step, want, f)?;
+    let tally = style.evaluate(&domain, &request_of(atoms, request), f)?;
     Ok(totals(style, &tally))
 }
 
@@ -408,54 +410,44 @@ fn totals(style: &Style, tally: &Tally) -> ffi::Totals {
     ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above }
 }
 
-#[allow(clippy::too_many_arguments)]
 fn style_densities(
     style: &mut Style,
     extent: &ffi::Extent,
     images: &[bool],
-    owned: usize,
-    x: &[f64],
-    v: &[f64],
-    tag: &[i32],
-    kind: &[i32],
     newton: bool,
+    atoms: &ffi::Atoms,
     request: &ffi::Request,
     f: &mut [f64],
 ) -> Result<(), StyleError> {
-    let (step, want) = wanted(request);
     let domain = style.scale().domain(domain_of(extent)?);
-    style.densities(Around { domain: &domain, images }, owned, x, v, tag, kind, newton, step, want, f)
+    let surroundings = Surroundings::Ghosts(Around { domain: &domain, images }, newton_of(newton));
+    style.densities(surroundings, &request_of(atoms, request), f)
 }
 
-#[allow(clippy::too_many_arguments)]
+fn densities_of_pairs(
+    style: &mut Style,
+    listed: &ffi::Listed,
+    newton: bool,
+    atoms: &ffi::Atoms,
+    request: &ffi::Request,
+) -> Result<(), StyleError> {
+    let ffi::Listed { i, j, factor } = *listed;
+    let surroundings = Surroundings::Listed(PairsOfHost { i, j, factor }, newton_of(newton));
+    style.densities(surroundings, &request_of(atoms, request), &mut [])
+}
+
 fn style_forces(
     style: &mut Style,
-    owned: usize,
-    x: &[f64],
-    v: &[f64],
-    tag: &[i32],
-    kind: &[i32],
+    atoms: &ffi::Atoms,
     request: &ffi::Request,
     f: &mut [f64],
 ) -> Result<ffi::Totals, StyleError> {
-    let (step, want) = wanted(request);
-    let tally = style.forces(owned, x, v, tag, kind, step, want, f)?;
+    let tally = style.forces(&request_of(atoms, request), f)?;
     Ok(totals(style, &tally))
 }
 
-#[allow(clippy::too_many_arguments)]
-fn densities_of_pairs(
-    style: &mut Style,
-    owned: usize,
-    x: &[f64],
-    tag: &[i32],
-    kind: &[i32],
-    newton: bool,
-    i: &[i32],
-    j: &[i32],
-    factor: &[f64],
-) -> Result<(), StyleError> {
-    style.densities_of_pairs(owned, x, tag, kind, newton, &PairsOfHost { i, j, factor })
+fn sum_densities(style: &mut Style, atoms: &ffi::Atoms) -> Result<(), StyleError> {
+    style.sum_densities(&particles_of(atoms))
 }
 
 fn style_single(
@@ -504,7 +496,7 @@ impl Style {
     }
 
     fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> Result<bool, StyleError> {
-        let (_, want) = wanted(request);
+        let want = want_of(request);
         let path = |domain| {
             let domain = self.scale().domain(domain);
             self.engine().path_for(Surroundings::Box(&domain), want)

@@ -7,8 +7,8 @@ use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::{Effort, PairThermostat};
 use psidpd_core::engine::{
-    Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, Pending, PeriodicBox, Pool,
-    Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want, at_once,
+    Engine, Newton, Particles, Path as EnginePath, Pending, PeriodicBox, Pool, Precision, Reason, Request,
+    Settings, Surroundings, Tally, Want, at_once,
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
@@ -47,11 +47,6 @@ pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T
             .unwrap_or_else(|| "unknown cause".to_owned());
         Err(StyleError(format!("internal error, please report it: {text}")))
     })
-}
-
-/// Views a flat array as vectors of three numbers, as LAMMPS stores them.
-pub(crate) fn triples(flat: &[f64]) -> &[[f64; 3]] {
-    flat.as_chunks::<3>().0
 }
 
 impl Style {
@@ -223,85 +218,39 @@ impl Style {
         text
     }
 
-    /// Adds to `f` all forces on particles in a box that this rank has all of.
+    /// Adds to `f` all forces on particles in a box that this rank has all of; the box is in units of the model.
     ///
     /// # Errors
     /// Fails as [`Engine::forces`].
-    #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
         domain: &PeriodicBox,
-        x: &[f64],
-        v: &[f64],
-        tag: &[i32],
-        kind: &[i32],
-        step: Option<Step>,
-        want: Want,
+        request: &Request,
         f: &mut [f64],
     ) -> Result<Tally, StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, x, v, step);
-            let particles = Particles { owned: tag.len(), x: triples(taken.x), tag, kind };
-            let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            Ok(scale.tally(taken.add_forces(scale, f, |f| engine.forces(domain, &request, f, true))?))
+            let taken = converted.take(scale, request);
+            Ok(scale.tally(taken.add_forces(scale, f, |request, f| engine.forces(domain, request, f, true))?))
         })
     }
 
-    /// First half of an evaluation, over the first `owned` particles of LAMMPS's arrays: adds to `f` all
-    /// forces but those of the slopes of ghosts.
+    /// First half of an evaluation: adds to `f` all forces but those of the slopes of ghosts. With pairs that LAMMPS lists
+    /// all forces are added in the second half. Boxes are in units of the model.
     ///
     /// # Errors
     /// Fails as [`Engine::first`].
-    #[allow(clippy::too_many_arguments)]
     pub fn densities(
         &mut self,
-        around: Around,
-        owned: usize,
-        x: &[f64],
-        v: &[f64],
-        tag: &[i32],
-        kind: &[i32],
-        newton: bool,
-        step: Option<Step>,
-        want: Want,
+        surroundings: Surroundings,
+        request: &Request,
         f: &mut [f64],
     ) -> Result<(), StyleError> {
         guard(|| {
-            let newton = if newton { Newton::On } else { Newton::Off };
             let Style { engine, pending, scale, converted, .. } = self;
             *pending = None;
-            let taken = converted.take(scale, x, v, step);
-            let particles = Particles { owned, x: triples(taken.x), tag, kind };
-            let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            let surroundings = Surroundings::Ghosts(around, newton);
-            *pending = Some(taken.add_forces(scale, f, |f| engine.first(surroundings, &request, f))?);
-            Ok(())
-        })
-    }
-
-    /// First half of an evaluation, with pairs that LAMMPS lists: all forces are added in the second half.
-    ///
-    /// # Errors
-    /// Fails as [`Engine::first`].
-    pub fn densities_of_pairs(
-        &mut self,
-        owned: usize,
-        x: &[f64],
-        tag: &[i32],
-        kind: &[i32],
-        newton: bool,
-        listed: &PairsOfHost,
-    ) -> Result<(), StyleError> {
-        guard(|| {
-            let newton = if newton { Newton::On } else { Newton::Off };
-            let Style { engine, pending, scale, converted, .. } = self;
-            *pending = None;
-            let taken = converted.take(scale, x, &[], None);
-            let particles = Particles { owned, x: triples(taken.x), tag, kind };
-            // For listed pairs the request for energies and virials comes with the second half.
-            let request = Request { particles, v: &[], step: None, want: Want::FORCES };
-            *pending = Some(engine.first(Surroundings::Listed(*listed, newton), &request, &mut [])?);
+            let taken = converted.take(scale, request);
+            *pending = Some(taken.add_forces(scale, f, |request, f| engine.first(surroundings, request, f))?);
             Ok(())
         })
     }
@@ -318,19 +267,12 @@ impl Style {
     ///
     /// # Errors
     /// Fails as [`Engine::sum_densities`].
-    pub fn sum_densities(
-        &mut self,
-        owned: usize,
-        x: &[f64],
-        tag: &[i32],
-        kind: &[i32],
-    ) -> Result<(), StyleError> {
+    pub fn sum_densities(&mut self, particles: &Particles) -> Result<(), StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, x, &[], None);
-            let particles = Particles { owned, x: triples(taken.x), tag, kind };
+            let taken = converted.take(scale, &at_rest(particles));
             // LAMMPS has ghosts on all sides of its atoms, also across periods.
-            engine.sum_densities(Surroundings::ghosts(Newton::On), &particles)?;
+            engine.sum_densities(Surroundings::ghosts(Newton::On), &taken.particles())?;
             Ok(())
         })
     }
@@ -383,29 +325,21 @@ impl Style {
     ///
     /// # Errors
     /// Fails without a first half, and as [`Pending::finish`].
-    #[allow(clippy::too_many_arguments)]
-    pub fn forces(
-        &mut self,
-        owned: usize,
-        x: &[f64],
-        v: &[f64],
-        tag: &[i32],
-        kind: &[i32],
-        step: Option<Step>,
-        want: Want,
-        f: &mut [f64],
-    ) -> Result<Tally, StyleError> {
+    pub fn forces(&mut self, request: &Request, f: &mut [f64]) -> Result<Tally, StyleError> {
         guard(|| {
             let Style { engine, pending, scale, converted, .. } = self;
             let pending = pending.take().ok_or_else(|| {
                 StyleError("the second half of an evaluation needs the first half before it".to_owned())
             })?;
-            let taken = converted.take(scale, x, v, step);
-            let particles = Particles { owned, x: triples(taken.x), tag, kind };
-            let request = Request { particles, v: triples(taken.v), step: taken.step, want };
-            Ok(scale.tally(taken.add_forces(scale, f, |f| pending.finish(engine, &request, f))?))
+            let taken = converted.take(scale, request);
+            Ok(scale.tally(taken.add_forces(scale, f, |request, f| pending.finish(engine, request, f))?))
         })
     }
+}
+
+/// A request for forces of these particles without drag and noise.
+pub(crate) fn at_rest<'a>(particles: &Particles<'a>) -> Request<'a> {
+    Request { particles: *particles, v: &[], step: None, want: Want::FORCES }
 }
 
 fn engine_at(

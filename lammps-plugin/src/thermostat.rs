@@ -2,7 +2,7 @@
 //! rank's atoms by the midpoint rule.
 
 use crate::error::StyleError;
-use crate::style::{Style, guard, triples};
+use crate::style::{Style, at_rest, guard};
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Effort, Need, Rank, Stream, Update};
 use psidpd_core::engine::{Around, Particles};
@@ -24,13 +24,10 @@ impl Style {
     /// # Errors
     /// Fails as
     /// [`find_pairs_of_rank`](psidpd_core::engine::thermostat::PairThermostat::find_pairs_of_rank).
-    #[allow(clippy::too_many_arguments)]
     pub fn find_thermostat_pairs(
         &mut self,
         around: Around,
-        x: &[f64],
-        tag: &[i32],
-        kind: &[i32],
+        particles: &Particles,
         mass: &[f64],
         dt: f64,
         virial: bool,
@@ -39,7 +36,7 @@ impl Style {
         guard(|| {
             let scale = self.scale();
             let (Some(thermostat), pool, kinds, converted) = self.thermostat() else { return Ok(false) };
-            let taken = converted.take(&scale, x, &[], None);
+            let taken = converted.take(&scale, &at_rest(particles));
             let unit = scale.velocity().powi(2) / scale.energy;
             let scaled: Vec<f64>;
             let mass = match scale.is_one() {
@@ -49,7 +46,7 @@ impl Style {
                     &scaled
                 }
             };
-            let particles = Particles { owned: mass.len(), x: triples(taken.x), tag, kind };
+            let particles = Particles { owned: mass.len(), ..taken.particles() };
             let rank = Rank { around, particles, species_of_kind: kinds, mass };
             thermostat.find_pairs_of_rank(pool, &rank, dt / scale.time, virial)?;
             thermostat.draw(pool, noise.seed, noise.step, Stream(0), noise.law);

@@ -1,4 +1,6 @@
 use super::*;
+use crate::converted::triples;
+use psidpd_core::engine::{Around, PairsOfHost, Step};
 use psidpd_core::model::WarrenPair;
 
 const MODEL: &str = "title = \"t\"\nspecies = [\"A\", \"B\"]\n[[pair]]\nbetween = [\"A\", \"B\"]\n\
@@ -10,21 +12,34 @@ fn style(names: &[&str], dimensions: usize) -> Result<Style, StyleError> {
     Style::new(Model::parse("m.toml", MODEL).unwrap(), 1.0, &names, dimensions)
 }
 
+/// A request for forces of atoms in the flat arrays of LAMMPS.
+fn request<'a>(
+    owned: usize,
+    x: &'a [f64],
+    v: &'a [f64],
+    tag: &'a [i32],
+    kind: &'a [i32],
+    step: Option<Step>,
+) -> Request<'a> {
+    let particles = Particles { owned, x: triples(x), tag, kind };
+    Request { particles, v: triples(v), step, want: Want::FORCES }
+}
+
 #[test]
 fn types_map_to_species_by_name() {
     let mut s = style(&["B", "NULL", "A"], 3).unwrap();
     let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
     let mut f = [0.0; 6];
     let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
-    let around = Around { domain: &open, images: &[] };
-    s.densities(around, 2, &x, &[], &[1, 2], &[1, 2], true, None, Want::FORCES, &mut f).unwrap();
-    s.forces(2, &x, &[], &[1, 2], &[1, 2], None, Want::FORCES, &mut f).unwrap();
+    let around = Surroundings::Ghosts(Around { domain: &open, images: &[] }, Newton::On);
+    s.densities(around, &request(2, &x, &[], &[1, 2], &[1, 2], None), &mut f).unwrap();
+    s.forces(&request(2, &x, &[], &[1, 2], &[1, 2], None), &mut f).unwrap();
     assert_eq!(f, [0.0; 6]);
-    s.densities(around, 2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES, &mut f).unwrap();
-    s.forces(2, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
+    s.densities(around, &request(2, &x, &[], &[1, 2], &[1, 3], None), &mut f).unwrap();
+    s.forces(&request(2, &x, &[], &[1, 2], &[1, 3], None), &mut f).unwrap();
     assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
     // Without ghosts, forces are added to those in `f`.
-    s.evaluate(&open, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
+    s.evaluate(&open, &request(2, &x, &[], &[1, 2], &[1, 3], None), &mut f).unwrap();
     assert_eq!(f, [-25.0, 0.0, 0.0, 25.0, 0.0, 0.0]);
 }
 
@@ -36,12 +51,12 @@ fn densities_of_one_step_leave_later_steps_to_the_sweep() {
     let mut s = Style::new(Model::parse("m.toml", text).unwrap(), 1.0, &["A".to_owned()], 3).unwrap();
     let (x, tag, kind) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [1, 2], [1, 1]);
     let w = 3.0 / std::f64::consts::PI * 0.5;
-    s.sum_densities(2, &x, &tag, &kind).unwrap();
+    s.sum_densities(&request(2, &x, &[], &tag, &kind, None).particles).unwrap();
     assert_eq!(s.engine().results().densities, [0.0; 4]);
     for _ in 0..2 {
-        s.evaluate(&PeriodicBox::OPEN, &x, &[], &tag, &kind, None, Want::FORCES, &mut [0.0; 6]).unwrap();
+        s.evaluate(&PeriodicBox::OPEN, &request(2, &x, &[], &tag, &kind, None), &mut [0.0; 6]).unwrap();
         assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
-        s.sum_densities(2, &x, &tag, &kind).unwrap();
+        s.sum_densities(&request(2, &x, &[], &tag, &kind, None).particles).unwrap();
         let densities = s.engine().results().densities;
         assert_eq!(densities.len(), 4);
         assert!((densities[1] - w).abs() < 1e-14 && densities[0] > 0.0, "{densities:?}");
@@ -105,44 +120,53 @@ fn hostile_arguments_are_errors() {
     let (x, v) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [0.0; 6]);
     let step = Some(Step { seed: 1, number: 1, dt: 0.01 });
     let mut f = [0.0; 6];
-    s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).unwrap();
+    s.evaluate(&closed, &request(2, &x, &v, &[1, 2], &[1, 1], step), &mut f).unwrap();
     s.engine_mut().fetch_slopes(2);
     assert!(s.single([1, 1], 0.5, [0, 1]).unwrap().1 > 0.0);
     for i in extremes {
         for pair in [[i, 0], [0, i], [i, i]] {
             assert_eq!(s.single([1, 1], 0.5, pair).is_ok(), pair.iter().all(|k| (0..2).contains(k)));
         }
-        for kind in extremes {
-            let _ = s.single([kind, i], f64::NAN, [0, 1]);
-            let kinds = [1, kind];
-            let known = kind == 1;
-            let around = Around { domain: &open, images: &[] };
-            assert!(
-                s.densities(around, 2, &x, &v, &[1, 2], &kinds, true, step, Want::FORCES, &mut f).is_ok()
-                    == known
-                    || kind == 0
-            );
-        }
     }
-    let around = Around { domain: &open, images: &[true] };
+    let around = Surroundings::Ghosts(Around { domain: &open, images: &[] }, Newton::On);
+    for [i, kind] in extremes.into_iter().flat_map(|i| extremes.map(|kind| [i, kind])) {
+        let _ = s.single([kind, i], f64::NAN, [0, 1]);
+        let kinds = [1, kind];
+        let done = s.densities(around, &request(2, &x, &v, &[1, 2], &kinds, step), &mut f);
+        assert!(done.is_ok() == (kind == 1) || kind == 0);
+    }
+    // The pairs of half an evaluation are not known yet.
+    let whole = request(2, &x, &v, &[1, 2], &[1, 1], step);
+    s.densities(around, &whole, &mut f).unwrap();
+    assert!(s.single([1, 1], 0.5, [0, 1]).is_err());
+    s.forces(&whole, &mut f).unwrap();
+    assert!(s.single([1, 1], 0.5, [0, 1]).is_ok());
+    let around = Surroundings::Ghosts(Around { domain: &open, images: &[true] }, Newton::On);
     for owned in [0, 1, 2, 3, usize::MAX] {
         for (tags, kinds) in [(&[1, 2][..], &[1][..]), (&[1], &[1, 1]), (&[], &[])] {
-            let short = s.densities(around, owned, &x, &v, tags, kinds, true, step, Want::FORCES, &mut f);
+            let short = s.densities(around, &request(owned, &x, &v, tags, kinds, step), &mut f);
             assert!(short.is_err());
-            assert!(s.forces(owned, &x, &v, tags, kinds, step, Want::FORCES, &mut f).is_err());
+            assert!(s.forces(&request(owned, &x, &v, tags, kinds, step), &mut f).is_err());
         }
         for (i, j, factor) in [(-1, 0, 1.0), (0, i32::MAX, 1.0), (7, 7, f64::NAN)] {
             let listed = PairsOfHost { i: &[i], j: &[j], factor: &[factor] };
-            assert!(s.densities_of_pairs(owned, &x, &[1, 2], &[1, 1], true, &listed).is_err());
+            assert!(
+                s.densities(
+                    Surroundings::Listed(listed, Newton::On),
+                    &request(owned, &x, &[], &[1, 2], &[1, 1], None),
+                    &mut []
+                )
+                .is_err()
+            );
         }
     }
-    assert!(s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f[..3]).is_err());
-    assert!(s.evaluate(&closed, &x, &v[..3], &[1, 2], &[1, 1], step, Want::FORCES, &mut f).is_err());
-    assert!(s.evaluate(&closed, &x, &v, &[0, -2], &[1, 1], step, Want::FORCES, &mut f).is_err());
+    assert!(s.evaluate(&closed, &request(2, &x, &v, &[1, 2], &[1, 1], step), &mut f[..3]).is_err());
+    assert!(s.evaluate(&closed, &request(2, &x, &v[..3], &[1, 2], &[1, 1], step), &mut f).is_err());
+    assert!(s.evaluate(&closed, &request(2, &x, &v, &[0, -2], &[1, 1], step), &mut f).is_err());
     let wild = [f64::NAN, 0.0, 0.0, f64::INFINITY, 0.0, 1e300];
-    assert!(s.evaluate(&closed, &wild, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).is_err());
+    assert!(s.evaluate(&closed, &request(2, &wild, &v, &[1, 2], &[1, 1], step), &mut f).is_err());
     // The style still works after these errors.
-    s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).unwrap();
+    s.evaluate(&closed, &request(2, &x, &v, &[1, 2], &[1, 1], step), &mut f).unwrap();
 }
 
 #[test]
