@@ -398,6 +398,24 @@ fn phases_of_an_asymmetric_mixture_are_in_equilibrium_or_refused() {
     );
 }
 
+/// Newton's method squares its error in each step, so a last step of 1e-11 leaves rounding alone, from whatever start. From
+/// starts at all distances from the solution a tolerance of 1e-5 would leave up to 1e-10.
+#[test]
+fn phases_do_not_depend_on_the_start_of_the_search() {
+    let mf = theory(&mixture(3, 1.0, 0.2, 0.4), 2.0);
+    let overall = [5.0, 5.0];
+    let found = mf.coexistence(overall).unwrap().densities;
+    for k in 0..40 {
+        let away = 0.5 * 0.8f64.powi(k);
+        let [a, b] = found;
+        let start = [[a[0] * (1.0 - away), a[1] * (1.0 + 0.5 * away)], [b[0] * (1.0 + away), b[1]]];
+        let again = mf.settle(overall, start).unwrap().densities;
+        for (x, y) in again.iter().flatten().zip(found.iter().flatten()) {
+            close(*x, *y, 1e-12);
+        }
+    }
+}
+
 /// At ε_AA = 2.3 a thinner mixed phase is more stable than the two of density 16.
 #[test]
 fn a_third_phase_of_the_huggins_fluid_is_found() {

@@ -141,6 +141,11 @@ impl Hot {
         let without = done - self.at;
         if 2 * without < done - self.since { 0 } else { without }
     }
+
+    /// Whether a run has stayed hot for too long; drag and noise take `relaxation` steps to cool it.
+    fn lasts(&self, done: u64, relaxation: f64) -> bool {
+        self.count >= IN_A_ROW && self.steps(done) as f64 > PATIENCE * relaxation
+    }
 }
 
 /// Sums over the spatial blocks of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each block, and of their products.
@@ -206,8 +211,7 @@ impl Watch {
         }
         let hot = Hot::with(self.hot, ratio, done);
         self.hot = Some(hot);
-        let relaxations = hot.steps(done) as f64 * stage.dt * warmth.rate;
-        if hot.count >= IN_A_ROW && relaxations > PATIENCE {
+        if hot.lasts(done, 1.0 / (stage.dt * warmth.rate)) {
             return Err(RunError::TooHot {
                 step: simulation.step_number(),
                 since: simulation.step_number() - (done - hot.since),
@@ -337,13 +341,14 @@ mod tests {
         }
     }
 
-    /// The number of temperatures, one every ten steps, until a run with a patience of 200 steps would stop.
+    /// The number of temperatures, one every ten steps, until a run stops whose relaxation time is twenty steps: ten such
+    /// times are 200 steps.
     fn stopped_after(temperatures: impl Iterator<Item = f64>) -> Option<usize> {
         let mut hot = None;
         temperatures.enumerate().find_map(|(k, ratio)| {
             let now = Hot::with(hot, ratio, 10 * k as u64);
             hot = Some(now);
-            (now.count >= IN_A_ROW && now.steps(10 * k as u64) > 200).then_some(k)
+            now.lasts(10 * k as u64, 20.0).then_some(k)
         })
     }
 
