@@ -20,7 +20,7 @@ const ADVISED: Integrator = Integrator::ForceGradient {
 const PRICE: f64 = 4.5;
 
 /// Largest number of particles for which drag and stiffness are computed, because both computations store all pairs.
-const MOST: usize = 500_000;
+pub(super) const MOST: usize = 500_000;
 
 /// Smallest relative error that deserves advice.
 const WORTH: f64 = 0.01;

@@ -9,10 +9,12 @@
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
+use super::advice::MOST;
 use super::error::RunError;
 use super::simulation::Simulation;
-use crate::scene::Stage;
+use crate::scene::{Scene, Stage};
 use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_formats::memory::PARTICLE;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
@@ -54,6 +56,10 @@ const FACES: f64 = 1.2;
 /// A stage of at least this many steps is sampled for its configurational temperature. If the thermostat
 /// keeps velocities right at any time step, only this temperature reveals a step that is too long.
 const WORTH_A_LOOK: u64 = 1000;
+
+/// Bytes per particle of the pairs of a thermostat, and of an evaluation for a configurational temperature.
+const PAIRS: f64 = 270.0;
+const EVALUATION: f64 = 900.0;
 
 /// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -179,6 +185,20 @@ impl Configurational {
         let mean = (self.a - ratio * self.b) / self.blocks;
         (squares - self.blocks * mean * mean).max(0.0) * self.blocks / (self.blocks - 1.0)
     }
+}
+
+/// Bytes per particle at the peak of a run of a scene, about those of Warren's liquid (docs/bench.md). The watch lists the
+/// pairs of the thermostat, and for configurational temperatures the pairs of the forces; so does the advice at the end
+/// of a small run.
+pub fn bytes_per_particle(scene: &Scene) -> f64 {
+    let particles: usize = scene.initial.parts().iter().map(|part| part.count).sum();
+    let any = |least: u64| {
+        particles <= MOST || scene.stages.iter().any(|stage| stage.thermostat && stage.steps >= least)
+    };
+    [(LEAST, PAIRS), (WORTH_A_LOOK, EVALUATION)]
+        .iter()
+        .filter(|(least, _)| any(*least))
+        .fold(PARTICLE, |sum, (_, bytes)| sum + bytes)
 }
 
 impl Watch {
