@@ -58,7 +58,8 @@ fn tables() -> Vec<Vec<Row>> {
     for line in page.lines() {
         let cells: Vec<&str> = line.split('|').map(str::trim).collect();
         if line.starts_with("| case | value | measured | published |") {
-            (inside, _) = (true, tables.push(Vec::new()));
+            inside = true;
+            tables.push(Vec::new());
             continue;
         }
         inside &= line.starts_with('|');
