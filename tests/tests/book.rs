@@ -32,6 +32,15 @@ fn prose(page: &str) -> Vec<String> {
     lines.join("\n").split("\n\n").map(|paragraph| paragraph.split('`').step_by(2).collect()).collect()
 }
 
+/// The code of a page's paragraphs that a line break divides, from its second line on.
+fn broken_code(page: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(root().join(page)).unwrap();
+    let outside = text.split("\n```").step_by(2);
+    let spans =
+        outside.flat_map(|part| part.split("\n\n")).flat_map(|part| part.split('`').skip(1).step_by(2));
+    spans.filter_map(|span| Some(span.split_once('\n')?.1.trim_start().to_owned())).collect()
+}
+
 /// The targets of links and pictures, except those of the web.
 fn links(page: &str) -> Vec<String> {
     let lines = prose(page);
@@ -88,6 +97,19 @@ fn links_lead_somewhere() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// A line that begins with such a sign begins a list, a heading or a quotation, though it is amid code.
+#[test]
+fn no_code_is_broken_into_a_list() {
+    for page in pages().iter().map(String::as_str).chain(BESIDE) {
+        for line in broken_code(page) {
+            let word = line.split(' ').next().unwrap();
+            let begins = ["-", "+", "*", "#", ">"].contains(&word)
+                || word.trim_end_matches(['.', ')']).parse::<u32>().is_ok_and(|_| word.ends_with(['.', ')']));
+            assert!(!begins, "{page}: {line}");
+        }
+    }
+}
+
 #[test]
 fn every_page_is_in_the_book() {
     let contents: BTreeSet<String> =
@@ -115,6 +137,7 @@ fn follow(page: &str) -> usize {
                     assert_eq!(words[0], "psidpd", "{page}: {line}");
                     let output = psidpd(folder.path(), &words[1..]);
                     assert!(output.status.success(), "{page}: {line}\n{}", said(&output));
+                    assert!(!said(&output).contains("do not trust"), "{page}: {line}\n{}", said(&output));
                     results.add(&output.stdout);
                     let out = words.iter().position(|word| *word == "--out").map(|at| words[at + 1]);
                     results.add_observables(&folder.path().join(out.unwrap_or_default()));

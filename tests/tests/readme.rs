@@ -49,8 +49,16 @@ fn the_native_scene_runs() {
     let models = root().join("validation/models").display().to_string();
     let scene = readme_block("toml", "# scene.toml").replace("validation/models", &models);
     std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
-    let output = psidpd(folder.path(), &["run", "scene.toml", "--out", "slab"]);
+    let output = psidpd(folder.path(), &["run", "scene.toml", "--out", "slab", "--json", "run.json"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let text = std::fs::read_to_string(folder.path().join("run.json")).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let values = found["headline"]["values"].as_array().unwrap();
+    let [t, error] = ["value", "error"]
+        .map(|key| values.iter().find(|v| v["name"] == "temperature").and_then(|v| v[key].as_f64()).unwrap());
+    // Before the slab of a lattice has melted it is some percent too hot.
+    assert!((t - 1.0).abs() < 4.0 * error && error < 0.01, "{found}");
+    assert!(!said(&output).contains("do not trust"), "{}", said(&output));
     for file in ["thermo.csv", "dump.lammpstrj", "final.data", "summary.json"] {
         assert!(folder.path().join("slab").join(file).is_file(), "{file} is missing");
     }

@@ -75,6 +75,28 @@ fn hybrids_restart_too() {
     assert!(difference(&frame(&l).x, &split.x) < 1e-9);
 }
 
+/// A restart file has the temperature that a fix has set, and not that of `pair_style`: the energy of this model is in
+/// proportion to it.
+#[test]
+fn a_restart_has_the_present_temperature() {
+    let folder = tempfile::tempdir().unwrap();
+    let restart = folder.path().join("hot.restart").display().to_string();
+    let model = folder.path().join("model.toml");
+    let text = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                [excess_free_energy]\nF = \"kT*0.1*n^2\"\n";
+    std::fs::write(&model, text).unwrap();
+    let hot = open(&format!(
+        "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {} F\n{MOVE}variable t equal 2\n\
+         fix a all adapt 1 pair dpd/psi temperature * * v_t\nrun 1\nwrite_restart {restart}\n",
+        particles("", "block 0 5 0 5 0 5", 1, 400),
+        model.display()
+    ));
+    let energy = hot.thermo("pe").unwrap();
+    drop(hot);
+    let again = open(&format!("{}comm_modify vel yes\nread_restart {restart}\n{MOVE}run 0\n", load()));
+    assert!((again.thermo("pe").unwrap() / energy - 1.0).abs() < 1e-9, "{energy}");
+}
+
 /// `write_data` writes the coefficients, and `read_data` reads them.
 #[test]
 fn data_files_have_the_coefficients() {

@@ -338,6 +338,14 @@ fn interface_of_the_van_der_waals_fluid() {
         0.5 * (mf.second_derivatives(&found.phases[..1])[0] + mf.second_derivatives(&found.phases[1..])[0]);
     let kappa = mf.gradient_coefficients(&[middle])[0];
     close(found.tension, delta * delta * (kappa * second).sqrt() / 6.0, 2e-3);
+    // Each phase has its own length of decay √(κ/f″).
+    let deep = theory(&model, 0.9 * critical.parameter);
+    let found = deep.interface(101).unwrap();
+    let lengths = found
+        .phases
+        .map(|rho| (deep.gradient_coefficients(&[rho])[0] / deep.second_derivatives(&[rho])[0]).sqrt());
+    assert!((lengths[0] / lengths[1] - 1.0).abs() > 0.1, "{lengths:?}");
+    (0..2).for_each(|k| close(found.decay[k], lengths[k], 1e-9));
     // Repulsion and attraction have one range: without α₃ and far below T_c gradients are favoured.
     let cold = theory(&van_der_waals(2, 1.0, 1.0, 0.0), 0.1).interface(51);
     assert!(matches!(cold, Err(TheoryError::GradientNotPositive { .. })), "{cold:?}");
@@ -396,6 +404,24 @@ fn phases_of_an_asymmetric_mixture_are_in_equilibrium_or_refused() {
         theory(&mixture(2, 1.0, 0.2, 0.2), 8.1).coexistence([5.0, 5.0]),
         Err(TheoryError::NoCoexistence)
     );
+}
+
+/// Newton's method squares its error in each step, so a last step of 1e-11 leaves rounding alone, from whatever start. From
+/// starts at all distances from the solution a tolerance of 1e-5 would leave up to 1e-10.
+#[test]
+fn phases_do_not_depend_on_the_start_of_the_search() {
+    let mf = theory(&mixture(3, 1.0, 0.2, 0.4), 2.0);
+    let overall = [5.0, 5.0];
+    let found = mf.coexistence(overall).unwrap().densities;
+    for k in 0..40 {
+        let away = 0.5 * 0.8f64.powi(k);
+        let [a, b] = found;
+        let start = [[a[0] * (1.0 - away), a[1] * (1.0 + 0.5 * away)], [b[0] * (1.0 + away), b[1]]];
+        let again = mf.settle(overall, start).unwrap().densities;
+        for (x, y) in again.iter().flatten().zip(found.iter().flatten()) {
+            close(*x, *y, 1e-12);
+        }
+    }
 }
 
 /// At ε_AA = 2.3 a thinner mixed phase is more stable than the two of density 16.
@@ -558,6 +584,24 @@ fn an_integral_above_zero_is_not_enough() {
     assert!(MeanField::new(&fluid).unwrap().pair_integrals()[0] > 0.0);
     let collapse = thermodynamic_limit(&fluid).unwrap().unwrap_err();
     assert_ne!(collapse.structure, Structure::Uniform);
+}
+
+/// A particle of a body-centred lattice with neighbours at 0.9 has eight of them, and six at 1.0392: fourteen in the two narrow
+/// wells. Twelve at most are in other lattices, whose closer neighbours would repel. So a core of 13 makes a body-centred
+/// lattice alone collapse, and a core of 15 none.
+#[test]
+fn a_body_centred_lattice_is_tried_too() {
+    let limit = |core: f64| {
+        let text = format!(
+            "title = 'wells'\nspecies = ['F']\n[[pair]]\nbetween = ['F', 'F']\nform = 'expression'\nrange = 1.2\n\
+             phi = '{core:?}*max(0, 1 - 4*r)^2 + 15*max(0, 1 - 11*(r - 0.5)^2) - max(0, 1 - 625*(r - 0.9)^2) \
+             - max(0, 1 - 625*(r - 1.0392)^2)'\n"
+        );
+        thermodynamic_limit(&model(&text).at(1.0).unwrap()).unwrap()
+    };
+    let collapse = limit(13.0).unwrap_err();
+    assert!(matches!(collapse.structure, Structure::BodyCentred { .. }), "{collapse:?}");
+    assert_eq!(limit(15.0), Ok(()));
 }
 
 #[test]

@@ -58,3 +58,33 @@ pub(super) fn dimensions_of(x: &[[f64; 3]], periodic: [bool; 3]) -> usize {
     let flat = !periodic[2] && x.iter().all(|p| p[2] == x[0][2]);
     if flat { 2 } else { 3 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file has names in the order of their first appearance, or numbers; the model has an order of its own.
+    #[test]
+    fn species_are_those_of_the_model() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
+        let named = |found: &[&str]| {
+            let mut read = Configuration {
+                step: None,
+                time: None,
+                dimensions: 3,
+                domain: domain.clone(),
+                names: found.iter().map(|n| (*n).to_owned()).collect(),
+                x: vec![[1.0; 3]; 3],
+                v: None,
+                species: vec![0, 1, 0],
+                tag: vec![1, 2, 3],
+            };
+            read.name_species(&["A".to_owned(), "B".to_owned()], 2);
+            assert_eq!(read.dimensions, 2);
+            (read.names.concat(), read.species)
+        };
+        assert_eq!(named(&["B", "A"]), ("AB".to_owned(), vec![1, 0, 1]));
+        assert_eq!(named(&["1", "2"]), ("AB".to_owned(), vec![0, 1, 0]));
+        assert_eq!(named(&["B", "oil"]), ("Boil".to_owned(), vec![0, 1, 0]));
+    }
+}

@@ -5,8 +5,8 @@ use rustix::process::{Resource, getrlimit};
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
-/// Bytes per particle at the peak: 4 GB for ten million particles (docs/running.md).
-const PARTICLE: f64 = 400.0;
+/// Bytes per particle of a short run at its peak (docs/bench.md).
+pub const PARTICLE: f64 = 430.0;
 
 /// Bytes of a process without particles.
 const PROGRAM: f64 = 2e7;
@@ -21,14 +21,14 @@ pub struct MemoryError {
     limit: &'static str,
 }
 
-/// The approximate number of bytes that a run with this number of particles needs.
-pub fn need(particles: usize) -> f64 {
-    PROGRAM + PARTICLE * particles as f64
+/// The approximate number of bytes that a run needs with this number of particles, and so many bytes for each.
+pub fn need(particles: usize, each: f64) -> f64 {
+    PROGRAM + each * particles as f64
 }
 
-/// Checks that a run with this number of particles fits into the memory.
-pub fn check(particles: usize) -> Result<(), MemoryError> {
-    fits(need(particles), || format!("{particles} particles need"))
+/// Checks that a run with this number of particles, and so many bytes for each, fits into the memory.
+pub fn check(particles: usize, each: f64) -> Result<(), MemoryError> {
+    fits(need(particles, each), || format!("{particles} particles need"))
 }
 
 /// Checks that `need` bytes fit into the memory. `what` makes the subject and verb of the error message.
@@ -130,9 +130,9 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused_with_both_numbers() {
-        assert_eq!(check(1000), Ok(()));
+        assert_eq!(check(1000, PARTICLE), Ok(()));
         // No address space is this large.
-        let text = check(usize::MAX).unwrap_err().to_string();
+        let text = check(usize::MAX, PARTICLE).unwrap_err().to_string();
         assert!(
             text.contains("18446744073709551615 particles need about") && text.contains("GB of memory"),
             "{text}"

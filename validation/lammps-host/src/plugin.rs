@@ -391,9 +391,12 @@ mod tests {
             fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
             fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         };
+        let told = std::cell::RefCell::new(Vec::new());
         let run = |number| {
             let cargo = program.clone().into_os_string();
-            build_with(&host, &version(number), &base, &builds, dir.path(), &cargo, &|_| {})
+            told.borrow_mut().clear();
+            let tell = |line: &str| told.borrow_mut().push(line.to_owned());
+            build_with(&host, &version(number), &base, &builds, dir.path(), &cargo, &tell)
         };
 
         let wide = HostVersion { abi: "bigbig mpich".into(), ..version(1) };
@@ -416,6 +419,7 @@ mod tests {
         cargo(&program, "$PSIDPD_LAMMPS_VERSION $PSIDPD_LAMMPS_INCLUDE $CARGO_MANIFEST_DIR");
         for number in [20250722, 20210929] {
             let plugin = run(number).unwrap();
+            assert!(told.borrow().iter().any(|line| line.contains("minutes the first time")), "{told:?}");
             let text = fs::read_to_string(&plugin).unwrap();
             assert_eq!(text, format!("{number} {} ", dir.path().display()));
             assert_eq!(built_for(&plugin).unwrap().lammps_version, number);
@@ -431,7 +435,7 @@ mod tests {
         let builds = || fs::read_to_string(builds.join("count")).unwrap().lines().count();
         let before = builds();
         run(20210929).unwrap();
-        assert_eq!(builds(), before);
+        assert_eq!((builds(), told.borrow().len()), (before, 0));
         fs::write(dir.path().join("pair.h"), "another").unwrap();
         run(20210929).unwrap();
         assert_eq!(builds(), before + 1);

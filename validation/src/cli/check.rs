@@ -4,6 +4,7 @@ use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::document::Document;
 use psidpd_core::engine::check_reach;
+use psidpd_dynamics::run::bytes_per_particle;
 use psidpd_experiments::check::{
     Conditions, Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates,
 };
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         }
         let range = scene.model.at(scene.kt)?.cutoff();
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
-        too_large = memory::check(particles).err();
+        too_large = memory::check(particles, bytes_per_particle(&scene)).err();
         too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
         let steps = if too_far.is_none() { estimates(&scene)? } else { Vec::new() };
         let taken = if too_far.is_none() { cost(&scene).ok() } else { None };

@@ -197,6 +197,7 @@ fn clusters_have_the_distance_that_they_are_given() {
     shown.sample(|view| view);
     let out = shown.finish();
     assert_eq!((value(&out[0], "count"), value(&out[0], "largest")), (3.0, 2.0));
+    assert_eq!(value(&out[0], "mean_size"), 4.0 / 3.0);
 }
 
 /// The liquid density of a slab is the density of its plateau, which is the middle of the profile. Both

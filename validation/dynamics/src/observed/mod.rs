@@ -400,6 +400,43 @@ fn a_run_that_goes_on_ends_the_same() {
     assert!(whole.finish().iter().any(|o| o.stage == "settle"));
 }
 
+/// Samples without a value are counted, also across an interruption, and the others are not lost.
+#[test]
+fn samples_left_out_are_counted_when_a_run_goes_on() {
+    let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 10, "[observe]\nevery = 1\npressure = true\n").unwrap();
+    let simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    let flux = flux::Flux::default();
+    let view = |step: u64, p: f64| frame::View {
+        step,
+        flux: Some(&flux),
+        conservative_pressure: [p; 6],
+        ..simulation.view(0.0)
+    };
+    let mut parts = observers(&scene);
+    let steps = [(1, f64::NAN), (2, 1.0), (3, f64::INFINITY), (4, 2.0), (5, f64::NAN)];
+    for (step, pressure) in steps {
+        parts.sample(view(step, pressure), "run");
+        parts = observers(&scene).restore(&parts.to_bytes()).unwrap();
+    }
+    let found = parts.finish().remove(0);
+    assert_eq!((found.samples, found.note.as_str()), (2, "Samples without a value, left out: 3."));
+}
+
+/// With `skip = 2` the first two steps of each stage are left out.
+#[test]
+fn samples_begin_after_the_steps_that_are_skipped() {
+    let observe = "[observe]\nevery = 1\nskip = 2\nstages = [\"settle\", \"run\"]\ntemperature = true\n";
+    let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 10, observe).unwrap();
+    let simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    let mut all = observers(&scene);
+    for step in 1..=107 {
+        let stage = if step <= 100 { "settle" } else { "run" };
+        all.sample(frame::View { step, ..simulation.view(0.0) }, stage);
+    }
+    let samples: Vec<_> = all.finish().iter().map(|o| (o.stage.clone(), o.samples)).collect();
+    assert_eq!(samples, [("settle".to_owned(), 98), ("run".to_owned(), 5)]);
+}
+
 /// A run writes its measurements as JSON and tables; the same scene writes the same bytes; a scene without
 /// `[observe]` writes none.
 #[test]

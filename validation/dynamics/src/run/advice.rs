@@ -19,8 +19,8 @@ const ADVISED: Integrator = Integrator::ForceGradient {
 /// Cost of a recommended step in steps of velocity Verlet: three evaluations of forces and half a thermostat.
 const PRICE: f64 = 4.5;
 
-/// Largest number of particles for which the stiffness is computed, because the computation stores all pairs.
-const MOST: usize = 500_000;
+/// Largest number of particles for which drag and stiffness are computed, because both computations store all pairs.
+pub(super) const MOST: usize = 500_000;
 
 /// Smallest relative error that deserves advice.
 const WORTH: f64 = 0.01;
@@ -49,7 +49,7 @@ impl Advice {
             return None;
         }
         // The estimate does not hold beside frozen walls, and a driven flow is hot by itself.
-        if simulation.has_body_forces() || !simulation.frozen().is_empty() {
+        if simulation.has_body_forces() || !simulation.frozen().is_empty() || simulation.len() > MOST {
             return None;
         }
         let drag = simulation.warmth(stage.dt).ok()??.rate;
@@ -76,7 +76,7 @@ impl Advice {
 /// The root mean square frequency of the particles; `None` if the forces have no Laplacian.
 fn frequency(simulation: &Simulation) -> Option<f64> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
-    if simulation.len() > MOST || configurational::missing(&fluid, simulation.domain()).is_some() {
+    if configurational::missing(&fluid, simulation.domain()).is_some() {
         return None;
     }
     let evaluator = Evaluator::new(fluid).ok()?;

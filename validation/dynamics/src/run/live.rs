@@ -24,7 +24,8 @@ impl Live {
     /// # Errors
     /// The initial state is invalid, or its particles do not fit into memory.
     pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
-        memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
+        let particles = scene.initial.parts().iter().map(|part| part.count).sum();
+        memory::check(particles, memory::PARTICLE)?;
         let mut simulation = scene.simulation(scene.initial_state())?;
         let precision = scene.precision();
         simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;

@@ -42,7 +42,7 @@ pub use runner::{Begin, Runner, Start, run_scene};
 pub use simulation::Simulation;
 pub use summary::Summary;
 pub use timing::{Iterations, Session, Timing};
-pub use watch::{Deviation, Thermometer};
+pub use watch::{Deviation, Thermometer, bytes_per_particle};
 
 #[cfg(test)]
 mod tests;

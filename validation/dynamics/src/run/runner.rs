@@ -6,6 +6,7 @@ use super::simulation::Simulation;
 use super::summary::Summary;
 use super::timing::Timing;
 use super::underway::Run;
+use super::watch::bytes_per_particle;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Written};
 use crate::particles::State;
@@ -108,7 +109,7 @@ impl<'a> Runner<'a> {
             return Err(RunError::OwnInput { path: path.clone() });
         }
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
-        memory::check(particles)?;
+        memory::check(particles, bytes_per_particle(scene))?;
         let state = scene.initial_state();
         let simulation = simulation(scene, state.clone())?;
         store.clear()?;

@@ -9,10 +9,12 @@
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
+use super::advice::MOST;
 use super::error::RunError;
 use super::simulation::Simulation;
-use crate::scene::Stage;
+use crate::scene::{Scene, Stage};
 use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_formats::memory::PARTICLE;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
@@ -54,6 +56,10 @@ const FACES: f64 = 1.2;
 /// A stage of at least this many steps is sampled for its configurational temperature. If the thermostat
 /// keeps velocities right at any time step, only this temperature reveals a step that is too long.
 const WORTH_A_LOOK: u64 = 1000;
+
+/// Bytes per particle of the pairs of a thermostat, and of an evaluation for a configurational temperature.
+const PAIRS: f64 = 270.0;
+const EVALUATION: f64 = 900.0;
 
 /// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -141,6 +147,11 @@ impl Hot {
         let without = done - self.at;
         if 2 * without < done - self.since { 0 } else { without }
     }
+
+    /// Whether a run has stayed hot for too long; drag and noise take `relaxation` steps to cool it.
+    fn lasts(&self, done: u64, relaxation: f64) -> bool {
+        self.count >= IN_A_ROW && self.steps(done) as f64 > PATIENCE * relaxation
+    }
 }
 
 /// Sums over the spatial blocks of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each block, and of their products.
@@ -176,6 +187,20 @@ impl Configurational {
     }
 }
 
+/// Bytes per particle at the peak of a run of a scene, about those of Warren's liquid (docs/bench.md). The watch lists the
+/// pairs of the thermostat, and for configurational temperatures the pairs of the forces; so does the advice at the end
+/// of a small run.
+pub fn bytes_per_particle(scene: &Scene) -> f64 {
+    let particles: usize = scene.initial.parts().iter().map(|part| part.count).sum();
+    let any = |least: u64| {
+        particles <= MOST || scene.stages.iter().any(|stage| stage.thermostat && stage.steps >= least)
+    };
+    [(LEAST, PAIRS), (WORTH_A_LOOK, EVALUATION)]
+        .iter()
+        .filter(|(least, _)| any(*least))
+        .fold(PARTICLE, |sum, (_, bytes)| sum + bytes)
+}
+
 impl Watch {
     pub fn is_due(stage: &Stage, done: u64) -> bool {
         let interval = (stage.steps / SAMPLES).clamp(LEAST, INTERVAL);
@@ -206,8 +231,7 @@ impl Watch {
         }
         let hot = Hot::with(self.hot, ratio, done);
         self.hot = Some(hot);
-        let relaxations = hot.steps(done) as f64 * stage.dt * warmth.rate;
-        if hot.count >= IN_A_ROW && relaxations > PATIENCE {
+        if hot.lasts(done, 1.0 / (stage.dt * warmth.rate)) {
             return Err(RunError::TooHot {
                 step: simulation.step_number(),
                 since: simulation.step_number() - (done - hot.since),
@@ -337,13 +361,14 @@ mod tests {
         }
     }
 
-    /// The number of temperatures, one every ten steps, until a run with a patience of 200 steps would stop.
+    /// The number of temperatures, one every ten steps, until a run stops whose relaxation time is twenty steps: ten such
+    /// times are 200 steps.
     fn stopped_after(temperatures: impl Iterator<Item = f64>) -> Option<usize> {
         let mut hot = None;
         temperatures.enumerate().find_map(|(k, ratio)| {
             let now = Hot::with(hot, ratio, 10 * k as u64);
             hot = Some(now);
-            (now.count >= IN_A_ROW && now.steps(10 * k as u64) > 200).then_some(k)
+            now.lasts(10 * k as u64, 20.0).then_some(k)
         })
     }
 

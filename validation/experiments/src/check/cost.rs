@@ -1,7 +1,7 @@
 //! What a scene will take on this machine, from a short trial of it.
 
 use crate::bulk::{Bulk, Sampling};
-use psidpd_dynamics::run::{Begin, RunError, Runner};
+use psidpd_dynamics::run::{Begin, RunError, Runner, bytes_per_particle};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::memory;
 use serde::Serialize;
@@ -57,7 +57,8 @@ pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
     } else {
         trial(scene)?
     };
-    Ok(Cost { particles, steps, bytes: memory::need(particles), seconds: each * steps as f64 })
+    let bytes = memory::need(particles, bytes_per_particle(scene));
+    Ok(Cost { particles, steps, bytes, seconds: each * steps as f64 })
 }
 
 /// Seconds of a step of the last stage.

@@ -14,6 +14,7 @@ use psidpd_core::model::{Fluid, Model};
 use psidpd_dynamics::integrator::{Counterpart, Integrator};
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::scene::{Scene, Stage};
+use psidpd_formats::memory;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
@@ -60,7 +61,8 @@ impl Default for Script<'_> {
 /// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`LammpsError`].
 pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
     let script = script_of(scene, Script::default())?;
-    psidpd_formats::memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
+    let particles = scene.initial.parts().iter().map(|part| part.count).sum();
+    memory::check(particles, memory::PARTICLE)?;
     let mut files = vec![PathBuf::from(SCRIPT)];
     files.extend(write_inputs(scene, &scene.initial_state(), out)?);
     save(&out.join(SCRIPT), &script)?;

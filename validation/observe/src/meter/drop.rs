@@ -424,6 +424,8 @@ mod tests {
             assert!((get("tension") - 2.0 * get("radius") / rest).abs() < 1e-2);
             let expected = 3.0 * ((dimensions as f64 + 2.0) / dimensions as f64).sqrt();
             assert!((get("radius_gyration") - expected).abs() < 1e-12);
+            let along = &out[2].get("radius_gyration").unwrap().values;
+            assert!(along.len() == 10 && along.iter().all(|r| (r - expected).abs() < 1e-12), "{along:?}");
             assert_eq!(out[0].note, "");
             for k in 10..20 {
                 assert!(drop.shells.push(&row) && drop.size.push(&[f64::from(k), 100.0, 9.0, 1.0]));

@@ -164,6 +164,18 @@ fn what_is_not_there_is_said() {
     assert!(all.contains("no final.data") && all.contains("no rows yet"), "{all}");
 }
 
+/// A last state of four terabytes, which takes no room on the disk, does not end the program that makes the page.
+#[test]
+fn a_state_that_does_not_fit_into_memory_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("thermo.csv"), thermo()).unwrap();
+    std::fs::File::create(folder.path().join("final.data")).unwrap().set_len(1 << 42).unwrap();
+    let (texts, _) = page(folder.path());
+    let all = texts.join("\n");
+    assert!(all.contains("final.data needs about 17592.2 GB of memory"), "{all}");
+    assert!(all.contains("there are no pictures of it") && all.contains("Pressure"), "{all}");
+}
+
 #[test]
 fn what_cannot_be_read_is_said_and_the_rest_is_shown() {
     let folder = tempfile::tempdir().unwrap();
