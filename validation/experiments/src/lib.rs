@@ -4,6 +4,7 @@ pub mod bench;
 pub mod bulk;
 pub mod calibrate;
 pub mod check;
+pub mod code;
 pub mod crosscheck;
 mod error;
 pub mod fluids;

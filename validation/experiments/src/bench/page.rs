@@ -169,23 +169,11 @@ fn plot(outcome: &Outcome, fluid: &'static str, title: &str) -> Plot {
     let series = wanted.iter().filter_map(|code| {
         let runs: Vec<&Run> = outcome.runs.iter().filter(|r| r.fluid == fluid && r.code == *code).collect();
         let of = |r: &&Run| (r.particles as f64, r.mega_particle_steps_per_second.median);
-        (!runs.is_empty()).then(|| Series {
-            name: code.clone(),
-            points: runs.iter().map(of).collect(),
-            errors: None,
-            style: if runs.len() > 1 { Style::Line } else { Style::Points },
-        })
+        let style = if runs.len() > 1 { Style::Line } else { Style::Points };
+        (!runs.is_empty()).then(|| Series::new(code.clone(), runs.iter().map(of).collect(), style))
     });
-    Plot {
-        title: title.to_owned(),
-        x_label: "particles".into(),
-        y_label: "10⁶ particle-steps per second".into(),
-        series: series.collect(),
-        log_x: true,
-        log_y: true,
-        levels: vec![],
-        marks: vec![],
-    }
+    let labels = ["particles", "10⁶ particle-steps per second"];
+    Plot { log_x: true, log_y: true, ..Plot::new(title, labels, series.collect()) }
 }
 
 /// `report.html`.
@@ -201,35 +189,32 @@ pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
     ))];
     speed.extend(few(&outcome.options).map(Item::Prose));
     for fluid in &outcome.fluids {
-        let svg = plot(outcome, fluid.name, fluid.title).render()?;
-        speed.push(Item::Figure { svg, caption: String::new() });
+        speed.push(Item::figure(&plot(outcome, fluid.name, fluid.title), "")?);
     }
     speed.push(Item::Table(speeds(outcome)));
     speed.push(Item::Table(fastest(outcome)));
-    let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let sections = vec![
-        section("Speed", speed),
-        section(
+        Section::new("Speed", speed),
+        Section::new(
             "Where the time goes, natively",
             vec![
-                Item::Prose(
+                Item::prose(
                     "Nanoseconds per particle and step. Sort: into bins. Pairs: search, conservative, dissipative and \
                      random forces of pairs, weights. Psi: densities, ψ and its slopes. Many-body: their forces. \
-                     Forces: back to the host's order. Integrate: all else."
-                        .into(),
+                     Forces: back to the host's order. Integrate: all else.",
                 ),
                 Item::Table(parts(outcome, |r| r.instructions.is_some(), &NATIVE_PARTS)),
             ],
         ),
-        section(
+        Section::new(
             "Where the time goes in LAMMPS",
             vec![
-                Item::Prose("Nanoseconds per particle and step, as LAMMPS accounts for them.".into()),
+                Item::prose("Nanoseconds per particle and step, as LAMMPS accounts for them."),
                 Item::Table(parts(outcome, |r| r.skin.is_some(), &LAMMPS_PARTS)),
             ],
         ),
-        section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
-        section("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
+        Section::new("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
+        Section::new("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
     let missing = match outcome.lammps.missing.join(", ") {
         none if none.is_empty() => "none".to_owned(),

@@ -3,9 +3,9 @@
 use super::LOG;
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::fluids::DPD_PAIR;
 use crate::lammps::deck::Deck;
 use crate::lammps::frames;
-use crate::lammps::style::PairStyle;
 use crate::models;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
@@ -63,9 +63,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         ));
         part.values.push((format!("observables.{name}"), json!({"largest": scale, "difference": apart})));
     }
-    part.section = Section {
-        heading: "Distances and displacements of the same configurations".into(),
-        items: vec![
+    part.section = Section::new(
+        "Distances and displacements of the same configurations",
+        vec![
             Item::Prose(format!(
                 "LAMMPS runs {} particles of its own dpd, and dumps a configuration every {EVERY} steps: g(r) is the mean \
                  over {} of them, in {BINS} shells up to {RANGE}, the displacements are those from the first.",
@@ -74,7 +74,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             )),
             Item::Table(table),
         ],
-    };
+    );
     Ok(part)
 }
 
@@ -109,7 +109,7 @@ fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64
          fix m all ave/time {EVERY} 1 {EVERY} c_m[4] file msd.txt format \" %.16g\"\n\
          dump frames all custom {EVERY} frames.txt id x y z ix iy iz\n\
          dump_modify frames sort id format float %.17g\nrun {}\n",
-        Deck::new(&PairStyle::Dpd { a: 25.0, gamma: 4.5, rc: 1.0 }, SEED, "start.data".into()).text(),
+        Deck::new(&DPD_PAIR, SEED, "start.data".into()).text(),
         RANGE + 0.5,
         FRAMES + 1,
         EVERY * FRAMES,

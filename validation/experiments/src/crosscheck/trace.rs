@@ -2,10 +2,11 @@
 
 use super::Context;
 use super::LOG;
-use super::codes::{Code, Setup};
+use super::setup::Setup;
 use crate::ExperimentError;
-use psidpd_core::engine::{Fault, Precision, Settings, Want};
-use psidpd_dynamics::run::{Integrator, Simulation, State};
+use crate::start::simulation;
+use psidpd_core::engine::{Fault, Want};
+use psidpd_dynamics::run::{Integrator, State};
 use psidpd_formats::dump;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -74,9 +75,10 @@ pub fn run(
     name: &str,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
-    match setup.code {
-        Code::Native | Code::NativeMixed => native(setup, state, length, context.fault, advance),
-        _ => lammps(context, setup, state, length, &context.work.join(name), advance),
+    if setup.is_native() {
+        native(setup, state, length, context.fault, advance)
+    } else {
+        lammps(context, setup, state, length, &context.work.join(name), advance)
     }
 }
 
@@ -89,11 +91,7 @@ pub(super) fn native(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
-    let mut simulation = Simulation::new(&model, 1.0, state.clone(), setup.seed)?;
-    if setup.code == Code::NativeMixed {
-        simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
-    }
-    fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
+    let mut simulation = simulation(&model, 1.0, state, setup.seed, setup.precision, fault)?;
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
     simulation.prepare(length.dt, Want::TOTALS)?;
     let (mut sum, mut count) = ([0.0; 16], 0.0);

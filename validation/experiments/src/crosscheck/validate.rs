@@ -118,7 +118,7 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
     write_atomically(out.join("results.json"), results.to_json()?.as_bytes())?;
     sections.insert(0, conclusion::what_is_compared());
     sections.insert(0, conclusion::section(results));
-    sections.push(Section { heading: "Checks".into(), items: vec![Item::Table(check_table(results))] });
+    sections.push(Section::new("Checks", vec![Item::Table(check_table(results))]));
     let mut facts: Vec<(String, String)> = results.facts.clone().into_iter().collect();
     let seeds: Vec<String> = results.seeds.iter().map(u64::to_string).collect();
     facts.push(("seeds".into(), seeds.join(", ")));

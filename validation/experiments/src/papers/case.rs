@@ -136,25 +136,12 @@ impl Outcome {
         measured: &[(&str, Vec<(f64, Measured)>)],
         published: &[(&str, Vec<(f64, f64)>)],
     ) {
-        let points = measured.iter().map(|(name, points)| Series {
-            name: (*name).into(),
-            points: points.iter().map(|(x, y)| (*x, y.value)).collect(),
-            errors: Some(points.iter().map(|(_, y)| y.error).collect()),
-            style: Style::Points,
+        let points = measured.iter().map(|(name, points)| {
+            let errors = points.iter().map(|(_, y)| y.error).collect();
+            Series::new(*name, bare(points), Style::Points).with_errors(errors)
         });
-        let lines = published.iter().map(|(name, points)| Series {
-            name: (*name).into(),
-            points: points.clone(),
-            errors: None,
-            style: Style::Line,
-        });
-        let plot = Plot {
-            title: title.into(),
-            x_label: axes[0].into(),
-            y_label: axes[1].into(),
-            series: points.chain(lines).collect(),
-            ..Plot::default()
-        };
+        let lines = published.iter().map(|(name, points)| Series::new(*name, points.clone(), Style::Line));
+        let plot = Plot::new(title, axes, points.chain(lines).collect());
         self.plots.push((file, plot));
     }
 }

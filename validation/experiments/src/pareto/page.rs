@@ -120,22 +120,14 @@ fn groups(outcome: &Outcome, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<
         let own: Vec<&&Point> = shown.iter().filter(|p| group(p) == name).collect();
         let points = own.iter().filter_map(|p| place(p)).collect();
         let errors = own.iter().map(|p| error(p).map_or(f64::NAN, |e| e[1])).collect();
-        Series { name, points, errors: Some(errors), style: Style::Points }
+        Series::new(name, points, Style::Points).with_errors(errors)
     };
     names.into_iter().map(series).collect()
 }
 
 fn plot(title: &str, y_label: String, series: Vec<Series>, levels: Vec<(f64, String)>) -> Plot {
-    Plot {
-        title: title.into(),
-        x_label: "wall seconds per unit of simulated time".into(),
-        y_label,
-        series,
-        log_x: true,
-        log_y: true,
-        levels,
-        marks: Vec::new(),
-    }
+    let labels = ["wall seconds per unit of simulated time".to_owned(), y_label];
+    Plot { log_x: true, log_y: true, levels, ..Plot::new(title, labels, series) }
 }
 
 /// The worst error of every setting against its cost; the front is a line.
@@ -149,7 +141,7 @@ fn plot_of_worst(outcome: &Outcome) -> Option<Plot> {
     let mut points: Vec<(f64, f64)> =
         front.filter_map(|p| Some((p.cost.as_ref()?.value, error(p)?[0]))).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    series.push(Series { name: "front".into(), points, errors: None, style: Style::Line });
+    series.push(Series::new("front", points, Style::Line));
     let label = "worst error over its tolerance".to_owned();
     Some(plot("Worst error against cost", label, series, vec![(1.0, "tolerance".into())]))
 }
@@ -232,21 +224,18 @@ pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
     for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {
-        plots.push(Item::Figure {
-            svg: plot.render()?,
-            caption: "Without a bar: not resolved, at what the error is likely to be below.".into(),
-        });
+        let caption = "Without a bar: not resolved, at what the error is likely to be below.";
+        plots.push(Item::figure(&plot, caption)?);
     }
-    let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let mut settings = vec![Item::Prose(explanation(outcome)), Item::Table(table(outcome))];
     settings.extend(outcome.left_out.iter().cloned().map(Item::Prose));
     let mut sections = vec![
-        section("Recommendation", vec![Item::Prose(recommendation(outcome))]),
-        section("Speed against error", plots),
-        section("All settings", settings),
+        Section::new("Recommendation", vec![Item::Prose(recommendation(outcome))]),
+        Section::new("Speed against error", plots),
+        Section::new("All settings", settings),
     ];
     if !outcome.drifts.is_empty() {
-        sections.push(section("Energy without thermostat", vec![Item::Table(drifts(outcome))]));
+        sections.push(Section::new("Energy without thermostat", vec![Item::Table(drifts(outcome))]));
     }
     let report = Report {
         title: format!("Speed against error: {}", outcome.scene),
