@@ -20,12 +20,13 @@ pub use outcome::Outcome;
 pub use spread::Spread;
 
 use crate::ExperimentError;
+use crate::code::{Code, Suffix};
 use crate::fluids::{MDPD, SUBJECTS, Subject};
 use crate::lammps::host::PluginHost;
 use crate::lammps::log::Loop;
 use crate::machine::machine;
 use crate::start::{self, Start};
-use contender::{Choice, Contender, Field, Suffix};
+use contender::{Choice, Contender, Field};
 use deck::Place;
 use length::{FEWEST, Length};
 use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
@@ -192,8 +193,7 @@ fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, S
 fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), ExperimentError> {
     let styles = deck::pair_styles(place)?;
     let has = |name: &str| styles.contains(name);
-    let suffixes: Vec<Suffix> =
-        [Suffix::None, Suffix::Omp, Suffix::Intel].into_iter().filter(|s| has(s.style())).collect();
+    let suffixes: Vec<Suffix> = Suffix::ALL.into_iter().filter(|s| has(s.style())).collect();
     let wanted = ["mdpd", "eam/alloy", "dpd/tstat", "dpd", "dpd/omp", "dpd/intel"];
     let missing = wanted.iter().filter(|s| !has(s)).map(|s| (*s).to_owned()).collect();
     let choice = Choice {
@@ -420,7 +420,7 @@ fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> 
         let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
         let speed_up = Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())?;
         let ranks = run.ranks as f64;
-        let plugin = matches!(entry.contender.code, contender::Code::Plugin(_));
+        let plugin = entry.contender.code == Code::Psi;
         let Spread { min, median, max } = speed_up;
         Some(Scaling {
             code: alone.id(),

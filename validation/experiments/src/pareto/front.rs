@@ -2,8 +2,8 @@
 
 use super::outcome::Point;
 use super::quantity::Deviation;
-use super::setting::Host;
 use super::tolerance::{Tolerance, worst};
+use crate::code::Host;
 
 /// Bound of every quantity where none is given.
 const USUAL: f64 = 0.01;

@@ -22,14 +22,14 @@ use outcome::{Cost, Outcome, Point, Recommended, Reference};
 use quantity::Deviation;
 pub use sample::Effort;
 pub use setting::Choice;
-use setting::Host;
 pub use time::Pace;
 pub use tolerance::Tolerance;
 
 use crate::ExperimentError;
+use crate::code::Host;
 use crate::jobs::{self, Job};
 use crate::machine::machine;
-use lammps::Lammps;
+use lammps::LammpsRuns;
 use origin::Origin;
 use own_style::is_another_law;
 use psidpd_core::engine::Precision;
@@ -90,7 +90,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     let known = known(&origin)?;
     let mut left_out = Vec::new();
     let lammps = match options.lammps {
-        true => match Lammps::open(&origin, &out.join("runs"), &|line| progress.note(line)) {
+        true => match LammpsRuns::open(&origin, &out.join("runs"), &|line| progress.note(line)) {
             Ok(lammps) => Some(lammps),
             Err(error) => {
                 left_out.push(format!("LAMMPS is not among the points: {error}."));
@@ -339,7 +339,7 @@ type Own = (Option<Reference>, Vec<Point>);
 /// LAMMPS's own style.
 fn own_points(
     origin: &Origin,
-    lammps: &Lammps,
+    lammps: &LammpsRuns,
     seconds: f64,
     options: &Options,
     known: Known,

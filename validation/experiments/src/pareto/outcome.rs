@@ -2,9 +2,10 @@
 
 use super::drift::EnergyDrift;
 use super::quantity::{self, Class, Deviation};
-use super::setting::{Host, Setting};
+use super::setting::Setting;
 use super::tolerance::{self, Tolerance, Worst};
 use crate::bench::Spread;
+use crate::code::Host;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -132,11 +133,6 @@ impl Point {
     }
 
     pub fn name(&self) -> String {
-        let who = match self.code {
-            Host::Native => "native",
-            Host::Plugin => "plugin",
-            Host::Lammps => "lammps",
-        };
-        format!("{who}, {}", self.integrator)
+        format!("{}, {}", self.code.name(), self.integrator)
     }
 }

@@ -2,8 +2,8 @@
 
 use super::outcome::{Outcome, Point, Reference};
 use super::quantity::{Class, Deviation};
-use super::setting::Host;
 use crate::ExperimentError;
+use crate::code::Host;
 use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table};
 
 /// An error in percent with its own; what is not resolved as what it is likely to be below.
