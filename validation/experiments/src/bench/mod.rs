@@ -16,7 +16,7 @@ mod pairs;
 mod spread;
 mod turns;
 
-pub use outcome::Outcome;
+pub use outcome::Benchmark;
 pub use spread::Spread;
 
 use crate::ExperimentError;
@@ -29,7 +29,7 @@ use crate::start::{self, Start};
 use contender::{Choice, Contender, Field};
 use deck::Place;
 use length::{FEWEST, Length};
-use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
+use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
 use psidpd_lammps_host::Host;
@@ -109,7 +109,7 @@ type Cases = BTreeMap<(&'static str, usize), Case>;
 ///
 /// # Errors
 /// Something could not be run or written.
-pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, ExperimentError> {
+pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
     std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
     // LAMMPS runs in folders of its own: paths must not depend on ours.
@@ -134,7 +134,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     let runs = runs(&entries, &cases);
     let (fluids, slope_widths) = facts()?;
     let scaling = scaling(&runs, &entries, slope_widths["mdpd"]);
-    let outcome = Outcome {
+    let outcome = Benchmark {
         format: 3,
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine {
@@ -169,7 +169,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     Ok(outcome)
 }
 
-fn write(out: &Path, outcome: &Outcome) -> Result<(), ExperimentError> {
+fn write(out: &Path, outcome: &Benchmark) -> Result<(), ExperimentError> {
     let json = serde_json::to_string_pretty(outcome)
         .map_err(|e| ExperimentError::io(out.join("bench.json"))(e.into()))?;
     write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
@@ -357,8 +357,8 @@ fn median(values: &[f64]) -> f64 {
     Spread::of(values).map_or(0.0, |s| s.median)
 }
 
-fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
-    let mut runs: Vec<Run> = entries
+fn runs(entries: &[Entry], cases: &Cases) -> Vec<Timed> {
+    let mut runs: Vec<Timed> = entries
         .iter()
         .map(|entry| {
             let case = &cases[&(entry.subject.name, entry.size)];
@@ -372,7 +372,7 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
             let per_particle = 1e9 * median(&entry.seconds) / all;
             let settings = entry.contender.settings();
             let steps = entry.length.steps * entry.seconds.len() as u64;
-            let mut run = Run {
+            let mut run = Timed {
                 fluid: entry.subject.name,
                 size: entry.size,
                 code: entry.contender.id(),
@@ -404,7 +404,7 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
         .zip(entries)
         .map(|(run, entry)| {
             let reference = contender::reference(&entry.subject)?.id();
-            let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == reference;
+            let same = |r: &&Timed| r.fluid == run.fluid && r.size == run.size && r.code == reference;
             Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())
         })
         .collect();
@@ -414,10 +414,10 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
     runs
 }
 
-fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
-    let of = |(run, entry): (&Run, &Entry)| {
+fn scaling(runs: &[Timed], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
+    let of = |(run, entry): (&Timed, &Entry)| {
         let alone = Contender { ranks: 1, weak: false, ..entry.contender.clone() };
-        let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
+        let same = |r: &&Timed| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
         let speed_up = Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())?;
         let ranks = run.ranks as f64;
         let plugin = entry.contender.code == Code::Psi;

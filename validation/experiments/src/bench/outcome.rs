@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// All of `bench.json`.
 #[derive(Debug, Clone, Serialize)]
-pub struct Outcome {
+pub struct Benchmark {
     /// Changes when fields change their meaning.
     pub format: u32,
     pub version: &'static str,
@@ -16,7 +16,7 @@ pub struct Outcome {
     pub options: Asked,
     pub fluids: Vec<FluidFacts>,
     /// Every contender with every fluid and size.
-    pub runs: Vec<Run>,
+    pub runs: Vec<Timed>,
     /// Two ranks against one.
     pub scaling: Vec<Scaling>,
     pub memory: Vec<Memory>,
@@ -76,7 +76,7 @@ pub struct FluidFacts {
 
 /// One contender with one fluid at one size.
 #[derive(Debug, Clone, Serialize)]
-pub struct Run {
+pub struct Timed {
     pub fluid: &'static str,
     /// Particles of the many-body fluid in the box before it was repeated.
     pub size: usize,
@@ -112,7 +112,7 @@ pub struct Run {
     pub steps_between_builds: Option<f64>,
 }
 
-impl Run {
+impl Timed {
     /// Millions of particle-steps per second in each round.
     pub fn rates(&self) -> Vec<f64> {
         self.seconds.iter().map(|s| 1e-6 * self.particles as f64 * self.steps as f64 / s).collect()

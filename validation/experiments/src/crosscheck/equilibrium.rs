@@ -27,9 +27,9 @@ const WARMER: f64 = 0.02;
 const PUBLISHED: f64 = 3.0;
 
 /// A code, its law, and the run it is compared with.
-type Run = (Code, ForceLaw, Option<usize>);
+type Slot = (Code, ForceLaw, Option<usize>);
 
-const RUNS: [Run; 5] = [
+const RUNS: [Slot; 5] = [
     (Code::Native, ForceLaw::Conservative, None),
     (Code::Psi, ForceLaw::Conservative, Some(NATIVE)),
     (Code::MdpdPsi, ForceLaw::LucyLammps, None),
@@ -41,7 +41,7 @@ const MDPD_PSI: usize = 2;
 const BUILT_IN: usize = 3;
 
 /// The first of them, as many as a set has. Tables take longest: a quick validation makes one run with them.
-fn runs(set: &WarrenSet, full: bool) -> &'static [Run] {
+fn runs(set: &WarrenSet, full: bool) -> &'static [Slot] {
     if full || set.name == SET6.name { &RUNS } else { &RUNS[..=BUILT_IN] }
 }
 

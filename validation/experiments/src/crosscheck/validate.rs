@@ -24,7 +24,7 @@ pub struct Options {
 }
 
 #[derive(Debug)]
-pub struct Outcome {
+pub struct Validation {
     pub results: Results,
     pub report: PathBuf,
 }
@@ -33,7 +33,7 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Something could not be run or written; checks that fail are in the results.
-pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
+pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, ExperimentError> {
     let start = Instant::now();
     std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
     // LAMMPS runs in folders of its own: paths must not depend on ours.
@@ -71,8 +71,8 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Exper
         observables::SEED,
     ];
     let mut sections = Vec::new();
-    type Run = fn(&Context) -> Result<Part, ExperimentError>;
-    let parts: [(&str, Run); 7] = [
+    type Comparison = fn(&Context) -> Result<Part, ExperimentError>;
+    let parts: [(&str, Comparison); 7] = [
         ("forces", forces::run),
         ("thermostat", thermostat::run),
         ("mixture", mixture::run),
@@ -95,7 +95,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Exper
     }
     results.facts.insert("wall time".into(), format!("{:.0} s", start.elapsed().as_secs_f64()));
     let report = write(&out, &results, sections)?;
-    Ok(Outcome { results, report })
+    Ok(Validation { results, report })
 }
 
 pub fn check_table(results: &Results) -> Table {

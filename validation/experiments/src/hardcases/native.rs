@@ -1,6 +1,6 @@
 //! Cases in the native runner.
 
-use super::case::{Case, Found, Must, Run};
+use super::case::{Case, Found, Inputs, Must};
 use crate::ExperimentError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{Fault, Precision, Settings, Want};
@@ -22,7 +22,7 @@ pub const FEW: usize = 3;
 /// # Errors
 /// Files that cannot be written; what is wrong with the scene is the inner error.
 pub fn scene(
-    run: &Run,
+    run: &Inputs,
     integrator: Integrator,
     precision: Precision,
     folder: &Path,
@@ -204,7 +204,7 @@ mod tests {
             "[[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.0]\nhigh = [4.0, 4.0, 4.0]\ndensity = 3.0\n";
         let must = super::super::case::Must::Right(0.04);
         let judged = |drift: &str| {
-            let run = Run {
+            let run = Inputs {
                 model: IDEAL.into(),
                 kt: 1.0,
                 scene: format!("box = 4.0\n{part}{drift}"),

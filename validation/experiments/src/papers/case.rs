@@ -82,13 +82,13 @@ impl Compared {
 }
 
 #[derive(Debug, Clone, Default)]
-pub struct Outcome {
+pub struct Reproduction {
     pub values: Vec<Compared>,
     /// File names without extension, and plots.
     pub plots: Vec<(&'static str, Plot)>,
 }
 
-impl Outcome {
+impl Reproduction {
     /// Whether all values agree.
     pub fn passes(&self) -> bool {
         !self.values.is_empty() && self.values.iter().all(Compared::passes)
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn what_is_our_own_says_so() {
-        let mut outcome = Outcome::default();
+        let mut outcome = Reproduction::default();
         outcome.equal("x", exact(1.0), 1.0, 0.1);
         outcome.own("y", exact(1.0), Measured { value: 2.0, error: 0.1 });
         let own: Vec<Value> = outcome.values.iter().map(|v| v.to_json()["own"].clone()).collect();
@@ -267,6 +267,6 @@ mod tests {
         assert!(!vague(Rule::Equal, 10.0).passes() && vague(Rule::Equal, 10.0).deviation() == 0.0);
         assert!(vague(Rule::AtLeast, 11.0).passes() && !vague(Rule::AtLeast, 9.0).passes());
         assert!(vague(Rule::AtMost, 9.0).passes() && !vague(Rule::AtMost, 11.0).passes());
-        assert!(!Outcome::default().passes(), "a case without values says nothing");
+        assert!(!Reproduction::default().passes(), "a case without values says nothing");
     }
 }

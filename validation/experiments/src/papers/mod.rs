@@ -16,7 +16,7 @@ mod wang;
 mod warren;
 
 use crate::ExperimentError;
-pub use case::{Compared, Outcome, Rule};
+pub use case::{Compared, Reproduction, Rule};
 pub use context::{Context, Size};
 
 /// A figure or table.
@@ -29,22 +29,31 @@ pub struct Case {
     run: Run,
 }
 
-type Run = fn(&Context) -> Result<Outcome, ExperimentError>;
+/// Makes the runs of a case and adds its values and plots.
+type Run = fn(&Context, &mut Reproduction) -> Result<(), ExperimentError>;
+
+/// A paper, and its cases: id, the comparison in a line, and the function that makes it.
+type Paper = (&'static str, &'static [(&'static str, &'static str, Run)]);
+
+const PAPERS: [Paper; 5] =
+    [pagonabarraga::PAPER, trofimov::PAPER, warren::PAPER, wang::PAPER, berendsen::PAPER];
 
 impl Case {
     /// Runs the case.
     ///
     /// # Errors
     /// A run stops, or a file cannot be written. A value that does not agree is no error.
-    pub fn run(&self, context: &Context) -> Result<Outcome, ExperimentError> {
-        (self.run)(context)
+    pub fn run(&self, context: &Context) -> Result<Reproduction, ExperimentError> {
+        let mut outcome = Reproduction::default();
+        (self.run)(context, &mut outcome)?;
+        Ok(outcome)
     }
 }
 
-pub fn cases() -> Vec<&'static Case> {
-    let papers: [&'static [Case]; 5] =
-        [pagonabarraga::CASES, trofimov::CASES, warren::CASES, wang::CASES, berendsen::CASES];
-    papers.into_iter().flatten().collect()
+pub fn cases() -> Vec<Case> {
+    let of =
+        |(paper, cases): Paper| cases.iter().map(move |(id, what, run)| Case { id, paper, what, run: *run });
+    PAPERS.into_iter().flat_map(of).collect()
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ mod time;
 mod tolerance;
 
 use drift::EnergyDrift;
-use outcome::{Cost, Outcome, Point, Recommended, Reference};
+use outcome::{Comparison, Cost, Point, Recommended, Reference};
 use quantity::Deviation;
 pub use sample::Effort;
 pub use setting::Choice;
@@ -79,7 +79,7 @@ const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 ///
 /// # Errors
 /// The scene cannot be run with its own step, or something cannot be written.
-pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
+pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comparison, ExperimentError> {
     std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
     let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
     let seconds = 60.0 * options.minutes;
@@ -144,7 +144,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     if let Err(why) = &references.configurations {
         left_out.push(format!("This scene cannot run Monte Carlo, so small steps are the reference: {why}."));
     }
-    let mut outcome = Outcome {
+    let mut outcome = Comparison {
         format: 2,
         version: env!("CARGO_PKG_VERSION"),
         machine: machine(),
@@ -397,8 +397,8 @@ fn reference_of(origin: &Origin, physics: &Physics, sampled: &Sampled, known: Kn
     Reference { what: what(origin, physics), dt, samples, time, values }
 }
 
-fn recommend(origin: &Origin, outcome: &Outcome) -> Option<Recommended> {
-    let Outcome { points, tolerances, .. } = outcome;
+fn recommend(origin: &Origin, outcome: &Comparison) -> Option<Recommended> {
+    let Comparison { points, tolerances, .. } = outcome;
     let best = front::cheapest(points, tolerances, &[Host::Native])?;
     let timed = front::cheapest(points, tolerances, &[Host::Plugin]);
     let setting = points[best].setting;

@@ -9,7 +9,7 @@ use crate::code::Host;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct Comparison {
     /// Changes when fields change their meaning.
     pub format: u32,
     pub version: &'static str,

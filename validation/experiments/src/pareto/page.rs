@@ -1,6 +1,6 @@
 //! Results as tables, plots and a page.
 
-use super::outcome::{Outcome, Point, Reference};
+use super::outcome::{Comparison, Point, Reference};
 use super::quantity::{Class, Deviation};
 use crate::ExperimentError;
 use crate::code::Host;
@@ -22,7 +22,7 @@ fn shown(d: &Deviation) -> String {
 }
 
 /// The quantities that some point has an error of, in the order of the first that has them.
-fn names(outcome: &Outcome) -> Vec<String> {
+fn names(outcome: &Comparison) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for d in outcome.points.iter().flat_map(|p| &p.errors).chain(&outcome.reference.values) {
         if !names.contains(&d.name) {
@@ -46,7 +46,7 @@ fn reference_row(names: &[String], who: &str, reference: &Reference) -> Vec<Stri
 }
 
 /// Every setting, the cheapest first; errors in percent.
-pub fn table(outcome: &Outcome) -> Table {
+pub fn table(outcome: &Comparison) -> Table {
     let names = names(outcome);
     let mut header: Vec<String> =
         ["setting", "dt", "precision", "threads", "s per time unit"].map(str::to_owned).to_vec();
@@ -78,7 +78,7 @@ pub fn table(outcome: &Outcome) -> Table {
 }
 
 /// Energy without thermostat.
-pub fn drifts(outcome: &Outcome) -> Table {
+pub fn drifts(outcome: &Comparison) -> Table {
     let mut table = Table::new([
         "conservative steps of",
         "dt",
@@ -107,7 +107,7 @@ fn group(p: &Point) -> String {
 }
 
 /// Points of error against cost, in groups; `error` and its bar are in percent or in units of a tolerance.
-fn groups(outcome: &Outcome, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
+fn groups(outcome: &Comparison, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
     let place = |p: &Point| Some((p.cost.as_ref()?.value, error(p)?[0]));
     let shown: Vec<&Point> = outcome.points.iter().filter(|p| place(p).is_some()).collect();
     let mut names: Vec<String> = Vec::new();
@@ -131,7 +131,7 @@ fn plot(title: &str, y_label: String, series: Vec<Series>, levels: Vec<(f64, Str
 }
 
 /// The worst error of every setting against its cost; the front is a line.
-fn plot_of_worst(outcome: &Outcome) -> Option<Plot> {
+fn plot_of_worst(outcome: &Comparison) -> Option<Plot> {
     let error = |p: &Point| Some([p.worst.as_ref()?.ratio, f64::NAN]);
     let mut series = groups(outcome, error);
     if series.is_empty() {
@@ -147,7 +147,7 @@ fn plot_of_worst(outcome: &Outcome) -> Option<Plot> {
 }
 
 /// Error against cost for one kind of quantity.
-fn plot_of(outcome: &Outcome, class: Class) -> Option<Plot> {
+fn plot_of(outcome: &Comparison, class: Class) -> Option<Plot> {
     let error = |p: &Point| {
         let d = p.error(class)?;
         Some([100.0 * d.shown(), if d.resolved { 100.0 * d.error } else { f64::NAN }])
@@ -159,7 +159,7 @@ fn plot_of(outcome: &Outcome, class: Class) -> Option<Plot> {
     (!series.is_empty()).then(|| plot(&title, format!("error of {}, %", class.name()), series, levels))
 }
 
-pub fn recommendation(outcome: &Outcome) -> String {
+pub fn recommendation(outcome: &Comparison) -> String {
     let within: Vec<String> = outcome.tolerances.iter().map(ToString::to_string).collect();
     let within = within.join(", ");
     let mut text = match &outcome.unresolved[..] {
@@ -195,7 +195,7 @@ pub fn recommendation(outcome: &Outcome) -> String {
     text
 }
 
-pub fn explanation(outcome: &Outcome) -> String {
+pub fn explanation(outcome: &Comparison) -> String {
     let temperature = match outcome.temperature_is_known {
         true => "of the temperatures from kT",
         false => "of the kinetic temperature from that of the reference",
@@ -220,7 +220,7 @@ pub fn explanation(outcome: &Outcome) -> String {
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
+pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
     for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {
