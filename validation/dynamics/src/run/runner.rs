@@ -1,3 +1,4 @@
+use super::checkpoints::Checkpoints;
 use super::error::RunError;
 use super::folder::Folder;
 use super::outcome::{Outcome, Progress};
@@ -131,7 +132,8 @@ impl<'a> Runner<'a> {
         };
         let mut output = Output::create(scene, out)?;
         let good = Checkpoint { files: output.written(), ..good };
-        let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default())?;
+        let checkpoints = Checkpoints::new(store, good, None);
+        let run = Run::new(scene, folder, simulation, Some(output), checkpoints, Timing::default())?;
         Ok(Runner { start: Start::New, run })
     }
 
@@ -163,8 +165,9 @@ impl<'a> Runner<'a> {
                 .write(folder.path())
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
-        let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
-        run.stored = Some(run.good.step);
+        let stored = Some(good.step);
+        let checkpoints = Checkpoints::new(store, good, stored);
+        let run = Run::new(scene, folder, simulation, output, checkpoints, timing)?;
         Ok(Runner { start, run })
     }
 
@@ -174,7 +177,7 @@ impl<'a> Runner<'a> {
 
     /// Sets the wall time between checkpoints for a scene without a step interval; the default is ten minutes.
     pub fn set_checkpoint_interval(&mut self, interval: Duration) {
-        self.run.interval = interval;
+        self.run.checkpoints.interval = interval;
     }
 
     /// Sets the number of threads; the default is one. The output of a run does not depend on it.
@@ -213,10 +216,10 @@ impl<'a> Runner<'a> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
             // Leftover checkpoints are harmless, and the folder may be read-only, so an error is ignored.
-            let _ = run.store.keep_newest();
+            let _ = run.checkpoints.store.keep_newest();
             return Ok(Outcome::Finished {
                 summary: Box::new(run.summary()),
-                timing: run.timing.clone(),
+                timing: run.clock.earlier.clone(),
                 advice: None,
             });
         }
