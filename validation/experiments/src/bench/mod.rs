@@ -29,7 +29,8 @@ use crate::start::{self, Start};
 use contender::{Choice, Contender, Field};
 use deck::Place;
 use length::{FEWEST, Length};
-use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Scaling, Timed};
+pub use outcome::Asked;
+use outcome::{FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
 use psidpd_lammps_host::Host;
@@ -41,21 +42,11 @@ use std::path::{Path, PathBuf};
 /// What `psidpd bench` is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Particles of the many-body fluid in the boxes.
-    pub sizes: Vec<usize>,
-    pub rounds: usize,
-    /// Seconds that a timed run may take, if that is enough for the fewest steps.
-    pub seconds: f64,
-    /// Steps of every run instead; then no skin is looked for either.
-    pub steps: Option<u64>,
+    pub asked: Asked,
     /// Particles of the systems whose memory is measured.
     pub memory: Vec<usize>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
-    /// Every code, not only those of [`Field::User`].
-    pub every_code: bool,
-    /// Above this size only the contenders of [`Field::Few`] are timed.
-    pub few_above: usize,
     /// More words behind the seed of `pair_style dpd/psi`, each a contender.
     pub words: Vec<String>,
     /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
@@ -121,7 +112,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     let (choice, missing) = choice(options, &place)?;
     let (cases, mut entries) = entries(options, &choice, &place, &out, progress)?;
     calibrate(options, &cases, &place, &mut entries, progress)?;
-    time(options.rounds, &cases, &place, &mut entries, progress)?;
+    time(options.asked.rounds, &cases, &place, &mut entries, progress)?;
 
     let spinner = progress.spinner("memory and threads");
     let memory = match &options.memory[..] {
@@ -150,15 +141,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
             load,
         },
         lammps: LammpsFacts { version, missing },
-        options: Asked {
-            sizes: options.sizes.clone(),
-            rounds: options.rounds,
-            seconds: options.seconds,
-            steps: options.steps,
-            every_code: options.every_code,
-            few_above: options.few_above,
-            seed: start::SEED,
-        },
+        options: options.asked.clone(),
         fluids,
         runs,
         scaling,
@@ -214,9 +197,9 @@ fn entries(
     out: &Path,
     progress: &Progress,
 ) -> Result<(Cases, Vec<Entry>), ExperimentError> {
-    let smallest = options.sizes.iter().min().copied();
+    let smallest = options.asked.sizes.iter().min().copied();
     let (mut cases, mut entries) = (Cases::new(), Vec::new());
-    for &size in &options.sizes {
+    for &size in &options.asked.sizes {
         for subject in SUBJECTS {
             let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
             let start = start::kept(&subject, size, &out.join("starts"))?;
@@ -225,13 +208,14 @@ fn entries(
             let pairs = pairs::pairs_per_particle(&start.state, cutoff);
             cases.insert((subject.name, size), Case { start, pairs });
             deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
-            let field = Field::of(size, Some(size) == smallest, options.every_code, options.few_above);
+            let field =
+                Field::of(size, Some(size) == smallest, options.asked.every_code, options.asked.few_above);
             for contender in contender::contenders(&subject, choice, field) {
                 entries.push(Entry {
                     subject,
                     size,
                     contender,
-                    length: Length { warm_up: 5, steps: options.steps.unwrap_or(FEWEST) },
+                    length: Length { warm_up: 5, steps: options.asked.steps.unwrap_or(FEWEST) },
                     skin: SKIN,
                     step: None,
                     seconds: Vec::new(),
@@ -262,7 +246,7 @@ fn calibrate(
     entries: &mut [Entry],
     progress: &Progress,
 ) -> Result<(), ExperimentError> {
-    if options.steps.is_some() {
+    if options.asked.steps.is_some() {
         return Ok(());
     }
     let mut order: Vec<usize> = (0..entries.len()).collect();
@@ -284,7 +268,7 @@ fn calibrate(
         };
         let step = pace.seconds * entry.particles();
         (entry.skin, entry.step) = (pace.skin, Some(step));
-        entry.length = Length::within(options.seconds, &entry.contender, step);
+        entry.length = Length::within(options.asked.seconds, &entry.contender, step);
     }
     bar.finish();
     Ok(())
@@ -292,7 +276,7 @@ fn calibrate(
 
 fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, ExperimentError> {
     // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
-    let large = entry.size > options.few_above;
+    let large = entry.size > options.asked.few_above;
     entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
     let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
     // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
@@ -462,7 +446,7 @@ fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), Experimen
 }
 
 fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, ExperimentError> {
-    let smallest = options.sizes.iter().min().copied().unwrap_or_default();
+    let smallest = options.asked.sizes.iter().min().copied().unwrap_or_default();
     let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
     let mut equal = BTreeMap::new();
     for subject in &SUBJECTS {

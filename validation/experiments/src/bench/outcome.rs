@@ -52,13 +52,13 @@ pub struct Asked {
     /// Particles of the many-body fluid in the boxes.
     pub sizes: Vec<usize>,
     pub rounds: usize,
-    /// Seconds that a timed run may take.
+    /// Seconds that a timed run may take, if that is enough for the fewest steps.
     pub seconds: f64,
-    /// Steps of every run; null if they follow from `seconds`.
+    /// Steps of every run, and no skin is looked for; null if they follow from `seconds`.
     pub steps: Option<u64>,
-    /// Size above which few contenders are timed.
+    /// Size above which only the contenders of [`Field::Few`](super::contender::Field::Few) are timed.
     pub few_above: usize,
-    /// Whether every code is timed in boxes up to that.
+    /// Whether every code is timed in boxes up to that, not only those of a user.
     pub every_code: bool,
     /// Of starts and noise.
     pub seed: u64,

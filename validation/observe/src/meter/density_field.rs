@@ -27,8 +27,6 @@ impl Meter for DensityField {
     const TABLE: Table = Table {
         path: "density_field",
         title: "density on a plane",
-        array: false,
-        forms: ("", &[]),
         about: "Number density in columns of the box, averaged over `axis`, of all particles and of each of several \
                 species: a map of drops, films and domains that stay where they are. The first two columns are the \
                 middles of the cells, the later of the two directions running fastest. The box must have right \
@@ -41,6 +39,7 @@ impl Meter for DensityField {
                 "Cells along the other two directions, in their order."
                 => "[10, 20]";
         },
+        ..Table::PLAIN
     };
 
     fn read(options: &Options) -> Result<DensityField, FileError> {

@@ -33,8 +33,6 @@ impl Meter for Rdf {
     const TABLE: Table = Table {
         path: "rdf",
         title: "radial distribution functions",
-        array: false,
-        forms: ("", &[]),
         about: "Pairs in spherical shells (in two dimensions rings) over their number in an ideal gas of as many \
                 particles in the same box, N_A (N_A − 1)/2 or N_A N_B pairs in V: exactly 1 on average in an ideal \
                 gas. `g` of all particles, and `g_A_B` of each two of several species.",
@@ -46,6 +44,7 @@ impl Meter for Rdf {
                 "How many shells."
                 => "40";
         },
+        ..Table::PLAIN
     };
 
     fn read(options: &Options) -> Result<Rdf, FileError> {

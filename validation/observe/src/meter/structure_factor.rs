@@ -42,8 +42,6 @@ impl Meter for StructureFactor {
     const TABLE: Table = Table {
         path: "structure_factor",
         title: "structure factors",
-        array: false,
-        forms: ("", &[]),
         about: "Direct sums over the wave vectors of the periodic box, averaged over shells of about equal |k|: `s` \
                 = ⟨|Σ exp(ik·r)|²⟩/N of all particles, and of each two of several species `s_A_B` = \
                 ⟨Re ρ_A(k) ρ_B(−k)⟩/√(N_A N_B) (Ashcroft and Langreth). Shells with many vectors keep an even \
@@ -59,6 +57,7 @@ impl Meter for StructureFactor {
                 "The most wave vectors in a shell."
                 => "6";
         },
+        ..Table::PLAIN
     };
 
     fn read(options: &Options) -> Result<StructureFactor, FileError> {

@@ -79,8 +79,6 @@ impl Meter for Viscosity {
     const TABLE: Table = Table {
         path: "viscosity",
         title: "shear viscosity (Green–Kubo)",
-        array: false,
-        forms: ("", &[]),
         about: "η(t) = V/kT ∫₀ᵗ C(t′) dt′ with the autocorrelation C of the shear stress of all forces, drag and noise \
                 included, averaged over all shears: C = ⟨P:P(t)⟩/((d − 1)(d + 2)) of the traceless tensor. Sampled \
                 at every step and summed by the trapezoid rule, this is Einstein and Helfand's slope of the square \
@@ -94,6 +92,7 @@ impl Meter for Viscosity {
                 "The longest time, in steps. A checkpoint holds 128 times as many numbers."
                 => "100";
         },
+        ..Table::PLAIN
     };
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;
