@@ -7,6 +7,7 @@ pub mod check;
 pub mod code;
 pub mod crosscheck;
 mod error;
+mod files;
 pub mod fluids;
 pub mod from_eos;
 pub mod hardcases;

@@ -21,6 +21,7 @@ pub use spread::Spread;
 
 use crate::ExperimentError;
 use crate::code::{Code, Suffix};
+use crate::files;
 use crate::fluids::{MDPD, SUBJECTS, Subject};
 use crate::lammps::host::PluginHost;
 use crate::lammps::log::Loop;
@@ -102,9 +103,7 @@ type Cases = BTreeMap<(&'static str, usize), Case>;
 /// Something could not be run or written.
 pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
-    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
-    // LAMMPS runs in folders of its own: paths must not depend on ours.
-    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
+    let out = files::absolute_folder(&options.out)?;
     let spinner = progress.spinner("LAMMPS and the plugin");
     let (place, version) = place(options, &out, progress)?;
     spinner.finish();
@@ -148,16 +147,9 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
         memory,
         equal_bits,
     };
-    write(&out, &outcome)?;
+    files::write_json(&out.join("bench.json"), &outcome)?;
+    write_atomically(out.join("report.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
-}
-
-fn write(out: &Path, outcome: &Benchmark) -> Result<(), ExperimentError> {
-    let json = serde_json::to_string_pretty(outcome)
-        .map_err(|e| ExperimentError::io(out.join("bench.json"))(e.into()))?;
-    write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
-    write_atomically(out.join("report.html"), page::report(outcome)?.as_bytes())?;
-    Ok(())
 }
 
 /// LAMMPS with the plugin, and its version in words.

@@ -4,6 +4,7 @@ use super::Context;
 use super::LOG;
 use super::setup::Setup;
 use crate::ExperimentError;
+use crate::files;
 use crate::start::simulation;
 use psidpd_core::engine::{Fault, Want};
 use psidpd_dynamics::run::{Integrator, State};
@@ -194,15 +195,11 @@ fn last_step(path: &Path) -> Option<u64> {
 
 /// The file of `fix ave/time`: comments, then step and nine numbers.
 fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
-    for line in text.lines().filter(|l| !l.starts_with('#')) {
-        let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-        let Ok(mut sample) = <[f64; 10]>::try_from(numbers) else {
-            return Err(ExperimentError::Output {
-                path: path.into(),
-                problem: format!("unexpected line: {line}"),
-            });
-        };
+    for numbers in files::rows(path)? {
+        let mut sample = <[f64; 10]>::try_from(numbers).map_err(|numbers| ExperimentError::Output {
+            path: path.into(),
+            problem: format!("a row has {} numbers, expected 10", numbers.len()),
+        })?;
         sample[0] *= length.dt;
         trace.push(&sample);
     }

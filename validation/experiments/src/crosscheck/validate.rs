@@ -2,6 +2,7 @@ use super::{
     Context, Part, conclusion, energy, equilibrium, forces, mixture, observables, thermostat, trajectory,
 };
 use crate::ExperimentError;
+use crate::files;
 use crate::lammps::host::PluginHost;
 use crate::machine::machine;
 use psidpd_core::engine::Fault;
@@ -35,9 +36,7 @@ pub struct Validation {
 /// Something could not be run or written; checks that fail are in the results.
 pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, ExperimentError> {
     let start = Instant::now();
-    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
-    // LAMMPS runs in folders of its own: paths must not depend on ours.
-    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
+    let out = files::absolute_folder(&options.out)?;
     let spinner = progress.spinner("LAMMPS");
     let host = psidpd_lammps_host::plugin::install_to_build(&|line| progress.note(line))?;
     let version = host.version()?;

@@ -27,6 +27,7 @@ pub use tolerance::Tolerance;
 
 use crate::ExperimentError;
 use crate::code::Host;
+use crate::files;
 use crate::jobs::{self, Job};
 use crate::machine::machine;
 use lammps::LammpsRuns;
@@ -80,8 +81,7 @@ const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 /// # Errors
 /// The scene cannot be run with its own step, or something cannot be written.
 pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comparison, ExperimentError> {
-    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
-    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
+    let out = files::absolute_folder(&options.out)?;
     let seconds = 60.0 * options.minutes;
     let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let spinner = progress.spinner("start");
@@ -165,9 +165,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
         recommended: None,
     };
     outcome.recommended = recommend(&origin, &outcome);
-    let json = serde_json::to_string_pretty(&outcome)
-        .map_err(|e| ExperimentError::io(out.join("pareto.json"))(e.into()))?;
-    write_atomically(out.join("pareto.json"), (json + "\n").as_bytes())?;
+    files::write_json(&out.join("pareto.json"), &outcome)?;
     write_atomically(out.join("pareto.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
 }

@@ -4,7 +4,7 @@ use super::outcome::{Comparison, Point, Reference};
 use super::quantity::{Class, Deviation};
 use crate::ExperimentError;
 use crate::code::Host;
-use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table};
+use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table, distinct};
 
 /// An error in percent with its own; what is not resolved as what it is likely to be below.
 fn shown(d: &Deviation) -> String {
@@ -23,13 +23,8 @@ fn shown(d: &Deviation) -> String {
 
 /// The quantities that some point has an error of, in the order of the first that has them.
 fn names(outcome: &Comparison) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for d in outcome.points.iter().flat_map(|p| &p.errors).chain(&outcome.reference.values) {
-        if !names.contains(&d.name) {
-            names.push(d.name.clone());
-        }
-    }
-    names
+    let errors = outcome.points.iter().flat_map(|p| &p.errors).chain(&outcome.reference.values);
+    distinct(errors.map(|d| d.name.clone()))
 }
 
 fn row(names: &[String], errors: &[Deviation]) -> Vec<String> {
@@ -110,19 +105,13 @@ fn group(p: &Point) -> String {
 fn groups(outcome: &Comparison, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
     let place = |p: &Point| Some((p.cost.as_ref()?.value, error(p)?[0]));
     let shown: Vec<&Point> = outcome.points.iter().filter(|p| place(p).is_some()).collect();
-    let mut names: Vec<String> = Vec::new();
-    for p in &shown {
-        if !names.contains(&group(p)) {
-            names.push(group(p));
-        }
-    }
     let series = |name: String| {
         let own: Vec<&&Point> = shown.iter().filter(|p| group(p) == name).collect();
         let points = own.iter().filter_map(|p| place(p)).collect();
         let errors = own.iter().map(|p| error(p).map_or(f64::NAN, |e| e[1])).collect();
         Series::new(name, points, Style::Points).with_errors(errors)
     };
-    names.into_iter().map(series).collect()
+    distinct(shown.iter().map(|p| group(p))).into_iter().map(series).collect()
 }
 
 fn plot(title: &str, y_label: String, series: Vec<Series>, levels: Vec<(f64, String)>) -> Plot {

@@ -2,17 +2,11 @@
 
 use super::{Axis, Point};
 use psidpd_report::quantity::with_error;
-use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table};
+use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table, distinct};
 
 /// Names of the results that any run has, in the order in which they come first.
 fn quantities(points: &[Point]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for value in points.iter().flat_map(|p| &p.headline.values) {
-        if !names.contains(&value.name) {
-            names.push(value.name.clone());
-        }
-    }
-    names
+    distinct(points.iter().flat_map(|p| &p.headline.values).map(|value| value.name.clone()))
 }
 
 /// A row for each run: the keys, each result with its error, whether it is finished, and how many notes there are.

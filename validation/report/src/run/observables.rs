@@ -168,12 +168,7 @@ fn draw_curve(o: &Observation, items: &mut Vec<Item>) {
     let mut push = |svg| items.push(figure(o, svg));
     // Each unit gets its own plot, because a shared axis would be meaningless.
     let unit_of = |c: &Column| if c.unit == "1" { String::new() } else { c.unit.clone() };
-    let mut units: Vec<String> = Vec::new();
-    for unit in o.columns.iter().map(unit_of) {
-        if !units.contains(&unit) {
-            units.push(unit);
-        }
-    }
+    let units = crate::distinct(o.columns.iter().map(unit_of));
     if units.is_empty() {
         push(Err(super::ReportError::Plot("there are no values".into())));
     }

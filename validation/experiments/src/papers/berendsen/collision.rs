@@ -2,6 +2,7 @@
 
 use super::IMMISCIBLE;
 use crate::ExperimentError;
+use crate::machine::peak_kilobytes;
 use crate::papers::case::{Reproduction, bare, exact, profile};
 use crate::papers::context::{Change, Context};
 
@@ -61,13 +62,7 @@ pub fn size(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     let seconds = begun.elapsed().as_secs_f64();
     let particles = context.pick(3.75e4, 3.75e6);
     // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.
-    let status = std::path::PathBuf::from("/proc/self/status");
-    let text =
-        std::fs::read_to_string(&status).map_err(|source| ExperimentError::Io { path: status, source })?;
-    let peak = text
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<f64>().ok());
-    outcome.at_most("memory, GB", exact(peak.unwrap_or(f64::NAN) / 1e6), 4.0);
+    outcome.at_most("memory, GB", exact(peak_kilobytes()? as f64 / 1e6), 4.0);
     outcome.at_most(
         "seconds for a step of 3.75 million particles",
         exact(seconds / 20.0 * 3.75e6 / particles),
