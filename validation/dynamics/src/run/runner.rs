@@ -60,13 +60,7 @@ pub enum Start {
 /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
 /// cannot be written.
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
-    let mut runner = Runner::begin(scene, out, Begin::Overwrite)?;
-    let never = AtomicUsize::new(0);
-    loop {
-        if let Outcome::Finished { summary, .. } = runner.run(&never, progress)? {
-            return Ok(*summary);
-        }
-    }
+    Runner::begin(scene, out, Begin::Overwrite)?.run_to_end(progress)
 }
 
 /// A run of a scene in a folder.
@@ -224,6 +218,18 @@ impl<'a> Runner<'a> {
             });
         }
         run.go_on(stop, progress).map_err(|error| run.stop(error))
+    }
+
+    /// Makes the remaining steps without interruption.
+    ///
+    /// # Errors
+    /// As [`Runner::run`].
+    pub fn run_to_end(&mut self, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
+        loop {
+            if let Outcome::Finished { summary, .. } = self.run(&AtomicUsize::new(0), progress)? {
+                return Ok(*summary);
+            }
+        }
     }
 }
 
