@@ -3,12 +3,11 @@
 use super::forces::{by_tag, open_deck, point, point_of};
 use super::{Context, Part};
 use crate::ExperimentError;
-use crate::fluids::SET6;
+use crate::fluids::{SET6, dpd_model};
 use crate::lammps::deck::Deck;
 use crate::lammps::style::PairStyle;
 use crate::start::{Filling, equilibrated, periodic};
 use psidpd_core::engine::{Step, Want};
-use psidpd_core::model::Model;
 use psidpd_dynamics::run::State;
 use psidpd_observe::{Measured, threshold};
 use psidpd_report::quantity::with_error;
@@ -38,21 +37,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// Largest error of a ratio of variances: noise that is 5 % too strong makes it 1.1.
 const VAGUE: f64 = 0.02;
 
-/// A fluid of LAMMPS's `dpd`.
-fn model(strength: f64, gamma: f64) -> Result<Model, ExperimentError> {
-    let pair = format!(
-        "[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = {strength:?}\nrange = 1.0\n"
-    );
-    let thermostat = format!("[[thermostat]]\ngamma = {gamma:?}\nrange = 1.0\n");
-    let text = format!(
-        "title = \"dpd\"\nspecies = [\"F\"]\n{}{}",
-        if strength == 0.0 { "" } else { &pair },
-        if gamma == 0.0 { "" } else { &thermostat }
-    );
-    Ok(Model::parse("dpd", &text)?)
-}
-
-/// The commands for it with these particles.
+/// The commands for a fluid of `dpd` with these particles.
 fn deck(
     context: &Context,
     state: &State,
@@ -78,7 +63,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let theirs = deck(context, &state, [strength, gamma, 0.0], "dpd-forces")?;
         let theirs = point(&open_deck(context, &theirs)?, volume)?;
         let step = (gamma > 0.0).then_some(Step { seed: SEED, number: 0, dt: DT });
-        let ours = point_of(context.simulation(&model(strength, gamma)?, kt, &state, SEED)?, step)?;
+        let ours = point_of(context.simulation(&dpd_model(strength, gamma, 1.0)?, kt, &state, SEED)?, step)?;
         let found = ours.against(&theirs);
         // Drag has no energy.
         let has_energy = strength != 0.0;
@@ -117,7 +102,7 @@ fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
     let mut table = Table::new(["γ", "kT", "Δt", "r", "native", "LAMMPS dpd"]);
     let comparisons = 2 * SETTINGS.len() * DISTANCES.len();
     for [gamma, kt, dt] in SETTINGS {
-        let mut simulation = context.simulation(&model(0.0, gamma)?, kt, &state, SEED)?;
+        let mut simulation = context.simulation(&dpd_model(0.0, gamma, 1.0)?, kt, &state, SEED)?;
         let lammps = open_deck(context, &deck(context, &state, [0.0, gamma, kt], "dpd-noise")?)?;
         lammps.command(&format!("timestep {dt:?}"))?;
         let mut drawn: [[Vec<f64>; DISTANCES.len()]; 2] = Default::default();

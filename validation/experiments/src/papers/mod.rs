@@ -26,14 +26,14 @@ pub struct Case {
     pub id: &'static str,
     pub paper: &'static str,
     pub what: &'static str,
-    run: Run,
+    add: Add,
 }
 
 /// Makes the runs of a case and adds its values and plots.
-type Run = fn(&Context, &mut Reproduction) -> Result<(), ExperimentError>;
+type Add = fn(&Context, &mut Reproduction) -> Result<(), ExperimentError>;
 
 /// A paper, and its cases: id, the comparison in a line, and the function that makes it.
-type Paper = (&'static str, &'static [(&'static str, &'static str, Run)]);
+type Paper = (&'static str, &'static [(&'static str, &'static str, Add)]);
 
 const PAPERS: [Paper; 5] =
     [pagonabarraga::PAPER, trofimov::PAPER, warren::PAPER, wang::PAPER, berendsen::PAPER];
@@ -45,14 +45,14 @@ impl Case {
     /// A run stops, or a file cannot be written. A value that does not agree is no error.
     pub fn run(&self, context: &Context) -> Result<Reproduction, ExperimentError> {
         let mut outcome = Reproduction::default();
-        (self.run)(context, &mut outcome)?;
+        (self.add)(context, &mut outcome)?;
         Ok(outcome)
     }
 }
 
 pub fn cases() -> Vec<Case> {
     let of =
-        |(paper, cases): Paper| cases.iter().map(move |(id, what, run)| Case { id, paper, what, run: *run });
+        |(paper, cases): Paper| cases.iter().map(move |(id, what, add)| Case { id, paper, what, add: *add });
     PAPERS.into_iter().flat_map(of).collect()
 }
 

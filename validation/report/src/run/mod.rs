@@ -16,6 +16,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 pub use headline::{Headline, HeadlineValue, headline};
+pub use series::Table as SeriesTable;
 
 /// The files that a report is made from, with their descriptions.
 const FILES: [(&str, &str); 10] = [
