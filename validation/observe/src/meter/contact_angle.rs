@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::keys::{Key, Need, Table, ValueKind};
 use crate::least_squares::least_squares;
 use crate::observation::{Kind, Observation};
-use crate::options::Options;
+use crate::options::{FACES, Options};
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::document::keys::keys;
@@ -20,14 +20,6 @@ const FEWEST: usize = 4;
 
 /// A wall: its direction, and whether it is at the upper end.
 type Face = (usize, bool);
-const FACES: [(&str, Face); 6] = [
-    ("xlo", (0, false)),
-    ("xhi", (0, true)),
-    ("ylo", (1, false)),
-    ("yhi", (1, true)),
-    ("zlo", (2, false)),
-    ("zhi", (2, true)),
-];
 
 /// The density around the vertical through a drop on a wall, and the circle that fits its contour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
