@@ -25,6 +25,9 @@ pub const TABLES: &[Table] = &[TOP, UNITS, PARAMETERS, DENSITY, EXCESS, CURVES, 
 /// Keys at the top level of the file.
 pub const TOP: Table = Table {
     path: "",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "The name of the model and its particles.",
     keys: keys! {
         "title": ValueKind::Text, REQUIRED,
@@ -40,12 +43,14 @@ pub const TOP: Table = Table {
             "The species, 1 to 64. Their order is the order of every list of species in results."
             => "species = [\"A\", \"B\"]";
     },
-    ..Table::PLAIN
 };
 
 /// Keys of `[units]`.
 pub const UNITS: Table = Table {
     path: "units",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "What the numbers of the model stand for, in SI. LAMMPS's `dpd/psi` needs this table in units other \
             than `lj`; nothing else uses it. The unit of time is `length sqrt(mass/energy)`.",
     keys: keys! {
@@ -59,12 +64,14 @@ pub const UNITS: Table = Table {
             "The unit of energy in joules: `k_B` times 300 K, if one temperature of the model is 300 K."
             => "[units]\nlength = 1e-9\nmass = 3e-25\nenergy = 4.14e-21";
     },
-    ..Table::PLAIN
 };
 
 /// Keys of `[parameters]`.
 pub const PARAMETERS: Table = Table {
     path: "parameters",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "Constants, for every formula and every number of the file. They may refer to each other in any \
             order. `kT` is not a parameter and cannot appear in formulas of parameters: the host gives the \
             temperature, and all other formulas know it as `kT`.",
@@ -73,12 +80,14 @@ pub const PARAMETERS: Table = Table {
             "A constant."
             => "[parameters]\nb = 0.0156\na = \"1.9*b\"";
     },
-    ..Table::PLAIN
 };
 
 /// Keys of `[density.NAME]`.
 pub const DENSITY: Table = Table {
     path: "density.NAME",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "A weighted local density `n_B(i) = sum over j of species B of w(r_ij)`, with `[w] = 1`. A density \
             `n` of species A, B gives formulas the variables `n_A`, `n_B` and `n = n_A + n_B`. A model may have \
             any number of densities.",
@@ -118,12 +127,14 @@ pub const DENSITY: Table = Table {
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.5, 20.0]\nbelow = \
              \"constant\"\n[excess_free_energy]\nA = \"kT*ln(n)\"";
     },
-    ..Table::PLAIN
 };
 
 /// Keys of `[excess_free_energy]`.
 pub const EXCESS: Table = Table {
     path: "excess_free_energy",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "`psi`, the excess free energy per particle, of every species, in units of energy; forces are \
             `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, \
             `pi`, `+ - * / ^` (or `**`), `ln` (or `log`: the natural logarithm), `log10`, `exp`, `sqrt`, `sin`, \
@@ -135,12 +146,14 @@ pub const EXCESS: Table = Table {
             => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = \
              1.0\n[excess_free_energy]\nA = \"n_B + 0.2*n_A\"\nB = \"n_A + 0.2*n_B\"";
     },
-    ..Table::PLAIN
 };
 
 /// Keys in the braces of an excess free energy.
 pub const CURVES: Table = Table {
     path: "excess_free_energy.SPECIES",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "Instead of a formula: psi as a function of the total of one density, from a table or from an \
             equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
     keys: keys! {
@@ -172,7 +185,6 @@ pub const CURVES: Table = Table {
             "With `slopes`: the reported energy of a particle, 0 if left out. The force is not its gradient."
             => "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }";
     },
-    ..Table::PLAIN
 };
 
 /// Keys of `[[pair]]`.
@@ -200,7 +212,9 @@ const PAIR_KEYS: &[Key] = keys! {
 /// Keys of `[[thermostat]]`.
 pub const THERMOSTAT: Table = Table {
     path: "thermostat",
+    title: "",
     array: true,
+    forms: ("", &[]),
     about: "Dissipative and random forces of a pair of species, `-gamma w_R^2 (e.v) e` and \
             `sqrt(2 gamma kT) w_R xi dt^(-1/2) e` with `w_R = (1 - r/range)^exponent`. If any pair of species has one, \
             all must.",
@@ -219,13 +233,14 @@ pub const THERMOSTAT: Table = Table {
             "The exponent of `w_R`; 1 if left out."
             => "[[thermostat]]\ngamma = 4.5\nrange = 1.0\nexponent = 0.5";
     },
-    ..Table::PLAIN
 };
 
 /// Keys of `[[literature]]`.
 pub const LITERATURE: Table = Table {
     path: "literature",
+    title: "",
     array: true,
+    forms: ("", &[]),
     about: "Published values of the fluid, by temperature, each with its error. They do not affect a run; \
             `theory`, `run` and reports show them next to theory and measurements.",
     keys: keys! {
@@ -251,7 +266,6 @@ pub const LITERATURE: Table = Table {
             "Width of the interface, `(rho_L - rho_V)/max|d rho/dz|`."
             => "[[literature]]\nkT = 1.0\nwidth = [0.66, 0.03]";
     },
-    ..Table::PLAIN
 };
 
 const ERROR: &str = "array of a number and its error, which is above 0";

@@ -20,12 +20,6 @@ pub struct Table {
     pub keys: &'static [Key],
 }
 
-impl Table {
-    /// A table without keys, of which a file has one, with its path as its title.
-    pub const PLAIN: Table =
-        Table { path: "", title: "", array: false, about: "", forms: ("", &[]), keys: &[] };
-}
-
 /// A key of a table, with its type and description.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
@@ -285,11 +279,11 @@ fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
 }
 
 /// Declares keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are
-/// left out where all have the key. Constants go before a key: `use AXIS;`.
+/// left out where all have the key.
 #[macro_export]
 macro_rules! keys {
-    ($($(use $shared:ident;)* $name:literal $([$forms:expr])?: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
-        &[$($($shared,)* $crate::document::keys::Key {
+    ($($name:literal $([$forms:expr])?: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
+        &[$($crate::document::keys::Key {
             $(forms: $forms,)?
             ..$crate::document::keys::key($name, $value, $need, $about, $example)
         }),*]

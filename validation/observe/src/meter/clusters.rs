@@ -1,12 +1,11 @@
 use super::Meter;
 use super::linked::{DISTANCE, Distance, Linked};
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// Clusters of particles closer than a distance.
@@ -37,7 +36,7 @@ impl Meter for Clusters {
                 "Particles in the smallest cluster that counts."
                 => "10";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Clusters, FileError> {

@@ -3,13 +3,12 @@ use super::drop::circular_centre;
 use super::linked::{DISTANCE, Distance, Linked};
 use super::pendant::median_density;
 use crate::frame::Frame;
-use crate::keys::{Key, Need, Table, ValueKind};
+use crate::keys::{Key, Need, PLAIN, Table, ValueKind, keys};
 use crate::least_squares::least_squares;
 use crate::observation::{Kind, Observation};
 use crate::options::{FACES, Options};
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -198,7 +197,7 @@ impl Meter for ContactAngle {
                 "The density on the contour."
                 => "3.0";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<ContactAngle, FileError> {

@@ -1,11 +1,10 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// The number of rows of fields that are kept for error bars.
@@ -39,7 +38,7 @@ impl Meter for DensityField {
                 "Cells along the other two directions, in their order."
                 => "[10, 20]";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<DensityField, FileError> {

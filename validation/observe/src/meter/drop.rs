@@ -3,13 +3,12 @@ use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
 use crate::flux::Carrier;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::profile::flank_interface;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -199,7 +198,7 @@ impl Meter for Drop {
                 "How many shells."
                 => "30";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

@@ -1,6 +1,6 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::Table;
+use crate::keys::{PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -22,7 +22,7 @@ impl Meter for Energy {
         about: "Per particle of the whole system: `total`, `kinetic`, `potential`, `psi_SPECIES` for Σ ψ over the \
                 particles of a species, and `phi_K_A_B` for Σ φ of the K-th `[[pair]]` of the model, between A \
                 and B.",
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Energy, FileError> {

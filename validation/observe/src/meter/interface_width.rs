@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, Table};
+use crate::keys::{AXIS, BINS, PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::profile::{DensityProfile, interface, slab_edges};
@@ -32,7 +32,7 @@ impl Meter for InterfaceWidth {
                 slope of a straight line through three tenths of the interface. If nothing can be fitted `width` has no \
                 value. Jackknife errors. No values if the profile is not that of one slab.",
         keys: &[AXIS, BINS],
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<InterfaceWidth, FileError> {

@@ -1,10 +1,9 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
-use psidpd_core::document::keys::keys;
 use psidpd_core::document::{FileError, FileErrorKind};
 use psidpd_core::model::kernel::Kernel;
 use serde::{Deserialize, Serialize};
@@ -72,7 +71,7 @@ impl Meter for LocalDensity {
                 "Where the histogram ends; it begins at 0."
                 => "20.0";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<LocalDensity, FileError> {

@@ -1,11 +1,10 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// The mean-square displacement and the diffusion coefficient of each species.
@@ -134,7 +133,7 @@ impl Meter for Msd {
                 "Whether displacements are those from the centre of mass of all particles."
                 => "true";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const OF_MOTION: bool = true;

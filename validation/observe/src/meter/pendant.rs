@@ -2,13 +2,12 @@ use super::Meter;
 use super::drop::circular_centre;
 use super::linked::{DISTANCE, Distance, Linked};
 use crate::frame::Frame;
-use crate::keys::{AXIS, Key, Need, Table, ValueKind};
+use crate::keys::{AXIS, Key, Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
 use crate::young_laplace::fit;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// The number of rows of density fields that are kept for error bars.
@@ -139,7 +138,7 @@ impl Meter for Pendant {
                 "The force g m on a particle along the axis."
                 => "0.02";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Pendant, FileError> {

@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{BINS, Need, Table, ValueKind, key};
+use crate::keys::{BINS, Need, PLAIN, Table, ValueKind, key};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -90,7 +90,7 @@ impl Meter for Poiseuille {
             ),
             BINS,
         ],
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const OF_MOTION: bool = true;

@@ -1,6 +1,6 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::Table;
+use crate::keys::{PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -34,7 +34,7 @@ impl Meter for Pressure {
                 `thermostat_every`, sample at steps of all phases. `configurational` is the scalar ρkT + tr W/(dV) of conservative \
                 forces with the kT of the stage: what configurations tell, without the scatter of velocities and their \
                 error at a time step, as a Monte Carlo run has it. In a dilute fluid it has much the least noise.",
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

@@ -3,7 +3,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, RECENTRE, Table};
+use crate::keys::{AXIS, BINS, PLAIN, RECENTRE, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -133,7 +133,7 @@ impl Quantity for Density {
         title: "density along an axis",
         about: "Number density in slices of the box: `density`, and `density_SPECIES` of each of several species.",
         keys: KEYS,
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const MOMENTS: bool = false;
@@ -161,7 +161,7 @@ impl Quantity for Composition {
         title: "composition along an axis",
         about: "`fraction_SPECIES`: the mean number of particles of a species in a slice over that of all.",
         keys: KEYS,
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const MOMENTS: bool = false;
@@ -186,7 +186,7 @@ impl Quantity for Temperature {
         about: "Kinetic kT in slices of the box, about the mean flow of the slice: \
                 (⟨Σ m v²⟩ − ⟨Σ m v⟩²/⟨Σ m⟩)/(d ⟨n⟩). Jackknife errors.",
         keys: KEYS,
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const MOMENTS: bool = true;
@@ -214,7 +214,7 @@ impl Quantity for Velocity {
         title: "flow velocity along an axis",
         about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on.",
         keys: KEYS,
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const OF_MOTION: bool = true;

@@ -2,12 +2,11 @@ use super::Meter;
 use super::distances::{Shells, count};
 use super::species_pairs::SpeciesPairs;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -44,7 +43,7 @@ impl Meter for Rdf {
                 "How many shells."
                 => "40";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Rdf, FileError> {

@@ -2,7 +2,7 @@ use super::Meter;
 use super::across::Across;
 use crate::flux::Carrier;
 use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, RECENTRE, Table};
+use crate::keys::{AXIS, BINS, PLAIN, RECENTRE, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -63,7 +63,7 @@ impl Meter for StressProfile {
                 the particles in `normal`), `difference` P_N − P_T, and `integral` ∫(P_N − P_T) from the lower end of \
                 the axis. `stress_profile_integral` is the whole of it: the surface tension of all interfaces together.",
         keys: &[AXIS, BINS, RECENTRE],
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

@@ -2,12 +2,11 @@ use super::Meter;
 use super::species_pairs::SpeciesPairs;
 use super::waves::waves;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -57,7 +56,7 @@ impl Meter for StructureFactor {
                 "The most wave vectors in a shell."
                 => "6";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<StructureFactor, FileError> {

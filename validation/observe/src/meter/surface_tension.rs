@@ -1,13 +1,12 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{AXIS, Need, Table, ValueKind};
+use crate::keys::{AXIS, Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use nalgebra::Matrix3;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use psidpd_core::engine::{PeriodicBox, Want};
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +65,7 @@ impl Meter for SurfaceTension {
                 "ε, the relative change of the area."
                 => "5e-4";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

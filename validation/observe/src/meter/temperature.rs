@@ -1,7 +1,7 @@
 use super::Meter;
 use crate::configurational;
 use crate::frame::Frame;
-use crate::keys::Table;
+use crate::keys::{PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -27,7 +27,7 @@ impl Meter for Temperature {
                 kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \
                 At large time steps the two err differently. There is no configurational temperature for a force that is not a gradient, for one that jumps at its range (the linear kernel), and in boxes narrower \
                 than twice the range.",
-        ..Table::PLAIN
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Temperature, FileError> {

@@ -1,12 +1,11 @@
 use super::Meter;
 use super::msd::Clock;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use psidpd_core::engine::Want;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -92,7 +91,7 @@ impl Meter for Viscosity {
                 "The longest time, in steps. A checkpoint holds 128 times as many numbers."
                 => "100";
         },
-        ..Table::PLAIN
+        ..PLAIN
     };
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;

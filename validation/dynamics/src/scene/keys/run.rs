@@ -4,7 +4,7 @@ use super::scene::{
     GRADIENT, INTEGRATOR, LAMBDA, MAX_MOVE, NOISE, SWEEPS, THERMOSTAT_EVERY, THERMOSTAT_STEP,
 };
 use super::ValueKind::*;
-use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
+use super::{Key, OPTIONAL, PLAIN, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
 
 pub const BODY_FORCE: Table = Table {
@@ -29,7 +29,7 @@ pub const BODY_FORCE: Table = Table {
              [[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n\
              [[part]]\nshape = \"rest\"\ndensity = 0.1"),
     ],
-    ..Table::PLAIN
+    ..PLAIN
 };
 
 const STAGE_INTEGRATOR: Key = Key {
@@ -115,7 +115,7 @@ pub const STAGE: Table = Table {
             "Whether body forces act; true if left out.",
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\n[[stage]]\nname = \"settle\"\nsteps = 1000\nbody_forces = false"),
     ],
-    ..Table::PLAIN
+    ..PLAIN
 };
 
 pub const OUTPUT: Table = Table {
@@ -136,5 +136,5 @@ pub const OUTPUT: Table = Table {
              left out, 0 for a checkpoint only at the end.",
             "[output]\ncheckpoint = 10000"),
     ],
-    ..Table::PLAIN
+    ..PLAIN
 };

@@ -1,7 +1,7 @@
 //! Keys of the top level, the box and the masses.
 
 use super::ValueKind::*;
-use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
+use super::{Key, OPTIONAL, PLAIN, REQUIRED, Table, key, names};
 use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use crate::scene::domain::BOUNDARIES;
 use psidpd_core::engine::Precision;
@@ -92,7 +92,7 @@ pub const TOP: Table = Table {
         SWEEPS,
         MAX_MOVE,
     ],
-    ..Table::PLAIN
+    ..PLAIN
 };
 
 pub const BOX: Table = Table {
@@ -110,12 +110,12 @@ pub const BOX: Table = Table {
              particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
     ],
-    ..Table::PLAIN
+    ..PLAIN
 };
 
 pub const MASSES: Table = Table {
     path: "masses",
     about: "Masses of the species; 1, or the mass in the data file, for species left out.",
     keys: &[key("SPECIES", Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
-    ..Table::PLAIN
+    ..PLAIN
 };
