@@ -201,12 +201,13 @@ fn nothing_is_met_that_was_not_measured() {
 /// Every code that a goal names is timed at the sizes of `--full`.
 #[test]
 fn whom_goals_name_is_timed_at_their_sizes() {
-    use psidpd::bench::contender::{Choice, FEW_ABOVE, Field, Suffix, contenders};
+    use psidpd::bench::contender::{Choice, FEW_ABOVE, Field, contenders};
+    use psidpd::experiments::code::Suffix;
     use psidpd::experiments::fluids::{SIZES, SUBJECTS};
     let choice = Choice {
         built_in: true,
         eam: true,
-        suffixes: vec![Suffix::None, Suffix::Omp, Suffix::Intel],
+        suffixes: Suffix::ALL.to_vec(),
         two_ranks: true,
         words: vec![],
         threads: [1, 2].map(|n| std::num::NonZeroUsize::new(n).unwrap()).to_vec(),

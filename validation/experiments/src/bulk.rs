@@ -2,14 +2,13 @@
 
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
+use psidpd_dynamics::run::{Begin, RunError, Runner};
 use psidpd_dynamics::scene::Scene;
 use psidpd_observe::{Measured, Observation};
 use psidpd_report::Progress;
 use std::fmt::Write;
 use std::num::NonZeroUsize;
 use std::path::Path;
-use std::sync::atomic::AtomicUsize;
 
 /// How long a homogeneous fluid is run, and how large it is.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -111,25 +110,27 @@ pub fn run_with(
     fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
     let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
-    let never = AtomicUsize::new(0);
-    let outcome = loop {
-        match runner.run(&never, &mut |p| bar.set(p.step)) {
-            Ok(Outcome::Interrupted { .. }) => {}
-            other => break other,
-        }
-    };
+    let outcome = runner.run_to_end(&mut |p| bar.set(p.step));
     bar.finish();
     outcome?;
-    let path = folder.join("observables.json");
-    let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };
-    let text = std::fs::read_to_string(&path).map_err(failed)?;
-    serde_json::from_str(&text).map(Observed).map_err(|e| failed(e.into()))
+    Observed::read(folder)
 }
 
 #[derive(Debug, Clone)]
 pub struct Observed(pub Vec<Observation>);
 
 impl Observed {
+    /// Reads what the run in a folder observed.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn read(folder: &Path) -> Result<Observed, RunError> {
+        let path = folder.join("observables.json");
+        let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };
+        let text = std::fs::read_to_string(&path).map_err(failed)?;
+        serde_json::from_str(&text).map(Observed).map_err(|e| failed(e.into()))
+    }
+
     pub fn get(&self, name: &str) -> Option<&Observation> {
         self.0.iter().find(|o| o.name == name)
     }

@@ -1,6 +1,7 @@
 //! The fluids that codes are compared and timed in.
 
 use crate::ExperimentError;
+use crate::lammps::style::PairStyle;
 use crate::models;
 use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab, warren_ab_text};
 
@@ -42,6 +43,23 @@ pub const DPD: Subject = Subject {
     density: 3.0,
     dt: 0.04,
 };
+
+/// The same fluid as a pair style of LAMMPS's own.
+pub const DPD_PAIR: PairStyle = PairStyle::Dpd { a: 25.0, gamma: 4.5, rc: 1.0 };
+
+/// The fluid of LAMMPS's `dpd` with these coefficients; a term whose coefficient is 0 is left out.
+pub fn dpd_model(a: f64, gamma: f64, rc: f64) -> Result<Model, ExperimentError> {
+    let mut text = "title = \"dpd\"\nspecies = [\"W\"]\n".to_owned();
+    if a != 0.0 {
+        text += &format!(
+            "[[pair]]\nbetween = [\"W\", \"W\"]\nform = \"soft\"\nstrength = {a:?}\nrange = {rc:?}\n"
+        );
+    }
+    if gamma != 0.0 {
+        text += &format!("[[thermostat]]\ngamma = {gamma:?}\nrange = {rc:?}\n");
+    }
+    Ok(Model::parse("dpd", &text)?)
+}
 
 /// Many-body terms in general: two species, two densities, ψ as a formula that tells species apart.
 pub const FORMULA: Subject = Subject {

@@ -1,11 +1,18 @@
 //! Experiments: runs that are compared with another code, a paper, theory or each other.
+//!
+//! An experiment has a fluid ([`fluids`], or a model file), a start ([`start`], or that of a scene), a code ([`code`], with its
+//! precision, threads and ranks) and steps. It gives observations: those of a scene ([`bulk`]), of dumps and tables of LAMMPS
+//! ([`lammps`]), or the times of a loop. A verdict holds them to a bound ([`Check`](psidpd_report::Check)) or to a published value
+//! ([`papers::Compared`]). A family of experiments has its own list of cases and its own page.
 
 pub mod bench;
 pub mod bulk;
 pub mod calibrate;
 pub mod check;
+pub mod code;
 pub mod crosscheck;
 mod error;
+mod files;
 pub mod fluids;
 pub mod from_eos;
 pub mod hardcases;

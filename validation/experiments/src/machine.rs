@@ -1,5 +1,8 @@
 //! The machine, for pages.
 
+use crate::ExperimentError;
+use std::path::Path;
+
 /// The processor, where the system says.
 pub fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -11,4 +14,16 @@ pub fn machine() -> String {
         })
         .unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     format!("{model}, {cores} core(s)")
+}
+
+/// The most memory that this process ever had.
+///
+/// # Errors
+/// The system does not say.
+pub fn peak_kilobytes() -> Result<u64, ExperimentError> {
+    let status = Path::new("/proc/self/status");
+    let text = std::fs::read_to_string(status).map_err(ExperimentError::io(status))?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|rest| rest.split_whitespace().next()?.parse().ok())
+        .ok_or_else(|| ExperimentError::Memory(format!("no VmHWM in {}", status.display())))
 }

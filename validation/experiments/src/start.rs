@@ -3,7 +3,8 @@
 use crate::ExperimentError;
 use crate::fluids::Subject;
 use chacha20::ChaCha8Rng;
-use psidpd_core::engine::{PeriodicBox, Precision, Settings, Want};
+use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Want};
+use psidpd_core::model::Model;
 use psidpd_dynamics::particles::thermal_velocities;
 use psidpd_dynamics::run::{Integrator, RunError, Simulation, State};
 use rand::{RngExt, SeedableRng};
@@ -38,6 +39,24 @@ impl Filling {
 pub fn periodic(lengths: [f64; 3]) -> Result<PeriodicBox, ExperimentError> {
     let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true; 3]);
     Ok(domain.map_err(|e| RunError::State(e.to_string()))?)
+}
+
+/// These particles in the native runner; with a `fault`, in one that is wrong on purpose.
+///
+/// # Errors
+/// The particles do not suit the model, or the model is invalid at the temperature.
+pub fn simulation(
+    model: &Model,
+    kt: f64,
+    state: &State,
+    seed: u64,
+    precision: Precision,
+    fault: Option<Fault>,
+) -> Result<Simulation, ExperimentError> {
+    let mut simulation = Simulation::new(model, kt, state.clone(), seed)?;
+    simulation.set_settings(Settings { precision, ..Settings::default() })?;
+    fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
+    Ok(simulation)
 }
 
 /// Random particles at kT = 1; species alternate.

@@ -7,6 +7,11 @@ use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style};
 /// Points of a curve over temperatures.
 const TEMPERATURES: usize = 25;
 
+/// Labels of axes.
+const DENSITY: &str = "number density ρ [1/length^d]";
+const TEMPERATURE: &str = "kT [energy]";
+const TENSION: &str = "σ [energy/length^(d−1)]";
+
 /// Points of a curve over densities.
 const DENSITIES: usize = 200;
 
@@ -32,12 +37,12 @@ pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     let mut sections = Vec::new();
     if !scope.doubts.is_empty() {
         let items = vec![Item::Prose(scope.doubts.join("\n\n"))];
-        sections.push(Section { heading: "Where mean field fails".into(), items });
+        sections.push(Section::new("Where mean field fails", items));
     }
-    sections.push(Section { heading: "Equation of state".into(), items: isotherms(model, scope)? });
+    sections.push(Section::new("Equation of state", isotherms(model, scope)?));
     match species {
-        1 => sections.push(Section { heading: "Vapour and liquid".into(), items: phases(model, scope)? }),
-        2 => sections.push(Section { heading: "Demixing".into(), items: compositions(model, scope)? }),
+        1 => sections.push(Section::new("Vapour and liquid", phases(model, scope)?)),
+        2 => sections.push(Section::new("Demixing", compositions(model, scope)?)),
         _ => {}
     }
     let kts: Vec<String> = scope.kts.iter().map(ToString::to_string).collect();
@@ -48,10 +53,6 @@ pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
         sections,
         ..Report::default()
     })
-}
-
-fn figure(plot: &Plot, caption: &str) -> Result<Item, ReportError> {
-    Ok(Item::Figure { svg: plot.render()?, caption: caption.into() })
 }
 
 fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
@@ -65,20 +66,13 @@ fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
             let loops = (1..DENSITIES).map(|k| pressure(b.liquid * k as f64 / DENSITIES as f64).abs());
             highest = loops.chain(highest).reduce(f64::max);
         }
-        mean_field.push(Series {
-            name: format!("mean field, kT = {kt}"),
-            points: (1..=DENSITIES).map(|k| (at(k), pressure(at(k)))).collect(),
-            ..Series::default()
-        });
+        let points = (1..=DENSITIES).map(|k| (at(k), pressure(at(k)))).collect();
+        mean_field.push(line(format!("mean field, kT = {kt}"), points));
         if let Some(c) = theory.correlations().ok().flatten() {
             let points =
                 (1..=DENSITIES / 5).map(|k| (at(5 * k), c.at(at(5 * k)).map_or(f64::NAN, |c| c.pressure)));
-            correlated.push(Series {
-                name: format!("with correlations, kT = {kt}"),
-                points: points.collect(),
-                style: Style::Dashed,
-                ..Series::default()
-            });
+            let name = format!("with correlations, kT = {kt}");
+            correlated.push(Series::new(name, points.collect(), Style::Dashed));
         }
     }
     mean_field.extend(correlated);
@@ -89,18 +83,12 @@ fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         }
     }
     let equal = if species > 1 { ", the species in equal shares" } else { "" };
-    let plot = Plot {
-        title: "Pressure".into(),
-        x_label: "number density ρ [1/length^d]".into(),
-        y_label: "p [energy/length^d]".into(),
-        series: mean_field,
-        ..Plot::default()
-    };
+    let plot = Plot::new("Pressure", [DENSITY, "p [energy/length^d]"], mean_field);
     let caption = format!(
         "p(ρ) of the homogeneous fluid{equal}; where it falls, or is below the pressure of coexistence, the fluid \
          separates. Dashed: with correlations to first order (random-phase approximation)."
     );
-    Ok(vec![figure(&plot, &caption)?])
+    Ok(vec![Item::figure(&plot, caption)?])
 }
 
 /// Temperatures up to the critical one, closer to each other there.
@@ -113,8 +101,13 @@ fn below(critical: f64) -> Vec<f64> {
         .collect()
 }
 
-fn line(name: &str, points: Vec<(f64, f64)>) -> Series {
-    Series { name: name.into(), points, ..Series::default() }
+fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
+    Series::new(name, points, Style::Line)
+}
+
+/// One curve over the critical point, from both of its sides.
+fn joined(low: &[(f64, f64)], critical: (f64, f64), high: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    low.iter().chain(&[critical]).chain(high.iter().rev()).copied().collect()
 }
 
 fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
@@ -142,29 +135,15 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
             Err(error) => reasons.push(format!("kT = {kt:.4}: {error}")),
         }
     }
-    // One curve each, over the critical point.
-    let joined = |a: usize, b: usize| {
-        let mut curve = curves[a].clone();
-        curve.push((critical.density, critical.parameter));
-        curve.extend(curves[b].iter().rev());
-        curve
-    };
-    let (binodal, spinodal) = (joined(0, 1), joined(2, 3));
-    let diagram = Plot {
-        title: "Phase diagram".into(),
-        x_label: "number density ρ [1/length^d]".into(),
-        y_label: "kT [energy]".into(),
-        series: vec![
-            line("binodal", binodal),
-            Series { style: Style::Dashed, ..line("spinodal", spinodal) },
-            Series {
-                style: Style::Points,
-                ..line("critical point", vec![(critical.density, critical.parameter)])
-            },
-        ],
-        ..Plot::default()
-    };
-    let mut items = vec![figure(
+    let [vapour, liquid, low, high] = curves;
+    let top = (critical.density, critical.parameter);
+    let series = vec![
+        line("binodal", joined(&vapour, top, &liquid)),
+        Series::new("spinodal", joined(&low, top, &high), Style::Dashed),
+        Series::new("critical point", vec![top], Style::Points),
+    ];
+    let diagram = Plot::new("Phase diagram", [DENSITY, TEMPERATURE], series);
+    let mut items = vec![Item::figure(
         &diagram,
         "Vapour and liquid coexist on the binodal; within the spinodal a homogeneous fluid is unstable.",
     )?];
@@ -172,33 +151,19 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
     for kind in ["published", "measured"] {
         let points: Vec<_> = scope.tension.iter().filter(|t| t.2 == kind).collect();
         if !points.is_empty() {
-            series.push(Series {
-                name: kind.into(),
-                points: points.iter().map(|(kt, v, _)| (*kt, v[0])).collect(),
-                errors: Some(points.iter().map(|(_, v, _)| v[1]).collect()),
-                style: Style::Points,
-            });
+            let errors = points.iter().map(|(_, v, _)| v[1]).collect();
+            let points = points.iter().map(|(kt, v, _)| (*kt, v[0])).collect();
+            series.push(Series::new(kind, points, Style::Points).with_errors(errors));
         }
     }
     if series.iter().any(|s| !s.points.is_empty()) {
-        let plot = Plot {
-            title: "Surface tension".into(),
-            x_label: "kT [energy]".into(),
-            y_label: "σ [energy/length^(d−1)]".into(),
-            series,
-            ..Plot::default()
-        };
-        items.push(figure(&plot, "Square-gradient theory, Pagonabarraga and Frenkel, eq. 29.")?);
+        let plot = Plot::new("Surface tension", [TEMPERATURE, TENSION], series);
+        items.push(Item::figure(&plot, "Square-gradient theory, Pagonabarraga and Frenkel, eq. 29.")?);
     }
     if !width.is_empty() {
-        let plot = Plot {
-            title: "Width of the interface".into(),
-            x_label: "kT [energy]".into(),
-            y_label: "w [length]".into(),
-            series: vec![line("mean field", width)],
-            ..Plot::default()
-        };
-        items.push(figure(&plot, "w = (ρ_L − ρ_V)/max|dρ/dz|.")?);
+        let series = vec![line("mean field", width)];
+        let plot = Plot::new("Width of the interface", [TEMPERATURE, "w [length]"], series);
+        items.push(Item::figure(&plot, "w = (ρ_L − ρ_V)/max|dρ/dz|.")?);
     }
     if let Some(first) = reasons.first() {
         items.push(Item::Prose(format!(
@@ -236,38 +201,27 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
             tension.push((kt, i.tension));
         }
     }
-    let joined = |a: usize, b: usize| {
-        let mut curve = curves[a].clone();
-        curve.push((critical.composition, critical.parameter));
-        curve.extend(curves[b].iter().rev());
-        curve
-    };
-    let diagram = Plot {
-        title: format!("Composition diagram at density {}", scope.density),
-        x_label: of.clone(),
-        y_label: "kT [energy]".into(),
-        series: vec![
-            line("binodal", joined(0, 1)),
-            Series { style: Style::Dashed, ..line("spinodal", joined(2, 3)) },
-        ],
-        ..Plot::default()
-    };
+    let [poor, rich, low, high] = curves;
+    let top = (critical.composition, critical.parameter);
+    let series = vec![
+        line("binodal", joined(&poor, top, &rich)),
+        Series::new("spinodal", joined(&low, top, &high), Style::Dashed),
+    ];
+    let title = format!("Composition diagram at density {}", scope.density);
+    let diagram = Plot::new(title, [of.as_str(), TEMPERATURE], series);
     let caption = format!(
         "The abscissa is the {of}. Binodal: phases of equal chemical potentials and pressure, of a mixture of this density and \
          of the critical composition; their own densities differ. Spinodal: mixtures of this density in which waves of density \
          and composition grow."
     );
-    let mut items = vec![figure(&diagram, &caption)?];
+    let mut items = vec![Item::figure(&diagram, caption)?];
     if !tension.is_empty() {
-        let plot = Plot {
-            title: "Tension between the phases".into(),
-            x_label: "kT [energy]".into(),
-            y_label: "σ [energy/length^(d−1)]".into(),
-            series: vec![line("", tension)],
-            ..Plot::default()
-        };
-        items.push(figure(&plot, "Square-gradient theory, Pagonabarraga and Frenkel, eqs. 36 to 41, which hold the total density: only where phases of \
-             this density are in equilibrium.")?);
+        let plot = Plot::new("Tension between the phases", [TEMPERATURE, TENSION], vec![line("", tension)]);
+        items.push(Item::figure(
+            &plot,
+            "Square-gradient theory, Pagonabarraga and Frenkel, eqs. 36 to 41, which hold the total density: only where phases of \
+             this density are in equilibrium.",
+        )?);
     }
     Ok(items)
 }

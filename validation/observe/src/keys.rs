@@ -1,8 +1,18 @@
 //! Tables of all keys of `[observe]`. They are the source of the reference `docs/observables.md`, and other
 //! keys are refused.
 
-use psidpd_core::document::keys::keys;
 pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
+
+/// Declares keys in short, as the macro of models does. Constants go before a key: `use AXIS;`.
+macro_rules! keys {
+    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
+        &[$($($shared,)* $crate::keys::key($name, $value, $need, $about, $example)),*]
+    };
+}
+pub(crate) use keys;
+
+/// A table without keys, of which a file has one.
+pub const PLAIN: Table = Table { path: "", title: "", array: false, about: "", forms: ("", &[]), keys: &[] };
 
 /// The keys of `[observe]` for every observable, and the keys that each observable has in addition.
 pub const COMMON: &[Key] = keys! {

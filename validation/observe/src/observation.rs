@@ -6,9 +6,10 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// The form of an observation on a plot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
+    #[default]
     /// Single numbers: every column has one value, and there is no `x`.
     Scalar,
     /// Values along a coordinate in space.
@@ -25,8 +26,10 @@ pub enum Kind {
 pub struct Abscissa {
     pub name: String,
     /// The unit in r_c, m, kT of the model; "1" for pure numbers.
+    #[serde(default)]
     pub unit: String,
     /// The values increase.
+    #[serde(with = "nullable")]
     pub values: Vec<f64>,
 }
 
@@ -35,30 +38,37 @@ pub struct Abscissa {
 pub struct Column {
     pub name: String,
     /// The unit in r_c, m, kT of the model; "1" for pure numbers.
+    #[serde(default)]
     pub unit: String,
     /// Unknown values are NaN, written as null.
     #[serde(with = "nullable")]
     pub values: Vec<f64>,
     /// One standard deviation of each value; NaN, written as null, if unknown.
-    #[serde(with = "nullable")]
+    #[serde(default, with = "nullable")]
     pub errors: Vec<f64>,
 }
 
-/// The result of an observable in one stage.
+/// The result of an observable in one stage. A file may lack everything but the name: other programs write such files too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// The name, unique within a stage; letters, digits and underscores.
     pub name: String,
     /// The name for people.
+    #[serde(default)]
     pub title: String,
+    #[serde(default)]
     pub stage: String,
+    #[serde(default)]
     pub kind: Kind,
     /// The abscissa of the columns, if they have one.
     pub x: Option<Abscissa>,
+    #[serde(default)]
     pub columns: Vec<Column>,
     /// The number of configurations in the mean.
+    #[serde(default)]
     pub samples: u64,
     /// Remarks for readers.
+    #[serde(default, deserialize_with = "text_or_null")]
     pub note: String,
 }
 
@@ -126,7 +136,7 @@ impl Observation {
     /// The value and error of a column with one value.
     pub fn scalar(&self, column: &str) -> Option<Measured> {
         let c = self.get(column)?;
-        Some(Measured { value: *c.values.first()?, error: *c.errors.first()? })
+        Some(Measured { value: *c.values.first()?, error: c.errors.first().copied().unwrap_or(f64::NAN) })
     }
 
     /// The name of the CSV file in the folder `observables`: `NAME.csv`, or `NAME-STAGE.csv` if other stages have the
@@ -184,7 +194,11 @@ pub fn write_csv(folder: &Path, observations: &[Observation]) -> std::io::Result
     Ok(())
 }
 
-/// Numbers that are not finite become null.
+fn text_or_null<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or_default())
+}
+
+/// Numbers that are not finite become null. A null in place of the list is an empty list.
 mod nullable {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -194,7 +208,7 @@ mod nullable {
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-        let options = Vec::<Option<f64>>::deserialize(from)?;
+        let options = Option::<Vec<Option<f64>>>::deserialize(from)?.unwrap_or_default();
         Ok(options.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
     }
 }

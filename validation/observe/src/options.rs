@@ -4,6 +4,16 @@ use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
 
+/// The names of the faces of a box: axis, and whether the face is the upper one.
+pub const FACES: [(&str, (usize, bool)); 6] = [
+    ("xlo", (0, false)),
+    ("xhi", (0, true)),
+    ("ylo", (1, false)),
+    ("yhi", (1, true)),
+    ("zlo", (2, false)),
+    ("zhi", (2, true)),
+];
+
 /// The facts on which the settings of an observable depend.
 #[derive(Debug)]
 pub struct Place<'a> {

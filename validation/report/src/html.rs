@@ -4,6 +4,7 @@ use std::fmt::Display;
 
 use super::table::{Table, Verdict};
 use super::text::escape;
+use super::{Plot, ReportError};
 
 const STYLE: &str = include_str!("page.css");
 
@@ -29,6 +30,12 @@ pub struct Section {
     pub items: Vec<Item>,
 }
 
+impl Section {
+    pub fn new(heading: impl Into<String>, items: Vec<Item>) -> Section {
+        Section { heading: heading.into(), items }
+    }
+}
+
 /// One item of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
@@ -43,6 +50,20 @@ pub enum Item {
         /// The text below the picture; may be empty.
         caption: String,
     },
+}
+
+impl Item {
+    pub fn prose(text: impl Into<String>) -> Item {
+        Item::Prose(text.into())
+    }
+
+    /// A plot with the text below it.
+    ///
+    /// # Errors
+    /// The function fails if plotters cannot draw the plot.
+    pub fn figure(plot: &Plot, caption: impl Into<String>) -> Result<Item, ReportError> {
+        Ok(Item::Figure { svg: plot.render()?, caption: caption.into() })
+    }
 }
 
 impl Report {
@@ -134,7 +155,7 @@ fn render_table(table: &Table) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Plot, Series, Style};
+    use super::super::{Series, Style};
     use super::*;
     use proptest::prelude::*;
 
@@ -148,28 +169,20 @@ mod tests {
         let mut table = Table::new([text.clone(), "verdict".into()]);
         table.push([text.clone(), "pass".into(), "3.5".into()]);
         table.push(["1", "FAIL"]);
-        let plot = Plot {
-            title: text.clone(),
-            series: vec![Series {
-                name: text.clone(),
-                points: vec![(1.0, 2.0), (2.0, 3.0)],
-                errors: None,
-                style: Style::Points,
-            }],
-            ..Plot::default()
-        };
+        let series = Series::new(text.clone(), vec![(1.0, 2.0), (2.0, 3.0)], Style::Points);
+        let plot = Plot::new(text.clone(), ["", ""], vec![series]);
         Report {
             title: text.clone(),
             subtitle: text.clone(),
             facts: vec![(text.clone(), text.clone())],
-            sections: vec![Section {
-                heading: text.clone(),
-                items: vec![
+            sections: vec![Section::new(
+                text.clone(),
+                vec![
                     Item::Prose(format!("{text}\n\n\nsecond")),
                     Item::Table(table),
-                    Item::Figure { svg: plot.render().unwrap(), caption: text.clone() },
+                    Item::figure(&plot, text.clone()).unwrap(),
                 ],
-            }],
+            )],
             passed: 3,
             failed: 1,
         }

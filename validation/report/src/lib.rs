@@ -24,3 +24,14 @@ pub use progress::{Bar, Progress};
 pub use results::{Check, Results};
 pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
+
+/// Each item once, in the order of their first occurrence.
+pub fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for item in items {
+        if !found.contains(&item) {
+            found.push(item);
+        }
+    }
+    found
+}

@@ -72,6 +72,16 @@ fn colour_of(k: usize) -> RGBColor {
 }
 
 impl Series {
+    /// Points without errors.
+    pub fn new(name: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Series {
+        Series { name: name.into(), points, errors: None, style }
+    }
+
+    #[must_use]
+    pub fn with_errors(self, errors: Vec<f64>) -> Series {
+        Series { errors: Some(errors), ..self }
+    }
+
     /// The error of a point, if it can be drawn.
     fn error(&self, index: usize) -> Option<f64> {
         let error = *self.errors.as_ref()?.get(index)?;
@@ -88,6 +98,12 @@ struct Shown {
 }
 
 impl Plot {
+    /// A plot with linear axes.
+    pub fn new(title: impl Into<String>, labels: [impl Into<String>; 2], series: Vec<Series>) -> Plot {
+        let [x_label, y_label] = labels.map(Into::into);
+        Plot { title: title.into(), x_label, y_label, series, ..Plot::default() }
+    }
+
     /// Draws the plot as an SVG document without prolog, fit for embedding.
     ///
     /// # Errors

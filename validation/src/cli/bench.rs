@@ -1,8 +1,9 @@
 use super::run::thread_count;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
-use psidpd_experiments::bench::{Options, contender::FEW_ABOVE, memory, page, run as measure};
+use psidpd_experiments::bench::{Asked, Options, contender::FEW_ABOVE, memory, page, run as measure};
 use psidpd_experiments::fluids::SIZES;
+use psidpd_experiments::start::SEED;
 use psidpd_report::Progress;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -86,12 +87,15 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     sizes.sort_unstable();
     sizes.dedup();
     let options = Options {
-        sizes,
-        rounds: arguments.rounds.map_or(rounds, NonZeroUsize::get),
-        seconds: arguments.seconds.unwrap_or(if full { 0.5 } else { 0.3 }),
-        steps: arguments.steps,
-        every_code: full || arguments.all,
-        few_above: arguments.few_above,
+        asked: Asked {
+            sizes,
+            rounds: arguments.rounds.map_or(rounds, NonZeroUsize::get),
+            seconds: arguments.seconds.unwrap_or(if full { 0.5 } else { 0.3 }),
+            steps: arguments.steps,
+            few_above: arguments.few_above,
+            every_code: full || arguments.all,
+            seed: SEED,
+        },
         memory: or_default(&arguments.memory, memory),
         threads: arguments.threads.clone(),
         words: arguments.psi.clone(),

@@ -110,7 +110,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let found = calibrate(&a.model, &options, &command(a), &mut |line| say!("{line}"))?;
     write_atomically(&a.out, found.text.as_bytes())?;
     let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
-    let pm = |v: &psidpd_experiments::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
+    let pm = |v: &psidpd_observe::Measured| format!("{:.5} ± {:.5}", v.value, v.error);
     for r in &found.residuals {
         table.push([
             format!("{:.4}", r.density),

@@ -38,7 +38,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure
     let wrong: Vec<_> = found.iter().filter(|v| v.wrong.is_some()).collect();
     for v in &wrong {
         let why = v.wrong.as_deref().unwrap_or_default();
-        say!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host, v.integrator, v.precision, v.must);
+        say!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host.name(), v.integrator, v.precision, v.must);
     }
     say!("{} of {} cases as expected", found.len() - wrong.len(), found.len());
     write_json(json, &found)?;

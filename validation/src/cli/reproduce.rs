@@ -4,7 +4,7 @@ use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::Fault;
 use psidpd_experiments::ExperimentError;
-use psidpd_experiments::papers::{Case, Compared, Context, Outcome, Size, cases};
+use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, cases};
 use psidpd_formats::files::write_atomically;
 use psidpd_report::Table;
 use serde_json::{Value, json};
@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let mut table = Table::new(["id", "what"]);
         chosen.iter().for_each(|case| table.push([case.id, case.what]));
         say::table(&table);
-        let entry = |case: &&Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
+        let entry = |case: &Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
         write_json(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }))?;
         return Ok(Verdict::Good);
     }
@@ -87,35 +87,35 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     Ok(if good { Verdict::Good } else { Verdict::CheckFailed })
 }
 
-fn choose(ids: &[String]) -> Result<Vec<&'static Case>, Failure> {
+/// The cases of these ids, and of papers that are named by the first part of their ids.
+fn choose(ids: &[String]) -> Result<Vec<Case>, Failure> {
     let all = cases();
     if ids.is_empty() {
         return Ok(all);
     }
-    let mut chosen: Vec<&Case> = Vec::new();
+    let mut chosen: Vec<Case> = Vec::new();
     for id in ids {
-        let one = all.iter().find(|case| case.id == id);
+        let is_whole = all.iter().any(|case| case.id == id);
         let prefix = format!("{id}-");
-        let some: Vec<&Case> = match one {
-            Some(case) => vec![*case],
-            None => all.iter().copied().filter(|case| case.id.starts_with(&prefix)).collect(),
-        };
-        if some.is_empty() {
+        let is_meant = |case: &&Case| if is_whole { case.id == id } else { case.id.starts_with(&prefix) };
+        if !all.iter().any(|case| is_meant(&case)) {
             return Err(CliError::UnknownCase(id.clone()).into());
         }
-        chosen.extend(
-            some.into_iter().filter(|case| chosen.iter().all(|c| c.id != case.id)).collect::<Vec<_>>(),
-        );
+        for case in all.iter().filter(is_meant) {
+            if chosen.iter().all(|c| c.id != case.id) {
+                chosen.push(*case);
+            }
+        }
     }
     Ok(chosen)
 }
 
-fn result(case: &Case, outcome: &Outcome) -> Value {
+fn result(case: &Case, outcome: &Reproduction) -> Value {
     let values: Vec<Value> = outcome.values.iter().map(Compared::to_json).collect();
     json!({ "id": case.id, "values": values, "pass": outcome.passes() })
 }
 
-fn show(outcome: &Outcome) {
+fn show(outcome: &Reproduction) {
     use psidpd_experiments::papers::Rule;
     let mut table = Table::new(["value", "measured", "published", "deviation", ""]);
     for v in &outcome.values {
@@ -144,7 +144,7 @@ fn show(outcome: &Outcome) {
     }
 }
 
-fn write_plots(outcome: &Outcome, folder: &Path) -> Result<(), Failure> {
+fn write_plots(outcome: &Reproduction, folder: &Path) -> Result<(), Failure> {
     for (name, plot) in &outcome.plots {
         let svg = plot.render()?;
         let io = |source| Failure::from(ExperimentError::Io { path: folder.to_owned(), source });

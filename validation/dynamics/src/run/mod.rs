@@ -8,6 +8,7 @@ mod about;
 mod advice;
 mod bounds;
 mod by_tag;
+mod checkpoints;
 mod dump;
 mod error;
 mod folder;

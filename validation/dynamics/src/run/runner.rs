@@ -1,3 +1,4 @@
+use super::checkpoints::Checkpoints;
 use super::error::RunError;
 use super::folder::Folder;
 use super::outcome::{Outcome, Progress};
@@ -60,13 +61,7 @@ pub enum Start {
 /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
 /// cannot be written.
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
-    let mut runner = Runner::begin(scene, out, Begin::Overwrite)?;
-    let never = AtomicUsize::new(0);
-    loop {
-        if let Outcome::Finished { summary, .. } = runner.run(&never, progress)? {
-            return Ok(*summary);
-        }
-    }
+    Runner::begin(scene, out, Begin::Overwrite)?.run_to_end(progress)
 }
 
 /// A run of a scene in a folder.
@@ -132,7 +127,8 @@ impl<'a> Runner<'a> {
         };
         let mut output = Output::create(scene, out)?;
         let good = Checkpoint { files: output.written(), ..good };
-        let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default())?;
+        let checkpoints = Checkpoints::new(store, good, None);
+        let run = Run::new(scene, folder, simulation, Some(output), checkpoints, Timing::default())?;
         Ok(Runner { start: Start::New, run })
     }
 
@@ -164,8 +160,9 @@ impl<'a> Runner<'a> {
                 .write(folder.path())
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
-        let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
-        run.stored = Some(run.good.step);
+        let stored = Some(good.step);
+        let checkpoints = Checkpoints::new(store, good, stored);
+        let run = Run::new(scene, folder, simulation, output, checkpoints, timing)?;
         Ok(Runner { start, run })
     }
 
@@ -175,7 +172,7 @@ impl<'a> Runner<'a> {
 
     /// Sets the wall time between checkpoints for a scene without a step interval; the default is ten minutes.
     pub fn set_checkpoint_interval(&mut self, interval: Duration) {
-        self.run.interval = interval;
+        self.run.checkpoints.interval = interval;
     }
 
     /// Sets the number of threads; the default is one. The output of a run does not depend on it.
@@ -214,14 +211,26 @@ impl<'a> Runner<'a> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
             // Leftover checkpoints are harmless, and the folder may be read-only, so an error is ignored.
-            let _ = run.store.keep_newest();
+            let _ = run.checkpoints.store.keep_newest();
             return Ok(Outcome::Finished {
                 summary: Box::new(run.summary()),
-                timing: run.timing.clone(),
+                timing: run.clock.earlier.clone(),
                 advice: None,
             });
         }
         run.go_on(stop, progress).map_err(|error| run.stop(error))
+    }
+
+    /// Makes the remaining steps without interruption.
+    ///
+    /// # Errors
+    /// As [`Runner::run`].
+    pub fn run_to_end(&mut self, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
+        loop {
+            if let Outcome::Finished { summary, .. } = self.run(&AtomicUsize::new(0), progress)? {
+                return Ok(*summary);
+            }
+        }
     }
 }
 

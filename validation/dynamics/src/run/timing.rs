@@ -4,6 +4,7 @@ use super::error::RunError;
 use psidpd_core::engine::thermostat::Effort;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::time::Instant;
 
 /// The contents of `timing.json`: one session for the start and each resumption of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -42,6 +43,41 @@ impl Iterations {
     pub(super) fn of(effort: Effort) -> Option<Iterations> {
         let Effort { most, inaccurate, .. } = effort;
         effort.mean().map(|mean| Iterations { mean, most, inaccurate })
+    }
+}
+
+/// The clock of the present session.
+pub(super) struct Clock {
+    /// Earlier sessions.
+    pub earlier: Timing,
+    from_step: u64,
+    since: Instant,
+}
+
+impl Clock {
+    pub fn new(earlier: Timing, from_step: u64) -> Clock {
+        Clock { earlier, from_step, since: Instant::now() }
+    }
+
+    /// Begins the session anew.
+    pub fn restart(&mut self, from_step: u64) {
+        (self.from_step, self.since) = (from_step, Instant::now());
+    }
+
+    /// All sessions, this one up to `step`.
+    pub fn until(&self, step: u64, particles: usize, effort: Effort) -> Timing {
+        let wall_seconds = self.since.elapsed().as_secs_f64();
+        let made = step.saturating_sub(self.from_step) as f64 * particles as f64;
+        let mut timing = self.earlier.clone();
+        timing.sessions.push(Session {
+            from_step: self.from_step,
+            to_step: step,
+            wall_seconds,
+            // The clock may not have advanced, and JSON has no infinity.
+            particle_steps_per_second: made / wall_seconds.max(1e-9),
+            thermostat: Iterations::of(effort),
+        });
+        timing
     }
 }
 

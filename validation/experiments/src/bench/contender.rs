@@ -1,71 +1,49 @@
 //! Who is timed, under which name.
 
+use crate::code::{Code, Host, Suffix};
 use crate::fluids::{DPD, MDPD, Subject};
 use psidpd_core::engine::{Instructions, Precision, Settings};
 use std::num::NonZeroUsize;
 
-#[derive(Debug, Clone, PartialEq)]
-pub enum Code {
-    /// LAMMPS's `mdpd/rhosum` and `mdpd`.
-    BuiltIn,
-    /// LAMMPS's `eam/alloy` with tables of the fluid, and `dpd/tstat`.
-    Eam,
-    /// LAMMPS's `dpd`, or an accelerated version of it.
-    Dpd(Suffix),
-    /// The plugin's `dpd/psi`, with these words behind the seed.
-    Plugin(String),
-    Native(Settings),
-    /// The native runner with the sums over pairs one by one.
-    Plain,
-}
-
-/// Accelerated versions of LAMMPS's `dpd`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Suffix {
-    /// `dpd` itself.
-    None,
-    /// `dpd/omp` on one thread.
-    Omp,
-    /// `dpd/intel` on one thread, in its mixed precision.
-    Intel,
-}
-
-/// A code, and on how many MPI ranks.
+/// A code with its settings, and on how many MPI ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contender {
     pub code: Code,
+    /// Settings of [`Code::Native`].
+    pub settings: Settings,
+    /// Words behind the seed of [`Code::Psi`].
+    pub words: String,
     /// MPI ranks; 1 for the native runner.
     pub ranks: usize,
     /// Whether the box is repeated along x as often as there are ranks: weak scaling.
     pub weak: bool,
 }
 
-impl Suffix {
-    pub fn style(self) -> &'static str {
-        match self {
-            Suffix::None => "dpd",
-            Suffix::Omp => "dpd/omp",
-            Suffix::Intel => "dpd/intel",
-        }
-    }
-}
-
 impl Contender {
     /// On one rank.
     pub fn alone(code: Code) -> Contender {
-        Contender { code, ranks: 1, weak: false }
+        Contender { code, settings: Settings::default(), words: String::new(), ranks: 1, weak: false }
+    }
+
+    /// The native runner with these settings.
+    pub fn native(settings: Settings) -> Contender {
+        Contender { settings, ..Contender::alone(Code::Native) }
+    }
+
+    /// The plugin on one rank with these words.
+    pub fn plugin(words: impl Into<String>) -> Contender {
+        Contender { words: words.into(), ..Contender::alone(Code::Psi) }
     }
 
     /// The name in results.
     pub fn id(&self) -> String {
-        let mut id = match &self.code {
-            Code::BuiltIn => "lammps mdpd".to_owned(),
-            Code::Eam => "lammps eam/alloy".to_owned(),
-            Code::Dpd(suffix) => format!("lammps {}", suffix.style()),
-            Code::Plugin(words) => format!("plugin dpd/psi {words}").trim_end().to_owned(),
-            Code::Native(s) => format!("native {} {} {}", s.precision, s.instructions, s.threads),
-            Code::Plain => "native plain".to_owned(),
-        };
+        let mut id = self.code.label().to_lowercase();
+        if let Some(s) = self.settings() {
+            id += &format!(" {} {} {}", s.precision, s.instructions, s.threads);
+        }
+        if !self.words.is_empty() {
+            id += &format!(" {}", self.words);
+        }
         if self.ranks > 1 {
             id += &format!(", {} ranks", self.ranks);
         }
@@ -76,38 +54,29 @@ impl Contender {
     }
 
     pub fn in_lammps(&self) -> bool {
-        !matches!(self.code, Code::Native(_) | Code::Plain)
+        self.code.host() != Host::Native
     }
 
     /// Whether it is the plugin on one rank, where it needs no ghosts: decks advise LAMMPS as its manual does.
     pub fn needs_no_ghosts(&self) -> bool {
-        matches!(self.code, Code::Plugin(_)) && self.ranks == 1
+        self.code == Code::Psi && self.ranks == 1
     }
 
     /// The settings of the native runner.
     pub fn settings(&self) -> Option<Settings> {
-        match self.code {
-            Code::Native(settings) => Some(settings),
-            _ => None,
-        }
+        (self.code == Code::Native).then_some(self.settings)
     }
 
     /// Threads of each rank.
     pub fn threads(&self) -> usize {
-        match &self.code {
-            Code::Native(settings) => settings.threads.get(),
-            Code::Plugin(words) => word_after(words, "threads").and_then(|n| n.parse().ok()).unwrap_or(1),
-            _ => 1,
-        }
+        let words = word_after(&self.words, "threads").and_then(|n| n.parse().ok());
+        self.settings().map_or(words.unwrap_or(1), |settings| settings.threads.get())
     }
 
     /// The precision, where one was asked for.
     pub fn precision(&self) -> Option<String> {
-        match &self.code {
-            Code::Native(settings) => Some(settings.precision.to_string()),
-            Code::Plugin(words) => word_after(words, "precision").map(str::to_owned),
-            _ => None,
-        }
+        let words = word_after(&self.words, "precision").map(str::to_owned);
+        self.settings().map(|settings| settings.precision.to_string()).or(words)
     }
 
     /// How often the state is repeated along x.
@@ -123,7 +92,7 @@ fn word_after<'a>(words: &'a str, key: &str) -> Option<&'a str> {
 /// What the rate of others is compared with: the built-in of the fluid.
 pub fn reference(subject: &Subject) -> Option<Contender> {
     if *subject == MDPD {
-        Some(Contender::alone(Code::BuiltIn))
+        Some(Contender::alone(Code::Mdpd))
     } else if *subject == DPD {
         Some(Contender::alone(Code::Dpd(Suffix::None)))
     } else {
@@ -184,20 +153,20 @@ impl Field {
     }
 
     fn has(self, subject: &Subject, contender: &Contender, choice: &Choice) -> bool {
-        match (self, &contender.code) {
+        let Contender { settings, words, .. } = contender;
+        let best = settings.instructions == Instructions::best();
+        match (self, contender.code) {
             (Field::Everyone, _) => true,
-            (Field::AllButPlain, code) => *code != Code::Plain,
+            (Field::AllButPlain, code) => code != Code::PairSums,
             (Field::User, _) if contender.weak => false,
-            (Field::User, Code::Plugin(words)) => words != DOUBLE || choice.words.contains(words),
-            (Field::User, Code::Native(settings)) => settings.instructions == Instructions::best(),
-            (Field::User, Code::Eam | Code::Plain) => false,
+            (Field::User, Code::Psi) => words != DOUBLE || choice.words.contains(words),
+            (Field::User, Code::Native) => best,
+            (Field::User, Code::Eam | Code::PairSums) => false,
             (Field::User, _) => true,
-            (Field::Few, Code::Plugin(words)) => {
+            (Field::Few, Code::Psi) => {
                 (words == MIXED && reference(subject).is_some()) || choice.words.contains(words)
             }
-            (Field::Few, Code::Native(settings)) => {
-                settings.precision == Precision::Mixed && settings.instructions == Instructions::best()
-            }
+            (Field::Few, Code::Native) => settings.precision == Precision::Mixed && best,
             (Field::Few, _) => reference(subject).as_ref() == Some(contender),
         }
     }
@@ -214,7 +183,7 @@ pub fn contenders(subject: &Subject, choice: &Choice, field: Field) -> Vec<Conte
 fn everyone(subject: &Subject, choice: &Choice) -> Vec<Contender> {
     let mut all = Vec::new();
     if *subject == MDPD {
-        all.extend(choice.built_in.then(|| Contender::alone(Code::BuiltIn)));
+        all.extend(choice.built_in.then(|| Contender::alone(Code::Mdpd)));
         all.extend(choice.eam.then(|| Contender::alone(Code::Eam)));
     } else if *subject == DPD {
         all.extend(choice.suffixes.iter().map(|s| Contender::alone(Code::Dpd(*s))));
@@ -223,16 +192,15 @@ fn everyone(subject: &Subject, choice: &Choice) -> Vec<Contender> {
     let threads = choice.threads.iter().filter(|n| n.get() > 1 && !general);
     let words = ["", MIXED, DOUBLE].map(str::to_owned).into_iter();
     let words = words.chain(threads.map(|n| format!("{MIXED} threads {n}"))).chain(choice.words.clone());
-    all.extend(words.map(|words| Contender::alone(Code::Plugin(words))));
+    all.extend(words.map(Contender::plugin));
     if *subject == MDPD && choice.two_ranks {
         for weak in [false, true] {
-            let built_in = choice.built_in.then_some(Code::BuiltIn);
-            for code in built_in.into_iter().chain([Code::Plugin(MIXED.to_owned())]) {
-                all.push(Contender { code, ranks: 2, weak });
-            }
+            let built_in = choice.built_in.then(|| Contender::alone(Code::Mdpd));
+            let both = built_in.into_iter().chain([Contender::plugin(MIXED)]);
+            all.extend(both.map(|alone| Contender { ranks: 2, weak, ..alone }));
         }
     }
-    all.push(Contender::alone(Code::Plain));
+    all.push(Contender::alone(Code::PairSums));
     for &threads in &choice.threads {
         for (_, precision) in Precision::ALL {
             for (_, instructions) in Instructions::ALL.into_iter().filter(|(_, i)| i.available()) {
@@ -240,8 +208,7 @@ fn everyone(subject: &Subject, choice: &Choice) -> Vec<Contender> {
                 if general && instructions != Instructions::best() {
                     continue;
                 }
-                let settings = Settings { precision, instructions, threads };
-                all.push(Contender::alone(Code::Native(settings)));
+                all.push(Contender::native(Settings { precision, instructions, threads }));
             }
         }
     }
@@ -256,11 +223,11 @@ mod tests {
 
     #[test]
     fn threads_are_those_of_the_settings_or_of_the_words() {
-        let plugin = |words: &str| Contender::alone(Code::Plugin(words.to_owned())).threads();
+        let plugin = |words: &str| Contender::plugin(words).threads();
         assert_eq!(["", "threads", "precision mixed", "precision mixed threads 2"].map(plugin), [1, 1, 1, 2]);
         let settings = Settings { threads: NonZeroUsize::new(3).unwrap(), ..Settings::default() };
-        assert_eq!(Contender::alone(Code::Native(settings)).threads(), 3);
-        let precision = |words: &str| Contender::alone(Code::Plugin(words.to_owned())).precision();
+        assert_eq!(Contender::native(settings).threads(), 3);
+        let precision = |words: &str| Contender::plugin(words).precision();
         assert_eq!(precision("threads 2"), None);
         assert_eq!(precision(MIXED).as_deref(), Some("mixed"));
     }
@@ -269,7 +236,7 @@ mod tests {
         Choice {
             built_in: true,
             eam: true,
-            suffixes: vec![Suffix::None, Suffix::Omp, Suffix::Intel],
+            suffixes: Suffix::ALL.to_vec(),
             two_ranks: true,
             words: vec!["precision double threads 3".into()],
             threads: [1, 2].map(|n| NonZeroUsize::new(n).unwrap()).to_vec(),

@@ -1,14 +1,16 @@
 //! A timed run of LAMMPS.
 
-use super::contender::{Code, Contender, Suffix};
+use super::contender::Contender;
 use super::length::Length;
 use crate::ExperimentError;
-use crate::fluids::{GAMMA, RC, SET6, Subject};
+use crate::code::{Code, Suffix, Told};
+use crate::fluids::{GAMMA, SET6, Subject};
 use crate::lammps::deck::Deck;
 use crate::lammps::host::PluginHost;
-use crate::lammps::log::{Loop, parse};
+use crate::lammps::log::{Loop, timed};
 use crate::lammps::style::{GRID, PairStyle};
 use crate::start::{SEED, Start};
+use psidpd_core::model::ForceLaw;
 use psidpd_lammps_host::export::eam;
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -26,19 +28,13 @@ pub struct Place {
 
 /// The pair style of a contender; the native runner has none.
 fn style(place: &Place, subject: &Subject, contender: &Contender) -> Option<PairStyle> {
-    let species = subject.species.join(" ");
-    Some(match &contender.code {
-        Code::BuiltIn => PairStyle::Mdpd(SET6.pair(GAMMA)),
-        Code::Eam => {
-            let tables = tables(place, subject).display().to_string();
-            PairStyle::Eam { tables, species, thermostat: Some([GAMMA, RC]) }
-        }
-        Code::Dpd(_) => PairStyle::Dpd { a: 25.0, gamma: 4.5, rc: 1.0 },
-        Code::Plugin(words) => {
-            let model = model(place, subject).display().to_string();
-            PairStyle::Psi { model, species, words: words.clone() }
-        }
-        Code::Native(_) | Code::Plain => return None,
+    contender.code.style(Told {
+        model: model(place, subject).display().to_string(),
+        tables: tables(place, subject).display().to_string(),
+        species: subject.species.join(" "),
+        pair: SET6.pair(GAMMA),
+        law: ForceLaw::Conservative,
+        words: contender.words.clone(),
     })
 }
 
@@ -53,7 +49,7 @@ fn deck(
     length: Length,
 ) -> Option<String> {
     let style = style(place, subject, contender)?;
-    let data = if contender.code == Code::BuiltIn { &start.data_mdpd } else { &start.data };
+    let data = if contender.code == Code::Mdpd { &start.data_mdpd } else { &start.data };
     // On one rank the styles need no ghosts: none that forces are sent back from, and none that are found in time.
     let alone = contender.needs_no_ghosts();
     let deck = Deck {
@@ -109,8 +105,7 @@ pub fn run(
     length: Length,
 ) -> Result<Loop, ExperimentError> {
     let script = deck(place, subject, contender, start, skin, length).unwrap_or_default();
-    let said = place.lammps.run(contender.ranks, &place.work, &script, "none", LIMIT)?;
-    parse(&said).map_err(|problem| ExperimentError::Printed { what: contender.id(), problem })
+    timed(&contender.id(), &place.lammps.run(contender.ranks, &place.work, &script, "none", LIMIT)?)
 }
 
 /// The names of the pair styles that the host has, by its own list.

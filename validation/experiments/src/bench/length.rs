@@ -1,6 +1,7 @@
 //! How many steps a timed run makes.
 
-use super::contender::{Code, Contender};
+use super::contender::Contender;
+use crate::code::Code;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Length {
@@ -29,10 +30,7 @@ impl Length {
     pub fn within(seconds: f64, contender: &Contender, step: f64) -> Length {
         // The cast takes NaN to zero and what is too large to the greatest number.
         let fit = (seconds / step) as u64;
-        let cycle = match contender.code {
-            Code::Native(_) => CYCLE,
-            _ => 1,
-        };
+        let cycle = if contender.code == Code::Native { CYCLE } else { 1 };
         Length::of((fit.min(MOST) / cycle * cycle).max(FEWEST.next_multiple_of(cycle)))
     }
 
@@ -45,13 +43,12 @@ impl Length {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use psidpd_core::engine::Settings;
 
     #[test]
     fn time_bounds_steps_and_the_fewest_bound_that() {
-        let lammps = Contender::alone(Code::BuiltIn);
-        let native = Contender::alone(Code::Native(Settings::default()));
-        let plain = Contender::alone(Code::Plain);
+        let lammps = Contender::alone(Code::Mdpd);
+        let native = Contender::alone(Code::Native);
+        let plain = Contender::alone(Code::PairSums);
         let steps = |contender, step| Length::within(0.3, contender, step).steps;
         assert_eq!(steps(&lammps, 0.002), 150);
         assert_eq!([0.1, 10.0].map(|s| steps(&lammps, s)), [20, 20]);

@@ -2,6 +2,7 @@
 
 use crate::ExperimentError;
 use crate::fluids::MDPD;
+use crate::machine::peak_kilobytes;
 use crate::start::{Filling, SEED, random};
 use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::run::{Integrator, Simulation};
@@ -46,14 +47,7 @@ pub fn child(particles: usize) -> Result<Child, ExperimentError> {
     let dt = 0.1 * MDPD.dt;
     simulation.prepare(dt, Want::FORCES)?;
     simulation.advance(5, dt, Integrator::VelocityVerlet)?;
-    let status = Path::new("/proc/self/status");
-    let text = std::fs::read_to_string(status).map_err(ExperimentError::io(status))?;
-    let kilobytes: Option<u64> = text
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))
-        .and_then(|rest| rest.split_whitespace().next()?.parse().ok());
-    let peak_bytes = 1024
-        * kilobytes.ok_or_else(|| ExperimentError::Memory(format!("no VmHWM in {}", status.display())))?;
+    let peak_bytes = 1024 * peak_kilobytes()?;
     Ok(Child { particles, peak_bytes, engine_bytes: simulation.engine().memory() as u64 })
 }
 

@@ -16,19 +16,22 @@ mod pairs;
 mod spread;
 mod turns;
 
-pub use outcome::Outcome;
+pub use outcome::Benchmark;
 pub use spread::Spread;
 
 use crate::ExperimentError;
+use crate::code::{Code, Suffix};
+use crate::files;
 use crate::fluids::{MDPD, SUBJECTS, Subject};
 use crate::lammps::host::PluginHost;
 use crate::lammps::log::Loop;
 use crate::machine::machine;
 use crate::start::{self, Start};
-use contender::{Choice, Contender, Field, Suffix};
+use contender::{Choice, Contender, Field};
 use deck::Place;
 use length::{FEWEST, Length};
-use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
+pub use outcome::Asked;
+use outcome::{FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
 use psidpd_lammps_host::Host;
@@ -40,21 +43,11 @@ use std::path::{Path, PathBuf};
 /// What `psidpd bench` is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Particles of the many-body fluid in the boxes.
-    pub sizes: Vec<usize>,
-    pub rounds: usize,
-    /// Seconds that a timed run may take, if that is enough for the fewest steps.
-    pub seconds: f64,
-    /// Steps of every run instead; then no skin is looked for either.
-    pub steps: Option<u64>,
+    pub asked: Asked,
     /// Particles of the systems whose memory is measured.
     pub memory: Vec<usize>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
-    /// Every code, not only those of [`Field::User`].
-    pub every_code: bool,
-    /// Above this size only the contenders of [`Field::Few`] are timed.
-    pub few_above: usize,
     /// More words behind the seed of `pair_style dpd/psi`, each a contender.
     pub words: Vec<String>,
     /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
@@ -108,11 +101,9 @@ type Cases = BTreeMap<(&'static str, usize), Case>;
 ///
 /// # Errors
 /// Something could not be run or written.
-pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, ExperimentError> {
+pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
-    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
-    // LAMMPS runs in folders of its own: paths must not depend on ours.
-    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
+    let out = files::absolute_folder(&options.out)?;
     let spinner = progress.spinner("LAMMPS and the plugin");
     let (place, version) = place(options, &out, progress)?;
     spinner.finish();
@@ -120,7 +111,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     let (choice, missing) = choice(options, &place)?;
     let (cases, mut entries) = entries(options, &choice, &place, &out, progress)?;
     calibrate(options, &cases, &place, &mut entries, progress)?;
-    time(options.rounds, &cases, &place, &mut entries, progress)?;
+    time(options.asked.rounds, &cases, &place, &mut entries, progress)?;
 
     let spinner = progress.spinner("memory and threads");
     let memory = match &options.memory[..] {
@@ -133,7 +124,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     let runs = runs(&entries, &cases);
     let (fluids, slope_widths) = facts()?;
     let scaling = scaling(&runs, &entries, slope_widths["mdpd"]);
-    let outcome = Outcome {
+    let outcome = Benchmark {
         format: 3,
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine {
@@ -149,31 +140,16 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
             load,
         },
         lammps: LammpsFacts { version, missing },
-        options: Asked {
-            sizes: options.sizes.clone(),
-            rounds: options.rounds,
-            seconds: options.seconds,
-            steps: options.steps,
-            every_code: options.every_code,
-            few_above: options.few_above,
-            seed: start::SEED,
-        },
+        options: options.asked.clone(),
         fluids,
         runs,
         scaling,
         memory,
         equal_bits,
     };
-    write(&out, &outcome)?;
+    files::write_json(&out.join("bench.json"), &outcome)?;
+    write_atomically(out.join("report.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
-}
-
-fn write(out: &Path, outcome: &Outcome) -> Result<(), ExperimentError> {
-    let json = serde_json::to_string_pretty(outcome)
-        .map_err(|e| ExperimentError::io(out.join("bench.json"))(e.into()))?;
-    write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
-    write_atomically(out.join("report.html"), page::report(outcome)?.as_bytes())?;
-    Ok(())
 }
 
 /// LAMMPS with the plugin, and its version in words.
@@ -192,8 +168,7 @@ fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, S
 fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), ExperimentError> {
     let styles = deck::pair_styles(place)?;
     let has = |name: &str| styles.contains(name);
-    let suffixes: Vec<Suffix> =
-        [Suffix::None, Suffix::Omp, Suffix::Intel].into_iter().filter(|s| has(s.style())).collect();
+    let suffixes: Vec<Suffix> = Suffix::ALL.into_iter().filter(|s| has(s.style())).collect();
     let wanted = ["mdpd", "eam/alloy", "dpd/tstat", "dpd", "dpd/omp", "dpd/intel"];
     let missing = wanted.iter().filter(|s| !has(s)).map(|s| (*s).to_owned()).collect();
     let choice = Choice {
@@ -214,9 +189,9 @@ fn entries(
     out: &Path,
     progress: &Progress,
 ) -> Result<(Cases, Vec<Entry>), ExperimentError> {
-    let smallest = options.sizes.iter().min().copied();
+    let smallest = options.asked.sizes.iter().min().copied();
     let (mut cases, mut entries) = (Cases::new(), Vec::new());
-    for &size in &options.sizes {
+    for &size in &options.asked.sizes {
         for subject in SUBJECTS {
             let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
             let start = start::kept(&subject, size, &out.join("starts"))?;
@@ -225,13 +200,14 @@ fn entries(
             let pairs = pairs::pairs_per_particle(&start.state, cutoff);
             cases.insert((subject.name, size), Case { start, pairs });
             deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
-            let field = Field::of(size, Some(size) == smallest, options.every_code, options.few_above);
+            let field =
+                Field::of(size, Some(size) == smallest, options.asked.every_code, options.asked.few_above);
             for contender in contender::contenders(&subject, choice, field) {
                 entries.push(Entry {
                     subject,
                     size,
                     contender,
-                    length: Length { warm_up: 5, steps: options.steps.unwrap_or(FEWEST) },
+                    length: Length { warm_up: 5, steps: options.asked.steps.unwrap_or(FEWEST) },
                     skin: SKIN,
                     step: None,
                     seconds: Vec::new(),
@@ -262,7 +238,7 @@ fn calibrate(
     entries: &mut [Entry],
     progress: &Progress,
 ) -> Result<(), ExperimentError> {
-    if options.steps.is_some() {
+    if options.asked.steps.is_some() {
         return Ok(());
     }
     let mut order: Vec<usize> = (0..entries.len()).collect();
@@ -284,7 +260,7 @@ fn calibrate(
         };
         let step = pace.seconds * entry.particles();
         (entry.skin, entry.step) = (pace.skin, Some(step));
-        entry.length = Length::within(options.seconds, &entry.contender, step);
+        entry.length = Length::within(options.asked.seconds, &entry.contender, step);
     }
     bar.finish();
     Ok(())
@@ -292,7 +268,7 @@ fn calibrate(
 
 fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, ExperimentError> {
     // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
-    let large = entry.size > options.few_above;
+    let large = entry.size > options.asked.few_above;
     entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
     let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
     // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
@@ -357,8 +333,8 @@ fn median(values: &[f64]) -> f64 {
     Spread::of(values).map_or(0.0, |s| s.median)
 }
 
-fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
-    let mut runs: Vec<Run> = entries
+fn runs(entries: &[Entry], cases: &Cases) -> Vec<Timed> {
+    let mut runs: Vec<Timed> = entries
         .iter()
         .map(|entry| {
             let case = &cases[&(entry.subject.name, entry.size)];
@@ -372,7 +348,7 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
             let per_particle = 1e9 * median(&entry.seconds) / all;
             let settings = entry.contender.settings();
             let steps = entry.length.steps * entry.seconds.len() as u64;
-            let mut run = Run {
+            let mut run = Timed {
                 fluid: entry.subject.name,
                 size: entry.size,
                 code: entry.contender.id(),
@@ -404,7 +380,7 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
         .zip(entries)
         .map(|(run, entry)| {
             let reference = contender::reference(&entry.subject)?.id();
-            let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == reference;
+            let same = |r: &&Timed| r.fluid == run.fluid && r.size == run.size && r.code == reference;
             Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())
         })
         .collect();
@@ -414,13 +390,13 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
     runs
 }
 
-fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
-    let of = |(run, entry): (&Run, &Entry)| {
+fn scaling(runs: &[Timed], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
+    let of = |(run, entry): (&Timed, &Entry)| {
         let alone = Contender { ranks: 1, weak: false, ..entry.contender.clone() };
-        let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
+        let same = |r: &&Timed| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
         let speed_up = Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())?;
         let ranks = run.ranks as f64;
-        let plugin = matches!(entry.contender.code, contender::Code::Plugin(_));
+        let plugin = entry.contender.code == Code::Psi;
         let Spread { min, median, max } = speed_up;
         Some(Scaling {
             code: alone.id(),
@@ -462,7 +438,7 @@ fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), Experimen
 }
 
 fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, ExperimentError> {
-    let smallest = options.sizes.iter().min().copied().unwrap_or_default();
+    let smallest = options.asked.sizes.iter().min().copied().unwrap_or_default();
     let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
     let mut equal = BTreeMap::new();
     for subject in &SUBJECTS {

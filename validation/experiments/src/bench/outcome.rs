@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// All of `bench.json`.
 #[derive(Debug, Clone, Serialize)]
-pub struct Outcome {
+pub struct Benchmark {
     /// Changes when fields change their meaning.
     pub format: u32,
     pub version: &'static str,
@@ -16,7 +16,7 @@ pub struct Outcome {
     pub options: Asked,
     pub fluids: Vec<FluidFacts>,
     /// Every contender with every fluid and size.
-    pub runs: Vec<Run>,
+    pub runs: Vec<Timed>,
     /// Two ranks against one.
     pub scaling: Vec<Scaling>,
     pub memory: Vec<Memory>,
@@ -52,13 +52,13 @@ pub struct Asked {
     /// Particles of the many-body fluid in the boxes.
     pub sizes: Vec<usize>,
     pub rounds: usize,
-    /// Seconds that a timed run may take.
+    /// Seconds that a timed run may take, if that is enough for the fewest steps.
     pub seconds: f64,
-    /// Steps of every run; null if they follow from `seconds`.
+    /// Steps of every run, and no skin is looked for; null if they follow from `seconds`.
     pub steps: Option<u64>,
-    /// Size above which few contenders are timed.
+    /// Size above which only the contenders of [`Field::Few`](super::contender::Field::Few) are timed.
     pub few_above: usize,
-    /// Whether every code is timed in boxes up to that.
+    /// Whether every code is timed in boxes up to that, not only those of a user.
     pub every_code: bool,
     /// Of starts and noise.
     pub seed: u64,
@@ -76,7 +76,7 @@ pub struct FluidFacts {
 
 /// One contender with one fluid at one size.
 #[derive(Debug, Clone, Serialize)]
-pub struct Run {
+pub struct Timed {
     pub fluid: &'static str,
     /// Particles of the many-body fluid in the box before it was repeated.
     pub size: usize,
@@ -112,7 +112,7 @@ pub struct Run {
     pub steps_between_builds: Option<f64>,
 }
 
-impl Run {
+impl Timed {
     /// Millions of particle-steps per second in each round.
     pub fn rates(&self) -> Vec<f64> {
         self.seconds.iter().map(|s| 1e-6 * self.particles as f64 * self.steps as f64 / s).collect()

@@ -1,6 +1,6 @@
 //! Results as tables and plots.
 
-use super::outcome::{Asked, Machine, Outcome, Run};
+use super::outcome::{Asked, Benchmark, Machine, Timed};
 use super::spread::Spread;
 use crate::ExperimentError;
 use psidpd_core::engine::Instructions;
@@ -11,7 +11,7 @@ fn shown(spread: &Spread) -> String {
 }
 
 /// Speed of every contender, a row for each.
-pub fn speeds(outcome: &Outcome) -> Table {
+pub fn speeds(outcome: &Benchmark) -> Table {
     let mut table =
         Table::new(["fluid", "particles", "code", "10⁶ particle-steps/s", "against built-in", "ns per pair"]);
     for run in &outcome.runs {
@@ -40,20 +40,20 @@ pub fn few(options: &Asked) -> Option<String> {
 }
 
 /// The fastest setting natively and in LAMMPS, of each fluid at each size.
-pub fn fastest(outcome: &Outcome) -> Table {
+pub fn fastest(outcome: &Benchmark) -> Table {
     let mut table =
         Table::new(["fluid", "particles", "fastest natively", "10⁶/s", "fastest in LAMMPS", "10⁶/s"]);
     for (fluid, size) in
         outcome.fluids.iter().flat_map(|f| outcome.options.sizes.iter().map(|s| (f.name, *s)))
     {
         let of = |native: bool| {
-            let here = |r: &&Run| r.fluid == fluid && r.size == size && r.skin.is_none() == native;
-            let rate = |r: &Run| r.mega_particle_steps_per_second.median;
+            let here = |r: &&Timed| r.fluid == fluid && r.size == size && r.skin.is_none() == native;
+            let rate = |r: &Timed| r.mega_particle_steps_per_second.median;
             // In a box of its own size: one repeated for two ranks is another.
             let runs = outcome.runs.iter().filter(here).filter(|r| !r.code.ends_with("weak"));
             runs.max_by(|a, b| rate(a).total_cmp(&rate(b))).map(|r| (r, rate(r)))
         };
-        let shown = |run: Option<(&Run, f64)>| match run {
+        let shown = |run: Option<(&Timed, f64)>| match run {
             Some((run, rate)) => [run.code.clone(), format!("{rate:.2}")],
             None => ["–".to_owned(), "–".to_owned()],
         };
@@ -73,13 +73,13 @@ pub fn instructions(machine: &Machine) -> String {
 }
 
 /// Where the time goes natively, in the fastest precision on one thread.
-pub fn native_parts(outcome: &Outcome) -> Table {
+pub fn native_parts(outcome: &Benchmark) -> Table {
     let mixed = format!("native mixed {} 1", Instructions::best());
     parts(outcome, |r| r.code == mixed, &NATIVE_PARTS)
 }
 
 /// Where the time goes in LAMMPS with the plugin, on one thread of one rank.
-pub fn plugin_parts(outcome: &Outcome) -> Table {
+pub fn plugin_parts(outcome: &Benchmark) -> Table {
     let mixed = "plugin dpd/psi precision mixed";
     parts(outcome, |r| r.code == mixed, &LAMMPS_PARTS)
 }
@@ -96,7 +96,7 @@ pub fn cycles(machine: &Machine) -> String {
 }
 
 /// Where the time goes, of the runs for which `wanted` says so.
-fn parts(outcome: &Outcome, wanted: impl Fn(&Run) -> bool, names: &[&str]) -> Table {
+fn parts(outcome: &Benchmark, wanted: impl Fn(&Timed) -> bool, names: &[&str]) -> Table {
     let header =
         ["fluid", "particles", "code"].iter().chain(names).chain(&["all", "cycles", "cycles per pair"]);
     let cycles = |nanoseconds: f64| match outcome.machine.gigahertz {
@@ -114,7 +114,7 @@ fn parts(outcome: &Outcome, wanted: impl Fn(&Run) -> bool, names: &[&str]) -> Ta
     table
 }
 
-fn scaling(outcome: &Outcome) -> Table {
+fn scaling(outcome: &Benchmark) -> Table {
     let mut table = Table::new([
         "code",
         "kind",
@@ -140,7 +140,7 @@ fn scaling(outcome: &Outcome) -> Table {
     table
 }
 
-fn memory(outcome: &Outcome) -> Table {
+fn memory(outcome: &Benchmark) -> Table {
     let mut table = Table::new(["particles", "bytes per particle", "of these in the engine", "MB"]);
     for m in &outcome.memory {
         table.push([
@@ -154,7 +154,7 @@ fn memory(outcome: &Outcome) -> Table {
 }
 
 /// Speed against the number of particles, for those that a plot can hold.
-fn plot(outcome: &Outcome, fluid: &'static str, title: &str) -> Plot {
+fn plot(outcome: &Benchmark, fluid: &'static str, title: &str) -> Plot {
     let best = Instructions::best();
     let wanted = [
         "lammps mdpd".to_owned(),
@@ -167,32 +167,20 @@ fn plot(outcome: &Outcome, fluid: &'static str, title: &str) -> Plot {
         format!("native mixed {best} 2"),
     ];
     let series = wanted.iter().filter_map(|code| {
-        let runs: Vec<&Run> = outcome.runs.iter().filter(|r| r.fluid == fluid && r.code == *code).collect();
-        let of = |r: &&Run| (r.particles as f64, r.mega_particle_steps_per_second.median);
-        (!runs.is_empty()).then(|| Series {
-            name: code.clone(),
-            points: runs.iter().map(of).collect(),
-            errors: None,
-            style: if runs.len() > 1 { Style::Line } else { Style::Points },
-        })
+        let runs: Vec<&Timed> = outcome.runs.iter().filter(|r| r.fluid == fluid && r.code == *code).collect();
+        let of = |r: &&Timed| (r.particles as f64, r.mega_particle_steps_per_second.median);
+        let style = if runs.len() > 1 { Style::Line } else { Style::Points };
+        (!runs.is_empty()).then(|| Series::new(code.clone(), runs.iter().map(of).collect(), style))
     });
-    Plot {
-        title: title.to_owned(),
-        x_label: "particles".into(),
-        y_label: "10⁶ particle-steps per second".into(),
-        series: series.collect(),
-        log_x: true,
-        log_y: true,
-        levels: vec![],
-        marks: vec![],
-    }
+    let labels = ["particles", "10⁶ particle-steps per second"];
+    Plot { log_x: true, log_y: true, ..Plot::new(title, labels, series.collect()) }
 }
 
 /// `report.html`.
 ///
 /// # Errors
 /// A plot or the page cannot be drawn.
-pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
+pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
     let rounds = outcome.options.rounds;
     let mut speed = vec![Item::Prose(format!(
         "Medians of {rounds} interleaved rounds, with the least and the greatest in brackets. Ratios are taken within a \
@@ -201,35 +189,32 @@ pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
     ))];
     speed.extend(few(&outcome.options).map(Item::Prose));
     for fluid in &outcome.fluids {
-        let svg = plot(outcome, fluid.name, fluid.title).render()?;
-        speed.push(Item::Figure { svg, caption: String::new() });
+        speed.push(Item::figure(&plot(outcome, fluid.name, fluid.title), "")?);
     }
     speed.push(Item::Table(speeds(outcome)));
     speed.push(Item::Table(fastest(outcome)));
-    let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let sections = vec![
-        section("Speed", speed),
-        section(
+        Section::new("Speed", speed),
+        Section::new(
             "Where the time goes, natively",
             vec![
-                Item::Prose(
+                Item::prose(
                     "Nanoseconds per particle and step. Sort: into bins. Pairs: search, conservative, dissipative and \
                      random forces of pairs, weights. Psi: densities, ψ and its slopes. Many-body: their forces. \
-                     Forces: back to the host's order. Integrate: all else."
-                        .into(),
+                     Forces: back to the host's order. Integrate: all else.",
                 ),
                 Item::Table(parts(outcome, |r| r.instructions.is_some(), &NATIVE_PARTS)),
             ],
         ),
-        section(
+        Section::new(
             "Where the time goes in LAMMPS",
             vec![
-                Item::Prose("Nanoseconds per particle and step, as LAMMPS accounts for them.".into()),
+                Item::prose("Nanoseconds per particle and step, as LAMMPS accounts for them."),
                 Item::Table(parts(outcome, |r| r.skin.is_some(), &LAMMPS_PARTS)),
             ],
         ),
-        section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
-        section("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
+        Section::new("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
+        Section::new("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
     let missing = match outcome.lammps.missing.join(", ") {
         none if none.is_empty() => "none".to_owned(),

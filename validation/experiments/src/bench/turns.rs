@@ -5,12 +5,7 @@
 /// last of the next are neighbours in time. A goal compares the largest size with the smallest, and a machine
 /// changes less within seconds than within minutes.
 pub fn turns(runs: &[(&str, usize)]) -> Vec<usize> {
-    let mut fluids: Vec<&str> = Vec::new();
-    for (fluid, _) in runs {
-        if !fluids.contains(fluid) {
-            fluids.push(fluid);
-        }
-    }
+    let fluids = psidpd_report::distinct(runs.iter().map(|(fluid, _)| *fluid));
     let mut order = Vec::with_capacity(runs.len());
     for fluid in fluids {
         let mut sizes: Vec<usize> = runs.iter().filter(|r| r.0 == fluid).map(|r| r.1).collect();

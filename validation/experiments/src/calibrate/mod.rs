@@ -28,6 +28,7 @@ use crate::bulk::{Bulk, Sampling};
 use psidpd_core::model::{Model, Polynomial};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
+use psidpd_observe::Measured;
 use serde::Serialize;
 use std::cell::RefCell;
 use std::path::Path;
@@ -52,30 +53,16 @@ pub struct Residual {
     /// Total number density.
     pub density: f64,
     /// Kinetic temperature.
-    pub temperature: Value,
+    pub temperature: Measured,
     /// ⟨n⟩ for each (β at α).
-    pub mean: Vec<Value>,
+    pub mean: Vec<Measured>,
     /// ⟨ρ̃⟩ for each (β at α).
-    pub corrected: Vec<Value>,
+    pub corrected: Vec<Measured>,
     pub wanted: f64,
     /// The pressure that was measured.
-    pub pressure: Value,
+    pub pressure: Measured,
     /// |p − p_wanted| over max(|p_wanted|, 0.1 ρ ∂p/∂ρ).
     pub deviation: f64,
-}
-
-/// A value and its error, for JSON.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Value {
-    pub value: f64,
-    /// One standard deviation.
-    pub error: f64,
-}
-
-impl From<psidpd_observe::Measured> for Value {
-    fn from(m: psidpd_observe::Measured) -> Value {
-        Value { value: m.value, error: m.error }
-    }
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -253,11 +240,11 @@ pub fn calibrate(
     let kept = best.batch.points.iter().zip(best.batch.of.iter().map(|k| &targets[*k]));
     let residuals = kept.map(|(p, t)| Residual {
         density: p.total,
-        temperature: p.temperature.into(),
-        mean: p.means.iter().map(|m| (*m).into()).collect(),
-        corrected: (0..pairs).map(|k| p.corrected(k, &best.fits[k].polynomial()).into()).collect(),
+        temperature: p.temperature,
+        mean: p.means.clone(),
+        corrected: (0..pairs).map(|k| p.corrected(k, &best.fits[k].polynomial())).collect(),
         wanted: t.wanted,
-        pressure: p.pressure.into(),
+        pressure: p.pressure,
         deviation: (p.pressure.value - t.wanted).abs() / t.scale,
     });
     Ok(Calibration {

@@ -6,8 +6,9 @@
 //! proportional to the force (Warren eq. 10).
 
 use super::Context;
-use super::codes::{Code, Setup};
+use super::setup::Setup;
 use crate::ExperimentError;
+use crate::code::Code;
 use crate::fluids::SET6;
 use crate::start::periodic;
 use psidpd_core::engine::Want;
@@ -60,8 +61,8 @@ pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ExperimentError>
 }
 
 pub fn lammps(context: &Context, code: Code, law: ForceLaw) -> Result<Work, ExperimentError> {
-    let setup = Setup { code, set: &SET6, law, gamma: 0.0, ..Setup::new(code, &SET6, law) };
-    let instance = super::forces::open(context, &setup, &state_at(0.0)?, &format!("loop-{}", code.slug()))?;
+    let setup = Setup::new(code, &SET6, law);
+    let instance = super::forces::open(context, &setup, &state_at(0.0)?, &format!("loop-{}", setup.slug()))?;
     around(|angle| {
         let x = state_at(angle)?.x;
         instance.scatter("x", 3, x.as_flattened())?;

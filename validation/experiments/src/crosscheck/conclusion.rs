@@ -66,10 +66,7 @@ pub fn section(results: &Results) -> Section {
         })
         .collect();
     let warren = format!("The native runner compared with the published values: {}.", published.join("; "));
-    Section {
-        heading: "Conclusion".into(),
-        items: vec![Item::Prose(format!("{agree}\n\n{built_in}\n\n{warren}"))],
-    }
+    Section::new("Conclusion", vec![Item::Prose(format!("{agree}\n\n{built_in}\n\n{warren}"))])
 }
 
 fn number(results: &Results, key: &str, part: &str) -> Option<f64> {
@@ -131,20 +128,19 @@ pub fn what_is_compared() -> Section {
     ] {
         words.push([word, meaning]);
     }
-    Section {
-        heading: "What is compared".into(),
-        items: vec![
-            Item::Prose(
+    Section::new(
+        "What is compared",
+        vec![
+            Item::prose(
                 "U = Σ_i ψ(n_i) + Σ_{i<j} φ(r_ij), n_i = Σ_{j≠i} w_d(r_ij), ψ(n) = (π/30) r_d⁴ B n², \
                  φ(r) = ½ A r_c (1 − r/r_c)².\n\n\
                  F_ij = [A (1 − r/r_c) + B (ρ̄_i + ρ̄_j)(1 − r/r_d)] ê_ij, with Warren's ρ̄_i = n_i, each term within its \
-                 range; drag −γ (1 − r/r_c)² (ê·v) ê and noise of σ² = 2γkT. Lengths are in r_c, energies in kT, masses in m."
-                    .into(),
+                 range; drag −γ (1 − r/r_c)² (ê·v) ê and noise of σ² = 2γkT. Lengths are in r_c, energies in kT, masses in m.",
             ),
             Item::Table(sets),
             Item::Table(words),
         ],
-    }
+    )
 }
 
 #[cfg(test)]

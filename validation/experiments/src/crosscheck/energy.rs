@@ -1,13 +1,15 @@
 //! Energy against time without thermostat, and why the built-in's is not kept.
 
 use super::closed_loop;
-use super::codes::{Code, Setup};
+use super::setup::Setup;
 use super::trace::{Length, Trace, run as run_code};
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::code::Code;
 use crate::fluids::SET6;
 use crate::jobs::{self, Job};
 use crate::start::{Filling, equilibrated};
+use psidpd_core::engine::Precision::{Double, Mixed};
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::drift;
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
@@ -26,18 +28,26 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling::cube(edge);
     let state = equilibrated(&SET6.fluid, filling, 1500, SEED)?;
     let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
-    let codes = [Code::Native, Code::NativeMixed, Code::Psi, Code::PsiMixed, Code::BuiltIn, Code::Eam];
+    let setups = [
+        (Code::Native, Double),
+        (Code::Native, Mixed),
+        (Code::Psi, Double),
+        (Code::Psi, Mixed),
+        (Code::Mdpd, Double),
+        (Code::Eam, Double),
+    ]
+    .map(|(code, precision)| {
+        let law = if code == Code::Mdpd { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
+        Setup { precision, ..Setup::new(code, &SET6, law) }
+    });
     let state = &state;
-    let jobs: Vec<Job<Result<Trace, ExperimentError>>> = codes
+    let jobs: Vec<Job<Result<Trace, ExperimentError>>> = setups
         .iter()
-        .map(|&code| {
-            let bar = context.progress.bar(&format!("NVE: {}", code.label()), length.steps);
+        .map(|setup| {
+            let bar = context.progress.bar(&format!("NVE: {}", setup.label()), length.steps);
             let job = move || {
-                let law = if code == Code::BuiltIn { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
-                let setup = Setup::new(code, &SET6, law);
-                let trace = run_code(context, &setup, state, length, &format!("nve-{}", code.slug()), &|s| {
-                    bar.set(s)
-                });
+                let name = format!("nve-{}", setup.slug());
+                let trace = run_code(context, setup, state, length, &name, &|s| bar.set(s));
                 bar.finish();
                 trace
             };
@@ -53,37 +63,26 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         "temperature, start",
         "end",
     ]);
-    let mut heat = Plot {
-        title: "Temperature without thermostat".into(),
-        x_label: "time".into(),
-        y_label: "kinetic temperature".into(),
-        ..Plot::default()
-    };
-    let mut energy = Plot {
-        title: "Total energy per particle, less its start".into(),
-        x_label: "time".into(),
-        y_label: "kT".into(),
-        ..Plot::default()
-    };
-    for (code, trace) in codes.iter().zip(&traces) {
+    let (mut heat, mut energy) = (Vec::new(), Vec::new());
+    for (setup, trace) in setups.iter().zip(&traces) {
+        let (label, slug) = (setup.label(), setup.slug());
         let per_particle = trace.energy_per_particle();
         let found = drift(&trace.time, &per_particle)?;
         let duration = trace.time.last().copied().unwrap_or(0.0);
         let net = found.slope * duration;
         let ends = ends(&trace.temperature);
         table.push([
-            code.label().to_owned(),
+            label.clone(),
             format!("{net:.1e}"),
             format!("{:.1e}", found.largest),
             format!("{:.3}", ends[0]),
             format!("{:.3}", ends[1]),
         ]);
-        let slug = code.slug();
         part.values.push((
             format!("nve.{slug}"),
             json!({"drift": net, "largest": found.largest, "temperature_start": ends[0], "temperature_end": ends[1]}),
         ));
-        if *code == Code::BuiltIn {
+        if setup.code == Code::Mdpd {
             part.checks.push(Check::at_least(
                 "nve.mdpd.heating",
                 "energy",
@@ -95,28 +94,22 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             part.checks.push(Check::at_most(
                 format!("nve.{slug}.drift"),
                 "energy",
-                format!("{}: drift of U + K over {duration} time units, kT per particle", code.label()),
+                format!("{label}: drift of U + K over {duration} time units, kT per particle"),
                 net,
                 LARGEST_DRIFT,
             ));
             let start = per_particle[0];
-            energy.series.push(Series {
-                name: code.label().into(),
-                points: trace.time.iter().zip(&per_particle).map(|(t, e)| (*t, e - start)).collect(),
-                errors: None,
-                style: Style::Line,
-            });
+            let points = trace.time.iter().zip(&per_particle).map(|(t, e)| (*t, e - start)).collect();
+            energy.push(Series::new(label.clone(), points, Style::Line));
         }
-        heat.series.push(Series {
-            name: code.label().into(),
-            points: trace.time.iter().copied().zip(trace.temperature.iter().copied()).collect(),
-            errors: None,
-            style: Style::Line,
-        });
+        let points = trace.time.iter().copied().zip(trace.temperature.iter().copied()).collect();
+        heat.push(Series::new(label, points, Style::Line));
     }
-    part.section = Section {
-        heading: "Energy without thermostat".into(),
-        items: vec![
+    let heat = Plot::new("Temperature without thermostat", ["time", "kinetic temperature"], heat);
+    let energy = Plot::new("Total energy per particle, less its start", ["time", "kT"], energy);
+    part.section = Section::new(
+        "Energy without thermostat",
+        vec![
             Item::Prose(format!(
                 "{} particles of set 6 at density {}, no drag, no noise, Δt = {}. The built-in's law is its own; its \
                  energy is not shown in the second figure because what it tallies is not the potential of its forces.",
@@ -125,17 +118,13 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
                 length.dt
             )),
             Item::Table(table),
-            Item::Figure {
-                svg: heat.render()?,
-                caption: "The built-in heats; the other codes compute the gradient of an energy and keep it."
-                    .into(),
-            },
-            Item::Figure {
-                svg: energy.render()?,
-                caption: "What is left is the error of the integrator.".into(),
-            },
+            Item::figure(
+                &heat,
+                "The built-in heats; the other codes compute the gradient of an energy and keep it.",
+            )?,
+            Item::figure(&energy, "What is left is the error of the integrator.")?,
         ],
-    };
+    );
     add_loop(context, &mut part)?;
     Ok(part)
 }
@@ -153,7 +142,7 @@ fn add_loop(context: &Context, part: &mut Part) -> Result<(), ExperimentError> {
         ("native", "conservative", closed_loop::native(context, Conservative)?),
         ("plugin dpd/psi", "conservative", closed_loop::lammps(context, Code::Psi, Conservative)?),
         ("native", "Lucy", closed_loop::native(context, LucyLammps)?),
-        ("LAMMPS mdpd", "its own", closed_loop::lammps(context, Code::BuiltIn, LucyLammps)?),
+        ("LAMMPS mdpd", "its own", closed_loop::lammps(context, Code::Mdpd, LucyLammps)?),
     ];
     let mut table = Table::new(["code", "law", "work around the loop", "over the integral of |F|"]);
     for (code, law, w) in rows {
@@ -192,12 +181,11 @@ fn add_loop(context: &Context, part: &mut Part) -> Result<(), ExperimentError> {
         "loop".into(),
         json!({"native": native.work, "plugin": plugin.work, "lucy": lucy.work, "mdpd": built_in.work}),
     ));
-    part.section.items.push(Item::Prose(
+    part.section.items.push(Item::prose(
         "Why: two particles rest and a third goes once around a circle. A force with a potential does no work on \
          the way. The built-in's density has the Lucy kernel and its force falls off linearly; the derivative of \
          the one is not proportional to the other, which is the condition for a potential (Warren, eq. 10), and \
-         the force does work. A fluid full of such triples heats."
-            .into(),
+         the force does work. A fluid full of such triples heats.",
     ));
     part.section.items.push(Item::Table(table));
     Ok(())

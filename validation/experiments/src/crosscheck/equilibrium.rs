@@ -1,10 +1,11 @@
 //! A slab in equilibrium: temperature, pressure, liquid density, energy and surface tension, with error
 //! bars, in every code.
 
-use super::codes::{Code, Setup};
+use super::setup::Setup;
 use super::trace::{Length, Trace, run as run_code};
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::code::Code;
 use crate::fluids::{GAMMA, SET5, SET6, WarrenSet};
 use crate::jobs::{self, Job};
 use crate::start::{Filling, equilibrated};
@@ -26,13 +27,13 @@ const WARMER: f64 = 0.02;
 const PUBLISHED: f64 = 3.0;
 
 /// A code, its law, and the run it is compared with.
-type Run = (Code, ForceLaw, Option<usize>);
+type Slot = (Code, ForceLaw, Option<usize>);
 
-const RUNS: [Run; 5] = [
+const RUNS: [Slot; 5] = [
     (Code::Native, ForceLaw::Conservative, None),
     (Code::Psi, ForceLaw::Conservative, Some(NATIVE)),
     (Code::MdpdPsi, ForceLaw::LucyLammps, None),
-    (Code::BuiltIn, ForceLaw::LucyLammps, Some(MDPD_PSI)),
+    (Code::Mdpd, ForceLaw::LucyLammps, Some(MDPD_PSI)),
     (Code::Eam, ForceLaw::Conservative, Some(NATIVE)),
 ];
 const NATIVE: usize = 0;
@@ -40,12 +41,12 @@ const MDPD_PSI: usize = 2;
 const BUILT_IN: usize = 3;
 
 /// The first of them, as many as a set has. Tables take longest: a quick validation makes one run with them.
-fn runs(set: &WarrenSet, full: bool) -> &'static [Run] {
+fn runs(set: &WarrenSet, full: bool) -> &'static [Slot] {
     if full || set.name == SET6.name { &RUNS } else { &RUNS[..=BUILT_IN] }
 }
 
 /// What is compared, with error bars.
-struct Measured {
+struct Slab {
     temperature: Estimate,
     pressure: Estimate,
     energy: Estimate,
@@ -60,8 +61,8 @@ struct Measured {
 
 fn name(code: Code, law: ForceLaw) -> String {
     match (code, law) {
-        (Code::BuiltIn, _) => "LAMMPS mdpd".into(),
-        (code, ForceLaw::Conservative) => code.label().into(),
+        (Code::Mdpd, _) => "LAMMPS mdpd".into(),
+        (code, ForceLaw::Conservative) => code.label(),
         (code, ForceLaw::LucyLammps) => format!("{}, law lucy", code.label()),
     }
 }
@@ -88,7 +89,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             jobs.push(Box::new(move || {
                 let seed = SEED + (10 * k + n) as u64;
                 let setup = Setup { gamma: GAMMA, seed, ..Setup::new(code, set, law) };
-                let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), code.slug());
+                let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), setup.slug());
                 let before = AtomicU64::new(0);
                 let advance = |step: u64| {
                     bar.set(step);
@@ -104,16 +105,16 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let traces = jobs::run(jobs).into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut traces = traces.iter();
     let mut part = Part {
-        section: Section {
-            heading: "A slab of liquid in equilibrium".into(),
-            items: vec![Item::Prose(format!(
+        section: Section::new(
+            "A slab of liquid in equilibrium",
+            vec![Item::Prose(format!(
                 "A slab of liquid with its vapour at kT = 1, γ = {GAMMA}, {edge} × {edge} × {height}, {steps} steps of \
                  {} of which the first fifth is left out; seeds from {SEED}. Error bars are standard errors from the \
                  autocorrelation of each series. Runs of equal law must agree: over all comparisons the chance of a \
                  false alarm is {FALSE_ALARM}.",
                 length.dt
             ))],
-        },
+        ),
         ..Part::default()
     };
     let comparisons = sets
@@ -134,7 +135,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
 
 /// A quantity by name, and the largest error of a difference that is accepted: no comparison with a larger one could tell
 /// the two force laws apart, of which tensions differ by 1.4 and more and pressures by their share in it.
-type Quantity = (&'static str, fn(&Measured) -> &Estimate, f64);
+type Quantity = (&'static str, fn(&Slab) -> &Estimate, f64);
 
 /// The quantities that equal fluids must agree in.
 const QUANTITIES: [Quantity; 5] = [
@@ -150,10 +151,10 @@ fn compared(code: Code, other: Option<usize>) -> impl Iterator<Item = Quantity> 
     // The energy that the built-in tallies is not that of its forces, nor of any other.
     QUANTITIES
         .into_iter()
-        .filter(move |(what, ..)| other.is_some() && !(code == Code::BuiltIn && *what == "energy"))
+        .filter(move |(what, ..)| other.is_some() && !(code == Code::Mdpd && *what == "energy"))
 }
 
-fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ExperimentError> {
+fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Slab, ExperimentError> {
     let of = |what: &str, series: &[f64]| {
         let kept = &series[series.len() / 5..];
         estimate(kept).map_err(|source| ExperimentError::Statistics { what: what.to_owned(), source })
@@ -172,7 +173,7 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, Experiment
     };
     let [xx, yy, zz, ..] = &trace.pressure;
     let per_particle: Vec<f64> = trace.potential.iter().map(|u| u / trace.particles as f64).collect();
-    Ok(Measured {
+    Ok(Slab {
         temperature: of("temperature", &trace.temperature)?,
         pressure: of("pressure", &trace.scalar_pressure())?,
         energy: of("energy", &per_particle)?,
@@ -195,7 +196,7 @@ fn shown(e: &Estimate) -> String {
 fn report_set(
     part: &mut Part,
     set: &WarrenSet,
-    measured: &[Measured],
+    measured: &[Slab],
     comparisons: usize,
 ) -> Result<(), ExperimentError> {
     let slug = set.name.replace(' ', "");
@@ -208,26 +209,19 @@ fn report_set(
         "surface tension",
         "width",
     ]);
-    let mut plot = Plot {
-        title: format!("Density profile, {}", set.name),
-        x_label: "z, from the middle of the slab".into(),
-        y_label: "number density".into(),
-        levels: vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))],
-        ..Plot::default()
-    };
+    let levels = vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))];
+    let labels = ["z, from the middle of the slab", "number density"];
+    let mut plot = Plot { levels, ..Plot::new(format!("Density profile, {}", set.name), labels, Vec::new()) };
+    let code_slug = |code: Code| Setup::new(code, set, ForceLaw::Conservative).slug();
     for ((code, law, _), m) in RUNS.iter().zip(measured) {
         let mut row = vec![name(*code, *law)];
         row.extend(QUANTITIES.iter().map(|(_, get, _)| shown(get(m))));
         row.push(m.width.map_or_else(|| "–".into(), |w| format!("{w:.2}")));
         table.push(row);
-        plot.series.push(Series {
-            name: name(*code, *law),
-            points: m.profile.clone(),
-            errors: None,
-            style: if *law == ForceLaw::Conservative { Style::Line } else { Style::Dashed },
-        });
+        let style = if *law == ForceLaw::Conservative { Style::Line } else { Style::Dashed };
+        plot.series.push(Series::new(name(*code, *law), m.profile.clone(), style));
         for (what, get, _) in QUANTITIES {
-            let id = format!("nvt.{slug}.{}-{}.{}", code.slug(), law_slug(*law), what.replace(' ', "-"));
+            let id = format!("nvt.{slug}.{}-{}.{}", code_slug(*code), law_slug(*law), what.replace(' ', "-"));
             part.values.push((id, json!(get(m))));
         }
     }
@@ -246,7 +240,7 @@ fn report_set(
         for (what, get, most) in compared(*code, Some(*other)) {
             let comparison = difference(get(m), get(&measured[*other]));
             let mut check = Check::agreement(
-                format!("nvt.{slug}.{}.{}", code.slug(), what.replace(' ', "-")),
+                format!("nvt.{slug}.{}.{}", code_slug(*code), what.replace(' ', "-")),
                 "equilibrium",
                 format!(
                     "{}: {what} of {} equals that of {}",
@@ -294,20 +288,20 @@ fn report_set(
         psidpd_observe::threshold(comparisons, FALSE_ALARM),
     ));
     part.section.items.push(Item::Table(table));
-    part.section.items.push(Item::Figure {
-        svg: plot.render()?,
-        caption: format!(
+    part.section.items.push(Item::figure(
+        &plot,
+        format!(
             "{}: full lines are the conservative law, dashed lines the built-in's law, in the plugin and in mdpd.",
             set.name
         ),
-    });
+    )?);
     Ok(())
 }
 
 /// The temperature of a run against kT.
-fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Measured) -> Check {
+fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Slab) -> Check {
     Check::at_most(
-        format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), code.slug()),
+        format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), Setup::new(code, set, law).slug()),
         "equilibrium",
         format!("{}: temperature of {} against kT", set.name, name(code, law)),
         found.temperature.mean - 1.0,
@@ -317,7 +311,7 @@ fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Measured) -> C
 }
 
 /// Density and tension of the native runner against Warren's.
-fn against_published(set: &WarrenSet, native: &Measured) -> [Check; 2] {
+fn against_published(set: &WarrenSet, native: &Slab) -> [Check; 2] {
     let published = |what: &str, found: &Estimate, (value, error): (f64, f64)| {
         Check::agreement(
             format!("nvt.{}.published.{what}", set.name.replace(' ', "")),
@@ -347,7 +341,7 @@ fn law_slug(law: ForceLaw) -> &'static str {
 mod tests {
     use super::super::trace::native;
     use super::*;
-    use psidpd_core::engine::Fault;
+    use psidpd_core::engine::{Fault, Precision};
 
     /// What is measured of a fluid fails the same checks if a force of the engine is 5 % wrong, in shorter runs than those of
     /// `psidpd validate`. The virial moves no particle: `forces` has a check of it.
@@ -358,9 +352,10 @@ mod tests {
         let state = equilibrated(&SET6.fluid, filling, 600, SEED).unwrap();
         let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 10 };
         let setup = Setup {
+            precision: Precision::Mixed,
             gamma: GAMMA,
             seed: SEED,
-            ..Setup::new(Code::NativeMixed, &SET6, ForceLaw::Conservative)
+            ..Setup::new(Code::Native, &SET6, ForceLaw::Conservative)
         };
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let trace = native(&setup, &state, length, fault, &|_| ()).unwrap();

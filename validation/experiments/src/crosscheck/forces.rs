@@ -1,17 +1,20 @@
 //! One configuration, liquid and interface, in every code: forces, energy, virial.
 
-use super::codes::{Code, FINE, Setup};
+use super::setup::{FINE, Setup};
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::code::Code;
 use crate::fluids::{GAMMA, RC, RD, SET6};
-use crate::start::{Filling, equilibrated};
-use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want};
+use crate::start::{Filling, equilibrated, simulation};
+use psidpd_core::engine::Precision::{Double, Mixed};
+use psidpd_core::engine::{Fault, PeriodicBox, Step, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
 use psidpd_core::truth;
 use psidpd_dynamics::run::{Simulation, State};
 use psidpd_lammps_host::Lammps;
 use psidpd_report::{Check, Item, Section, Table};
+use serde::Serialize;
 use serde_json::json;
 
 /// Seed of the configuration and of the noise.
@@ -28,13 +31,24 @@ pub(super) struct Point {
 }
 
 /// Relative differences of two [`Point`]s.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Difference {
     /// Largest over the particles, over the root mean square force.
     pub force: f64,
     pub energy: f64,
     /// Over the largest component.
     pub virial: f64,
+}
+
+impl Difference {
+    pub fn named(&self) -> [(&'static str, f64); 3] {
+        [("force", self.force), ("energy", self.energy), ("virial", self.virial)]
+    }
+
+    /// As cells of a table.
+    pub fn cells(&self) -> [String; 3] {
+        self.named().map(|(_, value)| format!("{value:.1e}"))
+    }
 }
 
 impl Point {
@@ -91,11 +105,7 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Expe
 /// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these,
 /// were it wrong.
 fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ExperimentError> {
-    let native = |model: &Model, step| {
-        let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
-        fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
-        point_of(simulation, step)
-    };
+    let native = |model: &Model, step| point_of(simulation(model, 1.0, state, SEED, Double, fault)?, step);
     let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
     for (id, law, gamma, step) in [
         ("conservative", ForceLaw::Conservative, 0.0, None),
@@ -104,17 +114,14 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
     ] {
         let model = SET6.model(law, gamma)?;
         let found = native(&model, step)?.against(&plain(&model, state, step)?);
-        for (what, value) in [("force", found.force), ("energy", found.energy), ("virial", found.virial)] {
-            part.checks.push(Check::at_most(
-                format!("forces.native-{id}.{what}"),
-                "forces",
-                format!(
-                    "native, {id}: {what} against the sums over pairs as they are written down, relative"
-                ),
-                value,
-                1e-11,
-            ));
-        }
+        let against = "the sums over pairs as they are written down";
+        part.bound(
+            ("forces", &format!("forces.native-{id}")),
+            &format!("native, {id}"),
+            against,
+            &found,
+            [1e-11; 3],
+        );
     }
     let model = SET6.model(ForceLaw::Conservative, 0.0)?;
     let virial = native(&model, None)?.virial;
@@ -144,24 +151,15 @@ fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64,
         for x in &mut stretched.x {
             *x = stretched.domain.point(state.domain.fraction(*x));
         }
-        let mut simulation = Simulation::new(model, 1.0, stretched, SEED)?;
-        fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
-        simulation.compute(Want::TOTALS, None)?;
-        Ok(simulation.potential_energy())
+        Ok(point_of(simulation(model, 1.0, &stretched, SEED, Double, fault)?, None)?.energy)
     };
     // The second derivative jumps where pairs leave a range: a small step, and rounding is far below.
     const H: f64 = 1e-5;
     Ok((energy(H)? - energy(-H)?) / (2.0 * H))
 }
 
-fn native_mixed(context: &Context, model: &Model, state: &State) -> Result<Point, ExperimentError> {
-    let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
-    simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
-    context.fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
-    point_of(simulation, None)
-}
-
-fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
+/// Values in the order of tags.
+pub(super) fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut ordered = vec![[f64::NAN; 3]; values.len()];
     for (tag, value) in tags.iter().zip(values) {
         ordered[*tag as usize - 1] = *value;
@@ -206,38 +204,17 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut compare =
         |part: &mut Part, setup: Setup, id: &str, truth: &Point, limits: [f64; 3], note: &str| {
             let lammps = open(context, &setup, &state, &format!("forces-{id}"))?;
-            let difference = point(&lammps, volume)?.against(truth);
+            let found = point(&lammps, volume)?.against(truth);
             let law = match setup.law {
                 ForceLaw::Conservative => "conservative",
                 ForceLaw::LucyLammps => "Lucy",
             };
-            let label = format!("{}{}", setup.code.label(), if setup.newton { "" } else { ", newton off" });
-            table.push([
-                label.clone(),
-                law.to_owned(),
-                note.to_owned(),
-                format!("{:.1e}", difference.force),
-                format!("{:.1e}", difference.energy),
-                format!("{:.1e}", difference.virial),
-            ]);
-            let values =
-                [("force", difference.force), ("energy", difference.energy), ("virial", difference.virial)];
-            for ((what, value), limit) in values.into_iter().zip(limits) {
-                // An infinite limit marks a number that the code cannot be held to.
-                if limit.is_finite() {
-                    part.checks.push(Check::at_most(
-                        format!("forces.{id}.{what}"),
-                        "forces",
-                        format!("{label}, {law} law: {what} against {note}, relative"),
-                        value,
-                        limit,
-                    ));
-                }
-            }
-            part.values.push((
-                format!("forces.{id}"),
-                json!({"force": difference.force, "energy": difference.energy, "virial": difference.virial}),
-            ));
+            let label = format!("{}{}", setup.label(), if setup.newton { "" } else { ", newton off" });
+            let [force, energy, virial] = found.cells();
+            table.push([label.clone(), law.to_owned(), note.to_owned(), force, energy, virial]);
+            let id = format!("forces.{id}");
+            part.bound(("forces", &id), &format!("{label}, {law} law"), note, &found, limits);
+            part.values.push((id, json!(found)));
             Ok::<(), ExperimentError>(())
         };
     let setup = |code, law, gamma, newton| Setup {
@@ -268,22 +245,13 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
 
     // The largest error of a force is near 2e-6 of the rms force.
     let loose = [2e-5, 1e-6, 1e-5];
-    compare(&mut part, setup(Code::PsiMixed, Conservative, 0.0, true), "psi-mixed", &truth, loose, "native")?;
-    let mixed = native_mixed(context, &SET6.model(Conservative, 0.0)?, &state)?.against(&truth);
-    let values = [("force", mixed.force), ("energy", mixed.energy), ("virial", mixed.virial)];
-    for ((what, value), limit) in values.into_iter().zip(loose) {
-        part.checks.push(Check::at_most(
-            format!("forces.native-mixed.{what}"),
-            "forces",
-            format!("native in mixed precision: {what} against double precision, relative"),
-            value,
-            limit,
-        ));
-    }
-    part.values.push((
-        "forces.native-mixed".into(),
-        json!({"force": mixed.force, "energy": mixed.energy, "virial": mixed.virial}),
-    ));
+    let mixed = Setup { precision: Mixed, ..setup(Code::Psi, Conservative, 0.0, true) };
+    compare(&mut part, mixed, "psi-mixed", &truth, loose, "native")?;
+    let model = SET6.model(Conservative, 0.0)?;
+    let mixed = point_of(simulation(&model, 1.0, &state, SEED, Mixed, context.fault)?, None)?.against(&truth);
+    let of = "native in mixed precision";
+    part.bound(("forces", "forces.native-mixed"), of, "double precision", &mixed, loose);
+    part.values.push(("forces.native-mixed".into(), json!(mixed)));
 
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
     let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
@@ -302,7 +270,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let built_in = [1e-10, f64::INFINITY, 1e-10];
     compare(
         &mut part,
-        setup(Code::BuiltIn, LucyLammps, 0.0, true),
+        setup(Code::Mdpd, LucyLammps, 0.0, true),
         "mdpd",
         &lucy,
         built_in,
@@ -311,7 +279,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let unlike = [f64::INFINITY; 3];
     compare(
         &mut part,
-        setup(Code::BuiltIn, LucyLammps, 0.0, true),
+        setup(Code::Mdpd, LucyLammps, 0.0, true),
         "mdpd-conservative",
         &truth,
         unlike,
@@ -319,26 +287,23 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     )?;
 
     part.section.items.push(Item::Table(table));
-    part.section.items.push(Item::Prose(
+    part.section.items.push(Item::prose(
         "Force: largest difference over all particles, over the root mean square force. Virial: largest \
          difference of a component, over the largest component. The last row is no check: it is how far the \
          built-in's force is from the conservative one. The energy that mdpd tallies is not the potential of \
          any force: its many-body term has the prefactor ½ B r_d, where the potential of the quadratic kernel \
-         has ¼ B r_d."
-            .into(),
+         has ¼ B r_d.",
     ));
     part.checks.push(gradient(context)?);
     Ok(part)
 }
 
 fn heading(particles: usize) -> Section {
-    Section {
-        heading: "Forces, energy and virial of one configuration".into(),
-        items: vec![Item::Prose(format!(
-            "{particles} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
-             native runner (seed {SEED})."
-        ))],
-    }
+    let text = format!(
+        "{particles} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
+         native runner (seed {SEED})."
+    );
+    Section::new("Forces, energy and virial of one configuration", vec![Item::Prose(text)])
 }
 
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.

@@ -11,7 +11,7 @@ use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, State};
 use psidpd_lammps_host::export::eam::{self, Grid};
-use psidpd_report::{Check, Item, Section, Table};
+use psidpd_report::{Item, Section, Table};
 use rand::{RngExt, SeedableRng};
 use serde_json::json;
 
@@ -47,23 +47,15 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let found = point_of(context.simulation(&model, 1.0, &state, SEED)?, None)?.against(&theirs);
     let mut part = Part::default();
     let mut table = Table::new(["", "relative difference"]);
-    for (what, value) in [("force", found.force), ("energy", found.energy), ("virial", found.virial)] {
-        table.push([what.to_owned(), format!("{value:.1e}")]);
-        part.checks.push(Check::at_most(
-            format!("mixture.eam.{what}"),
-            "mixture",
-            format!("two species in a tilted box, native: {what} against LAMMPS eam/alloy, relative"),
-            value,
-            LARGEST,
-        ));
+    for ((what, _), value) in found.named().into_iter().zip(found.cells()) {
+        table.push([what.to_owned(), value]);
     }
-    part.values.push((
-        "mixture.eam".into(),
-        json!({"force": found.force, "energy": found.energy, "virial": found.virial}),
-    ));
-    part.section = Section {
-        heading: "Two species in a tilted box".into(),
-        items: vec![
+    let of = "two species in a tilted box, native";
+    part.bound(("mixture", "mixture.eam"), of, "LAMMPS eam/alloy", &found, [LARGEST; 3]);
+    part.values.push(("mixture.eam".into(), json!(found)));
+    part.section = Section::new(
+        "Two species in a tilted box",
+        vec![
             Item::Prose(format!(
                 "{COUNT} particles at random (seed {SEED}) in a box of {LENGTHS:?} with tilts {TILT:?}, half of each of two \
                  species: ψ_A = 0.3 n², ψ_B = 2 √(1 + n²), soft pairs of strengths 10, 15 and −5. The native runner against \
@@ -71,7 +63,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             )),
             Item::Table(table),
         ],
-    };
+    );
     Ok(part)
 }
 

@@ -9,13 +9,13 @@
 //!   box, and for distances and displacements.
 
 pub mod closed_loop;
-pub mod codes;
 mod conclusion;
 pub mod energy;
 pub mod equilibrium;
 pub mod forces;
 pub mod mixture;
 pub mod observables;
+pub mod setup;
 pub mod thermostat;
 pub mod trace;
 pub mod trajectory;
@@ -23,10 +23,12 @@ mod validate;
 
 use crate::ExperimentError;
 use crate::lammps::host::PluginHost;
-use psidpd_core::engine::Fault;
+use crate::start;
+use forces::Difference;
+use psidpd_core::engine::{Fault, Precision};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Simulation, State};
-use psidpd_report::Progress;
+use psidpd_report::{Check, Progress, Section};
 use std::path::PathBuf;
 pub use validate::{Options, check_table, validate};
 
@@ -45,7 +47,7 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// The native runner with some particles.
+    /// The native runner with some particles, in double precision.
     fn simulation(
         &self,
         model: &Model,
@@ -53,19 +55,35 @@ impl Context<'_> {
         state: &State,
         seed: u64,
     ) -> Result<Simulation, ExperimentError> {
-        let mut simulation = Simulation::new(model, kt, state.clone(), seed)?;
-        self.fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
-        Ok(simulation)
+        start::simulation(model, kt, state, seed, Precision::Double, self.fault)
     }
 }
 
 /// Name, checks, and what a part of the validation adds to the report.
 #[derive(Debug, Default)]
 pub struct Part {
-    pub checks: Vec<psidpd_report::Check>,
-    pub section: psidpd_report::Section,
+    pub checks: Vec<Check>,
+    pub section: Section,
     /// Named numbers for `results.json`.
     pub values: Vec<(String, serde_json::Value)>,
+}
+
+impl Part {
+    /// Bounds the differences of a code `of` from what it is held against. An infinite limit marks a number that the code cannot
+    /// be held to.
+    fn bound(
+        &mut self,
+        (section, id): (&str, &str),
+        of: &str,
+        against: &str,
+        found: &Difference,
+        limits: [f64; 3],
+    ) {
+        for ((what, value), limit) in found.named().into_iter().zip(limits).filter(|(_, l)| l.is_finite()) {
+            let description = format!("{of}: {what} against {against}, relative");
+            self.checks.push(Check::at_most(format!("{id}.{what}"), section, description, value, limit));
+        }
+    }
 }
 
 #[cfg(test)]

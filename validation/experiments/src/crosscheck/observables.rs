@@ -3,16 +3,17 @@
 use super::LOG;
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::files;
+use crate::fluids::DPD_PAIR;
 use crate::lammps::deck::Deck;
 use crate::lammps::frames;
-use crate::lammps::style::PairStyle;
 use crate::models;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
 use psidpd_observe::{Observation, Observers};
 use psidpd_report::{Check, Item, Section, Table};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 /// Seed of velocities and noise.
@@ -63,9 +64,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         ));
         part.values.push((format!("observables.{name}"), json!({"largest": scale, "difference": apart})));
     }
-    part.section = Section {
-        heading: "Distances and displacements of the same configurations".into(),
-        items: vec![
+    part.section = Section::new(
+        "Distances and displacements of the same configurations",
+        vec![
             Item::Prose(format!(
                 "LAMMPS runs {} particles of its own dpd, and dumps a configuration every {EVERY} steps: g(r) is the mean \
                  over {} of them, in {BINS} shells up to {RANGE}, the displacements are those from the first.",
@@ -74,7 +75,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             )),
             Item::Table(table),
         ],
-    };
+    );
     Ok(part)
 }
 
@@ -91,13 +92,6 @@ fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     Ok(Scene::parse("scene.toml", &text, folder)?)
 }
 
-/// A table that LAMMPS wrote: without comments, and words that are no numbers.
-fn rows(path: &PathBuf) -> Result<Vec<Vec<f64>>, ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
-    let row = |line: &str| line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-    Ok(text.lines().filter(|l| !l.starts_with('#')).map(row).collect())
-}
-
 /// g of every shell, and the mean-square displacement of every configuration after the first.
 fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64>; 2], ExperimentError> {
     state.to_data_by_tag("psidpd").write(&folder.join("start.data"))?;
@@ -109,7 +103,7 @@ fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64
          fix m all ave/time {EVERY} 1 {EVERY} c_m[4] file msd.txt format \" %.16g\"\n\
          dump frames all custom {EVERY} frames.txt id x y z ix iy iz\n\
          dump_modify frames sort id format float %.17g\nrun {}\n",
-        Deck::new(&PairStyle::Dpd { a: 25.0, gamma: 4.5, rc: 1.0 }, SEED, "start.data".into()).text(),
+        Deck::new(&DPD_PAIR, SEED, "start.data".into()).text(),
         RANGE + 0.5,
         FRAMES + 1,
         EVERY * FRAMES,
@@ -117,9 +111,9 @@ fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64
     context.lammps.run(1, folder, &deck, LOG, Duration::from_secs(300))?;
     let [g, msd] = ["rdf.txt", "msd.txt"].map(|name| folder.join(name));
     // A line with the step and the number of shells, and for each shell its number and g.
-    let shells = rows(&g)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
+    let shells = files::rows(&g)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
     // Displacements of the first configuration from itself are none.
-    let squares = rows(&msd)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
+    let squares = files::rows(&msd)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
     Ok([shells, squares])
 }
 

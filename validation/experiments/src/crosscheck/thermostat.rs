@@ -1,14 +1,13 @@
 //! Pair force, drag and noise against LAMMPS's own `dpd`, which shares no code with psidpd.
 
-use super::forces::{open_deck, point, point_of};
+use super::forces::{by_tag, open_deck, point, point_of};
 use super::{Context, Part};
 use crate::ExperimentError;
-use crate::fluids::SET6;
+use crate::fluids::{SET6, dpd_model};
 use crate::lammps::deck::Deck;
 use crate::lammps::style::PairStyle;
 use crate::start::{Filling, equilibrated, periodic};
 use psidpd_core::engine::{Step, Want};
-use psidpd_core::model::Model;
 use psidpd_dynamics::run::State;
 use psidpd_observe::{Measured, threshold};
 use psidpd_report::quantity::with_error;
@@ -38,21 +37,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// Largest error of a ratio of variances: noise that is 5 % too strong makes it 1.1.
 const VAGUE: f64 = 0.02;
 
-/// A fluid of LAMMPS's `dpd`.
-fn model(strength: f64, gamma: f64) -> Result<Model, ExperimentError> {
-    let pair = format!(
-        "[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = {strength:?}\nrange = 1.0\n"
-    );
-    let thermostat = format!("[[thermostat]]\ngamma = {gamma:?}\nrange = 1.0\n");
-    let text = format!(
-        "title = \"dpd\"\nspecies = [\"F\"]\n{}{}",
-        if strength == 0.0 { "" } else { &pair },
-        if gamma == 0.0 { "" } else { &thermostat }
-    );
-    Ok(Model::parse("dpd", &text)?)
-}
-
-/// The commands for it with these particles.
+/// The commands for a fluid of `dpd` with these particles.
 fn deck(
     context: &Context,
     state: &State,
@@ -78,30 +63,21 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let theirs = deck(context, &state, [strength, gamma, 0.0], "dpd-forces")?;
         let theirs = point(&open_deck(context, &theirs)?, volume)?;
         let step = (gamma > 0.0).then_some(Step { seed: SEED, number: 0, dt: DT });
-        let ours = point_of(context.simulation(&model(strength, gamma)?, kt, &state, SEED)?, step)?;
+        let ours = point_of(context.simulation(&dpd_model(strength, gamma, 1.0)?, kt, &state, SEED)?, step)?;
         let found = ours.against(&theirs);
         // Drag has no energy.
-        let energy = (strength != 0.0).then_some(found.energy);
-        let shown = energy.map_or_else(|| "–".to_owned(), |e| format!("{e:.1e}"));
-        forces.push([id.to_owned(), format!("{:.1e}", found.force), shown, format!("{:.1e}", found.virial)]);
-        for (what, value) in
-            [("force", Some(found.force)), ("energy", energy), ("virial", Some(found.virial))]
-        {
-            part.checks.extend(value.map(|value| {
-                Check::at_most(
-                    format!("dpd.{}.{what}", id.replace(' ', "-")),
-                    "thermostat",
-                    format!("native, {id}: {what} against LAMMPS dpd at the same positions and velocities, relative"),
-                    value,
-                    ROUNDING,
-                )
-            }));
-        }
+        let has_energy = strength != 0.0;
+        let [force, energy, virial] = found.cells();
+        forces.push([id.to_owned(), force, if has_energy { energy } else { "–".into() }, virial]);
+        let (code, against) =
+            (format!("dpd.{}", id.replace(' ', "-")), "LAMMPS dpd at the same positions and velocities");
+        let limits = [ROUNDING, if has_energy { ROUNDING } else { f64::INFINITY }, ROUNDING];
+        part.bound(("thermostat", &code), &format!("native, {id}"), against, &found, limits);
     }
     let noise = noise(context, &mut part)?;
-    part.section = Section {
-        heading: "Pair force, drag and noise of LAMMPS's dpd".into(),
-        items: vec![
+    part.section = Section::new(
+        "Pair force, drag and noise of LAMMPS's dpd",
+        vec![
             Item::Prose(format!(
                 "{} particles of a liquid with their velocities, as a fluid of LAMMPS's own dpd: a = 25 without drag, drag \
                  of γ = 18 at kT = 0, and both.",
@@ -116,7 +92,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             )),
             Item::Table(noise),
         ],
-    };
+    );
     Ok(part)
 }
 
@@ -126,19 +102,16 @@ fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
     let mut table = Table::new(["γ", "kT", "Δt", "r", "native", "LAMMPS dpd"]);
     let comparisons = 2 * SETTINGS.len() * DISTANCES.len();
     for [gamma, kt, dt] in SETTINGS {
-        let mut simulation = context.simulation(&model(0.0, gamma)?, kt, &state, SEED)?;
+        let mut simulation = context.simulation(&dpd_model(0.0, gamma, 1.0)?, kt, &state, SEED)?;
         let lammps = open_deck(context, &deck(context, &state, [0.0, gamma, kt], "dpd-noise")?)?;
         lammps.command(&format!("timestep {dt:?}"))?;
         let mut drawn: [[Vec<f64>; DISTANCES.len()]; 2] = Default::default();
         for number in 0..DRAWS {
             simulation.compute(Want::FORCES, Some(Step { seed: SEED, number, dt }))?;
-            let mut ours = vec![0.0; state.len()];
-            for (tag, force) in simulation.tags().iter().zip(simulation.forces()) {
-                ours[*tag as usize - 1] = force[0];
-            }
+            let ours = by_tag(simulation.tags(), simulation.forces()).into_iter().map(|f| f[0]).collect();
             lammps.command("run 0 post no")?;
             let theirs: Vec<f64> = lammps.gather("f", 3)?.into_iter().step_by(3).collect();
-            for (drawn, forces) in drawn.iter_mut().zip([ours, theirs]) {
+            for (drawn, forces) in drawn.iter_mut().zip::<[Vec<f64>; 2]>([ours, theirs]) {
                 for (pair, f) in forces.iter().step_by(2).enumerate() {
                     let k = pair % DISTANCES.len();
                     drawn[k].push(f * f * dt / (2.0 * gamma * kt * (1.0 - DISTANCES[k]).powi(2)));

@@ -2,10 +2,12 @@
 
 use super::Context;
 use super::LOG;
-use super::codes::{Code, Setup};
+use super::setup::Setup;
 use crate::ExperimentError;
-use psidpd_core::engine::{Fault, Precision, Settings, Want};
-use psidpd_dynamics::run::{Integrator, Simulation, State};
+use crate::files;
+use crate::start::simulation;
+use psidpd_core::engine::{Fault, Want};
+use psidpd_dynamics::run::{Integrator, State};
 use psidpd_formats::dump;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -74,9 +76,10 @@ pub fn run(
     name: &str,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
-    match setup.code {
-        Code::Native | Code::NativeMixed => native(setup, state, length, context.fault, advance),
-        _ => lammps(context, setup, state, length, &context.work.join(name), advance),
+    if setup.is_native() {
+        native(setup, state, length, context.fault, advance)
+    } else {
+        lammps(context, setup, state, length, &context.work.join(name), advance)
     }
 }
 
@@ -89,11 +92,7 @@ pub(super) fn native(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
-    let mut simulation = Simulation::new(&model, 1.0, state.clone(), setup.seed)?;
-    if setup.code == Code::NativeMixed {
-        simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
-    }
-    fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
+    let mut simulation = simulation(&model, 1.0, state, setup.seed, setup.precision, fault)?;
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
     simulation.prepare(length.dt, Want::TOTALS)?;
     let (mut sum, mut count) = ([0.0; 16], 0.0);
@@ -196,15 +195,11 @@ fn last_step(path: &Path) -> Option<u64> {
 
 /// The file of `fix ave/time`: comments, then step and nine numbers.
 fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
-    for line in text.lines().filter(|l| !l.starts_with('#')) {
-        let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-        let Ok(mut sample) = <[f64; 10]>::try_from(numbers) else {
-            return Err(ExperimentError::Output {
-                path: path.into(),
-                problem: format!("unexpected line: {line}"),
-            });
-        };
+    for numbers in files::rows(path)? {
+        let mut sample = <[f64; 10]>::try_from(numbers).map_err(|numbers| ExperimentError::Output {
+            path: path.into(),
+            problem: format!("a row has {} numbers, expected 10", numbers.len()),
+        })?;
         sample[0] *= length.dt;
         trace.push(&sample);
     }

@@ -1,9 +1,11 @@
 //! The same trajectory in both hosts: noise on, same seed, same integrator, on one rank and on two.
 
 use super::LOG;
-use super::codes::{Code, Setup};
+use super::forces::by_tag;
+use super::setup::Setup;
 use super::{Context, Part};
 use crate::ExperimentError;
+use crate::code::Code;
 use crate::fluids::{GAMMA, SET6};
 use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::Want;
@@ -42,13 +44,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         };
         let distance = largest(ours.iter().zip(&theirs).map(apart)).sqrt();
         let newton = if newton { "on" } else { "off" };
-        table.push([
-            code.label().to_owned(),
-            ranks.to_string(),
-            newton.to_owned(),
-            format!("{distance:.1e}"),
-        ]);
-        let id = format!("trajectory.{}.{ranks}.newton-{newton}", code.slug());
+        table.push([code.label(), ranks.to_string(), newton.to_owned(), format!("{distance:.1e}")]);
+        let slug = Setup::new(code, &SET6, ForceLaw::Conservative).slug();
+        let id = format!("trajectory.{slug}.{ranks}.newton-{newton}");
         part.values.push((id.clone(), json!(distance)));
         part.checks.push(Check::at_most(
             id,
@@ -61,9 +59,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             LARGEST,
         ));
     }
-    part.section = Section {
-        heading: "One trajectory in both hosts".into(),
-        items: vec![
+    part.section = Section::new(
+        "One trajectory in both hosts",
+        vec![
             Item::Prose(format!(
                 "{} particles of set 6, {STEPS} steps of {DT} with drag and noise, seed {SEED}. The noise of a pair \
                  depends on seed, step and the two tags only, so ranks, order and neighbour settings do not change it.",
@@ -71,7 +69,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             )),
             Item::Table(table),
         ],
-    };
+    );
     Ok(part)
 }
 
@@ -81,11 +79,7 @@ fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ExperimentE
     let mut simulation = context.simulation(&model, 1.0, state, SEED)?;
     simulation.prepare(DT, Want::FORCES)?;
     simulation.advance(STEPS, DT, Integrator::VelocityVerlet)?;
-    let mut x = vec![[f64::NAN; 3]; state.len()];
-    for (tag, position) in simulation.tags().iter().zip(simulation.positions()) {
-        x[*tag as usize - 1] = *position;
-    }
-    Ok(x)
+    Ok(by_tag(simulation.tags(), simulation.positions()))
 }
 
 fn lammps(
@@ -95,8 +89,8 @@ fn lammps(
     ranks: usize,
     newton: bool,
 ) -> Result<Vec<[f64; 3]>, ExperimentError> {
-    let folder = context.work.join(format!("trajectory-{}-{ranks}-{newton}", code.slug()));
     let setup = Setup { gamma: GAMMA, seed: SEED, newton, ..Setup::new(code, &SET6, ForceLaw::Conservative) };
+    let folder = context.work.join(format!("trajectory-{}-{ranks}-{newton}", setup.slug()));
     let mut deck = setup.prepare(context, state, &folder, false)?;
     deck.push_str(&format!(
         "fix move all nve\ntimestep {DT}\nthermo {STEPS}\nrun {STEPS}\n\

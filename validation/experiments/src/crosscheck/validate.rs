@@ -2,6 +2,7 @@ use super::{
     Context, Part, conclusion, energy, equilibrium, forces, mixture, observables, thermostat, trajectory,
 };
 use crate::ExperimentError;
+use crate::files;
 use crate::lammps::host::PluginHost;
 use crate::machine::machine;
 use psidpd_core::engine::Fault;
@@ -24,7 +25,7 @@ pub struct Options {
 }
 
 #[derive(Debug)]
-pub struct Outcome {
+pub struct Validation {
     pub results: Results,
     pub report: PathBuf,
 }
@@ -33,11 +34,9 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Something could not be run or written; checks that fail are in the results.
-pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
+pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, ExperimentError> {
     let start = Instant::now();
-    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
-    // LAMMPS runs in folders of its own: paths must not depend on ours.
-    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
+    let out = files::absolute_folder(&options.out)?;
     let spinner = progress.spinner("LAMMPS");
     let host = psidpd_lammps_host::plugin::install_to_build(&|line| progress.note(line))?;
     let version = host.version()?;
@@ -71,8 +70,8 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Exper
         observables::SEED,
     ];
     let mut sections = Vec::new();
-    type Run = fn(&Context) -> Result<Part, ExperimentError>;
-    let parts: [(&str, Run); 7] = [
+    type Comparison = fn(&Context) -> Result<Part, ExperimentError>;
+    let parts: [(&str, Comparison); 7] = [
         ("forces", forces::run),
         ("thermostat", thermostat::run),
         ("mixture", mixture::run),
@@ -95,7 +94,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Exper
     }
     results.facts.insert("wall time".into(), format!("{:.0} s", start.elapsed().as_secs_f64()));
     let report = write(&out, &results, sections)?;
-    Ok(Outcome { results, report })
+    Ok(Validation { results, report })
 }
 
 pub fn check_table(results: &Results) -> Table {
@@ -118,7 +117,7 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
     write_atomically(out.join("results.json"), results.to_json()?.as_bytes())?;
     sections.insert(0, conclusion::what_is_compared());
     sections.insert(0, conclusion::section(results));
-    sections.push(Section { heading: "Checks".into(), items: vec![Item::Table(check_table(results))] });
+    sections.push(Section::new("Checks", vec![Item::Table(check_table(results))]));
     let mut facts: Vec<(String, String)> = results.facts.clone().into_iter().collect();
     let seeds: Vec<String> = results.seeds.iter().map(u64::to_string).collect();
     facts.push(("seeds".into(), seeds.join(", ")));

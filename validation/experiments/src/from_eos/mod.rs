@@ -21,7 +21,7 @@ pub use units::Units;
 
 use crate::ExperimentError;
 use crate::bulk::{Bulk, Sampling};
-use crate::calibrate::{Options as Calibrate, Value, calibrate, spaced};
+use crate::calibrate::{Options as Calibrate, calibrate, spaced};
 use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 use serde::Serialize;
@@ -47,20 +47,20 @@ pub struct Trial {
     /// A.
     pub attraction: f64,
     /// Tension of the slab, in kT/r_c².
-    pub tension: Value,
+    pub tension: Measured,
     /// Whether its pressures met the tolerance.
     pub calibrated: bool,
 }
 
 /// A quantity of the equation of state and of the model, in SI units.
 #[derive(Debug, Clone, Serialize)]
-pub struct Compared {
+pub struct Property {
     /// What it is, with its unit.
     pub name: &'static str,
     /// By the equation of state.
     pub wanted: f64,
     /// Of the model.
-    pub measured: Value,
+    pub measured: Measured,
 }
 
 /// The model, and how it compares.
@@ -75,7 +75,7 @@ pub struct Found {
     /// Strengths that were tried; the last is that of the model.
     pub trials: Vec<Trial>,
     /// Density, compressibility and tension of the liquid.
-    pub compared: Vec<Compared>,
+    pub compared: Vec<Property>,
     /// Whether pressures and tension meet the tolerance.
     pub converged: bool,
     #[serde(skip)]
@@ -133,29 +133,26 @@ pub fn from_eos(
             slab.tension.error,
             if calibration.converged { "" } else { "not " }
         ));
-        trials.push(Trial { attraction, tension: slab.tension.into(), calibrated: calibration.converged });
+        trials.push(Trial { attraction, tension: slab.tension, calibrated: calibration.converged });
         let met = (slab.tension.value / wanted - 1.0).abs() <= options.tolerance;
         let next = next(&trials, wanted);
         if met || trials.len() == TRIALS || next.is_none() {
             let (compressibility, by_eos) = compressibility(&path, &liquid, options, &units, folder.path())?;
             let compared = vec![
-                Compared {
+                Property {
                     name: "density, kg/m3",
                     wanted: liquid.density * substance.molar_mass,
-                    measured: slab
-                        .liquid
-                        .times(liquid.density * substance.molar_mass / options.density)
-                        .into(),
+                    measured: slab.liquid.times(liquid.density * substance.molar_mass / options.density),
                 },
-                Compared {
+                Property {
                     name: "isothermal compressibility up to 5 % denser, 1/GPa",
                     wanted: by_eos * 1e9,
-                    measured: compressibility.times(1e9).into(),
+                    measured: compressibility.times(1e9),
                 },
-                Compared {
+                Property {
                     name: "surface tension, mN/m",
                     wanted: liquid.tension * 1e3,
-                    measured: slab.tension.times(units.tension * 1e3).into(),
+                    measured: slab.tension.times(units.tension * 1e3),
                 },
             ];
             return Ok(Found {
@@ -221,7 +218,7 @@ mod tests {
     fn the_strength_follows_the_tension() {
         let trial = |attraction: f64, tension: f64| Trial {
             attraction,
-            tension: Value { value: tension, error: 0.1 },
+            tension: Measured { value: tension, error: 0.1 },
             calibrated: true,
         };
         assert_eq!(next(&[trial(-40.0, 8.0)], 8.0), Some(-40.0));

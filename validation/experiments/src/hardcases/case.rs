@@ -60,7 +60,7 @@ pub enum Found {
 }
 
 #[derive(Debug, Clone, Default)]
-pub struct Run {
+pub struct Inputs {
     pub model: String,
     pub kt: f64,
     /// The scene but for model, kT, integrator and stages.
@@ -76,7 +76,7 @@ pub struct Run {
 pub struct Case {
     pub group: &'static str,
     pub name: &'static str,
-    pub run: Run,
+    pub run: Inputs,
     pub must: Must,
     /// The same for integrators that keep the Maxwell distribution of an ideal gas at any time step, if that is another.
     pub exact: Option<Must>,

@@ -1,6 +1,6 @@
 //! Forces of configurations in which digits are lost, against the reference.
 
-use super::case::{Case, Must, Run};
+use super::case::{Case, Inputs, Must};
 use super::data_file::data;
 use crate::models::{SET6, STANDARD};
 
@@ -10,7 +10,7 @@ pub fn cases() -> Vec<Case> {
     let case = |name, model: &str, x: &[[f64; 3]], edge: f64| Case {
         group: GROUP,
         name,
-        run: Run {
+        run: Inputs {
             model: model.into(),
             kt: 1.0,
             scene: "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"zero\"\n".into(),

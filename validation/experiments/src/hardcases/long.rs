@@ -1,6 +1,6 @@
 //! Long runs: momentum, and energy without thermostat.
 
-use super::case::{Case, Must, Run};
+use super::case::{Case, Inputs, Must};
 use crate::models::SET6;
 
 const GROUP: &str = "long runs";
@@ -8,7 +8,7 @@ const GROUP: &str = "long runs";
 /// 10⁶ steps with `full`, else two thousand.
 pub fn cases(full: bool) -> Vec<Case> {
     let steps = if full { 1_000_000 } else { 2_000 };
-    let run = |dt: f64, scene: &str| Run {
+    let run = |dt: f64, scene: &str| Inputs {
         model: SET6.into(),
         kt: 1.0,
         scene: scene.into(),

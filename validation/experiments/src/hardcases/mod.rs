@@ -14,9 +14,10 @@ mod starts;
 mod steps;
 
 use crate::ExperimentError;
+use crate::code::Host;
 use crate::jobs::{self, Job};
-use case::{Case, Must};
-use plugin::Plugin;
+use crate::lammps::host::PluginHost;
+use case::{Case, Found, Must};
 use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_report::{Progress, Table};
@@ -37,8 +38,8 @@ pub enum Extent {
 pub struct Verdict {
     pub group: &'static str,
     pub case: &'static str,
-    /// `native` or `plugin`.
-    pub host: &'static str,
+    /// The native runner or the plugin.
+    pub host: Host,
     pub integrator: &'static str,
     pub precision: String,
     pub must: String,
@@ -84,7 +85,7 @@ pub fn run(
     progress: &Progress,
 ) -> Result<Vec<Verdict>, ExperimentError> {
     let folder = tempfile::tempdir().map_err(ExperimentError::io(std::env::temp_dir()))?;
-    let plugin = lammps.then(|| Plugin::open(&|line| progress.note(line))).transpose()?;
+    let lammps = lammps.then(|| PluginHost::find(&|line| progress.note(line))).transpose()?;
     let mut cases = cases(extent);
     cases.retain(|case| only.is_none_or(|words| case.name.contains(words) || case.group.contains(words)));
     let mut jobs: Vec<Job<Result<Verdict, ExperimentError>>> = Vec::new();
@@ -96,14 +97,22 @@ pub fn run(
         }
         for (integrator, precision) in settings {
             let place = folder.path().join(format!("{k}-{}-{precision}", integrator.name()));
-            jobs.push(Box::new(move || one(case, integrator, precision, &place, Host::Native(fault))));
+            jobs.push(Box::new(move || {
+                within(&place, || {
+                    let found = native::carry_out(case, integrator, precision, &place, fault)?;
+                    Ok(verdict(case, Host::Native, integrator, precision, case.must(integrator), &found))
+                })
+            }));
         }
-        if let Some((plugin, must)) = plugin.as_ref().zip(Plugin::must(case)) {
+        if let Some((lammps, must)) = lammps.as_ref().zip(plugin::must(case)) {
             for precision in [Precision::Mixed, Precision::Double] {
                 let place = folder.path().join(format!("{k}-plugin-{precision}"));
-                let integrator = Integrator::VelocityVerlet;
-                let there = Host::Plugin(plugin, must);
-                jobs.push(Box::new(move || one(case, integrator, precision, &place, there)));
+                jobs.push(Box::new(move || {
+                    within(&place, || {
+                        let found = plugin::carry_out(lammps, case, precision, &place)?;
+                        Ok(verdict(case, Host::Plugin, Integrator::VelocityVerlet, precision, must, &found))
+                    })
+                }));
             }
         }
     }
@@ -111,40 +120,35 @@ pub fn run(
     jobs::counted(jobs, &bar).into_iter().collect()
 }
 
-enum Host<'a> {
-    /// Natively; with a fault by a wrong engine.
-    Native(Option<Fault>),
-    /// In LAMMPS, where this must happen.
-    Plugin(&'a Plugin, Must),
+/// Makes a folder for a case, and removes it after `carry_out`.
+fn within<T>(
+    place: &Path,
+    carry_out: impl FnOnce() -> Result<T, ExperimentError>,
+) -> Result<T, ExperimentError> {
+    std::fs::create_dir_all(place).map_err(ExperimentError::io(place))?;
+    let made = carry_out()?;
+    let _ = std::fs::remove_dir_all(place);
+    Ok(made)
 }
 
-fn one(
+fn verdict(
     case: &Case,
+    host: Host,
     integrator: Integrator,
     precision: Precision,
-    place: &Path,
-    host: Host,
-) -> Result<Verdict, ExperimentError> {
-    std::fs::create_dir_all(place).map_err(ExperimentError::io(place))?;
-    let (host, must, found) = match host {
-        Host::Plugin(plugin, must) => ("plugin", must, plugin.carry_out(case, precision, place)?),
-        Host::Native(fault) => {
-            let found = native::carry_out(case, integrator, precision, place, fault)?;
-            ("native", case.must(integrator), found)
-        }
-    };
-    let _ = std::fs::remove_dir_all(place);
-    let wrong = case::judge(must, &found, precision == Precision::Mixed).err();
-    Ok(Verdict {
+    must: Must,
+    found: &Found,
+) -> Verdict {
+    Verdict {
         group: case.group,
         case: case.name,
         host,
         integrator: integrator.name(),
         precision: precision.to_string(),
         must: must.words(),
-        did: case::said(&found),
-        wrong,
-    })
+        did: case::said(found),
+        wrong: case::judge(must, found, precision == Precision::Mixed).err(),
+    }
 }
 
 pub fn table(results: &[Verdict]) -> Table {
@@ -155,7 +159,7 @@ pub fn table(results: &[Verdict]) -> Table {
         let did: String = r.did.chars().take(90).collect();
         table.push([
             r.case,
-            r.host,
+            r.host.name(),
             r.integrator,
             r.precision.as_str(),
             r.must.as_str(),

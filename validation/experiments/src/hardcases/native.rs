@@ -1,18 +1,17 @@
 //! Cases in the native runner.
 
-use super::case::{Case, Found, Must, Run};
+use super::case::{Case, Found, Inputs, Must};
 use crate::ExperimentError;
+use crate::bulk::Observed;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{Fault, Precision, Settings, Want};
 use psidpd_core::truth;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::particles::State;
-use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner, Simulation};
+use psidpd_dynamics::run::{Begin, RunError, Runner, Simulation};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::data::DataFile;
-use psidpd_observe::Observation;
 use std::path::Path;
-use std::sync::atomic::AtomicUsize;
 
 /// Fewer particles than these have no temperature.
 pub const FEW: usize = 3;
@@ -22,7 +21,7 @@ pub const FEW: usize = 3;
 /// # Errors
 /// Files that cannot be written; what is wrong with the scene is the inner error.
 pub fn scene(
-    run: &Run,
+    run: &Inputs,
     integrator: Integrator,
     precision: Precision,
     folder: &Path,
@@ -80,28 +79,21 @@ fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, Experime
     };
     fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
     let mut warnings = Vec::new();
-    let never = AtomicUsize::new(0);
     // An unusual start may be hot or cold until it has settled.
     let last = scene.stages.last().map_or("", |stage| stage.name.as_str());
     let mut note = |p: psidpd_dynamics::run::Progress| {
         let measured = p.deviations.iter().filter(|d| d.stage == last);
         warnings.extend(measured.map(ToString::to_string));
     };
-    let summary = loop {
-        match runner.run(&never, &mut note) {
-            Ok(Outcome::Finished { summary, .. }) => break summary,
-            Ok(Outcome::Interrupted { .. }) => {}
-            Err(error) if error.is_stop() => return Ok(Found::Stopped(error.to_string())),
-            Err(error) => return Err(error.into()),
-        }
+    let summary = match runner.run_to_end(&mut note) {
+        Ok(summary) => summary,
+        Err(error) if error.is_stop() => return Ok(Found::Stopped(error.to_string())),
+        Err(error) => return Err(error.into()),
     };
-    let path = out.join("observables.json");
-    let text = std::fs::read_to_string(&path).map_err(ExperimentError::io(&path))?;
-    let observed: Vec<Observation> =
-        serde_json::from_str(&text).map_err(|e| ExperimentError::io(&path)(e.into()))?;
+    let observed = Observed::read(out)?;
     let kt = scene.kt;
     let of = |column: &str| {
-        let m = observed.iter().find(|o| o.name == "temperature").and_then(|o| o.scalar(column))?;
+        let m = observed.scalar("temperature", column);
         // Without forces there is none of configurations.
         m.value.is_finite().then_some([m.value / kt, m.error / kt])
     };
@@ -204,7 +196,7 @@ mod tests {
             "[[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.0]\nhigh = [4.0, 4.0, 4.0]\ndensity = 3.0\n";
         let must = super::super::case::Must::Right(0.04);
         let judged = |drift: &str| {
-            let run = Run {
+            let run = Inputs {
                 model: IDEAL.into(),
                 kt: 1.0,
                 scene: format!("box = 4.0\n{part}{drift}"),

@@ -1,13 +1,13 @@
 //! Fluids where they cease to be simple.
 
-use super::case::{Case, Must, Run};
+use super::case::{Case, Inputs, Must};
 use crate::models::{LINEAR, SET6, VAN_DER_WAALS};
 
 const GROUP: &str = "phases";
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
-    let run = |model: String, kt: f64, scene: &str, dt: f64| Run {
+    let run = |model: String, kt: f64, scene: &str, dt: f64| Inputs {
         model,
         kt,
         scene: scene.into(),
@@ -16,7 +16,7 @@ pub fn cases() -> Vec<Case> {
         steps: [200, 400],
     };
     // What separates or freezes is hot until it has.
-    let long = |run: Run| Run { steps: [1000, 800], ..run };
+    let long = |run: Inputs| Inputs { steps: [1000, 800], ..run };
     let bell = SET6.replace("kernel = \"quadratic\"", "kernel = \"bell\"");
     // φ = a [A W(r, 0.8) − B W(r, 1)] attracts more than it repels, and has no thermodynamic limit.
     let collapsing = "title = \"spline\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"spline\"\n\

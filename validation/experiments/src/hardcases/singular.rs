@@ -1,6 +1,6 @@
 //! Formulas that are singular, and species that are not there.
 
-use super::case::{Case, Must, Run};
+use super::case::{Case, Inputs, Must};
 use crate::models::{HUGGINS, VAN_DER_WAALS};
 
 const GROUP: &str = "singular formulas";
@@ -15,7 +15,7 @@ fn logarithm(bounds: &str) -> String {
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
-    let flat = |model: String| Run {
+    let flat = |model: String| Inputs {
         model,
         kt: 2.5,
         // b n is 1.3 on average.
@@ -29,7 +29,7 @@ pub fn cases() -> Vec<Case> {
         .filter(|l| !l.starts_with("bounds"))
         .fold(String::new(), |all, l| all + l + "\n");
     // Two particles in a large box, out of each other's reach.
-    let thin = |bounds: &str| Run {
+    let thin = |bounds: &str| Inputs {
         model: logarithm(bounds),
         kt: 1.0,
         scene: "box = 20.0\n[initial]\nkind = \"lattice\"\ncount = 2\n".into(),
@@ -37,7 +37,7 @@ pub fn cases() -> Vec<Case> {
         dt: 0.01,
         steps: [20, 40],
     };
-    let huggins = |composition: &str, scene: &str| Run {
+    let huggins = |composition: &str, scene: &str| Inputs {
         model: HUGGINS.into(),
         kt: 1.0,
         scene: format!("{scene}[initial]\nkind = \"lattice\"\n{composition}\n"),

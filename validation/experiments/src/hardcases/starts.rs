@@ -1,13 +1,13 @@
 //! Starts that are unusual, and boxes.
 
-use super::case::{Case, Must, Run};
+use super::case::{Case, Inputs, Must};
 use super::data_file::data;
 use crate::models::{SET6, STANDARD};
 
 const GROUP: &str = "starts and boxes";
 
 pub fn cases() -> Vec<Case> {
-    let set6 = |scene: &str| Run {
+    let set6 = |scene: &str| Inputs {
         model: SET6.into(),
         kt: 1.0,
         scene: scene.into(),
@@ -16,13 +16,13 @@ pub fn cases() -> Vec<Case> {
         steps: [200, 400],
     };
     let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
-    let from_data = |run: Run, x: &[[f64; 3]], edge: f64| Run {
+    let from_data = |run: Inputs, x: &[[f64; 3]], edge: f64| Inputs {
         data: Some(data(x, edge)),
         scene: "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"thermal\"\n".into(),
         ..run
     };
     // Temperatures of few particles need many samples.
-    let dpd = Run { model: STANDARD.into(), dt: 0.02, steps: [200, 2000], ..set6("") };
+    let dpd = Inputs { model: STANDARD.into(), dt: 0.02, steps: [200, 2000], ..set6("") };
     // Every site of a lattice twice: 216 particles on 108 places.
     let mut twice = Vec::new();
     for k in 0..216usize {
@@ -55,12 +55,12 @@ pub fn cases() -> Vec<Case> {
         ),
         case(
             "a box barely two cut-offs wide",
-            Run { scene: "box = 2.02\ndensity = 3.0\n".into(), steps: [200, 12_000], ..dpd.clone() },
+            Inputs { scene: "box = 2.02\ndensity = 3.0\n".into(), steps: [200, 12_000], ..dpd.clone() },
             Must::Right(0.06),
         ),
         case(
             "a box less than two cut-offs wide",
-            Run { scene: "box = 1.9\ndensity = 3.0\n".into(), ..dpd.clone() },
+            Inputs { scene: "box = 1.9\ndensity = 3.0\n".into(), ..dpd.clone() },
             Must::Refused,
         ),
         case(

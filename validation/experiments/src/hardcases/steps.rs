@@ -1,6 +1,6 @@
 //! Steps that are long for the forces, the drag or the masses.
 
-use super::case::{Case, Must, Run};
+use super::case::{Case, Inputs, Must};
 use crate::models::{SET6, SPLINE};
 
 const GROUP: &str = "time steps and masses";
@@ -14,7 +14,7 @@ const IDEAL_TWO: &str =
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must, exact| Case { group: GROUP, name, run, must, exact };
-    let liquid = |dt: f64| Run {
+    let liquid = |dt: f64| Inputs {
         model: SET6.into(),
         kt: 1.0,
         scene: "box = 4.0\ndensity = 6.05\n".into(),
@@ -23,7 +23,7 @@ pub fn cases() -> Vec<Case> {
         steps: [200, 1000],
     };
     // γ Δt is told; Σ w² over neighbours is about 1.3 at this density.
-    let gas = |model: &str, dt: f64, rest: &str| Run {
+    let gas = |model: &str, dt: f64, rest: &str| Inputs {
         model: model.into(),
         kt: 1.0,
         scene: format!("box = 4.0\ndensity = 3.0\n{rest}"),
@@ -33,14 +33,24 @@ pub fn cases() -> Vec<Case> {
     };
     let strong = |gamma: f64| IDEAL.replace("gamma = 4.5", &format!("gamma = {gamma:?}"));
     // The watch has more samples of a longer stage.
-    let long = |run: Run| Run { steps: [100, 3000], ..run };
+    let long = |run: Inputs| Inputs { steps: [100, 3000], ..run };
     let drops = "box = [7.0, 7.0, 12.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\ncenter = [3.5, 3.5, 3.0]\n\
                  density = 12.0\nvelocity = [0.0, 0.0, 8.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\n\
                  center = [3.5, 3.5, 9.0]\ndensity = 12.0\nvelocity = [0.0, 0.0, -8.0]\n";
-    let collision =
-        Run { model: SPLINE.into(), kt: 0.5, scene: drops.into(), data: None, dt: 0.005, steps: [1500, 800] };
-    let cold =
-        Run { kt: 0.0, scene: "box = 4.0\ndensity = 3.0\n".into(), steps: [10, 10], ..gas(IDEAL, 0.01, "") };
+    let collision = Inputs {
+        model: SPLINE.into(),
+        kt: 0.5,
+        scene: drops.into(),
+        data: None,
+        dt: 0.005,
+        steps: [1500, 800],
+    };
+    let cold = Inputs {
+        kt: 0.0,
+        scene: "box = 4.0\ndensity = 3.0\n".into(),
+        steps: [10, 10],
+        ..gas(IDEAL, 0.01, "")
+    };
     let said = Must::RightOrSaid(0.06);
     let right = |part: f64| Some(Must::Right(part));
     vec![

@@ -30,6 +30,14 @@ impl PluginHost {
         })
     }
 
+    /// The LAMMPS that is installed, with the plugin.
+    ///
+    /// # Errors
+    /// There is none, or the plugin cannot be built.
+    pub fn find(note: &dyn Fn(&str)) -> Result<PluginHost, LammpsError> {
+        PluginHost::open(Host::find()?, note)
+    }
+
     /// Runs a script on `ranks` ranks in `folder`, at most for `limit`, and gives what LAMMPS prints. Its variable `plugin` is the
     /// plugin's path.
     ///

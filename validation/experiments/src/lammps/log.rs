@@ -1,5 +1,6 @@
 //! What LAMMPS prints after a run.
 
+use crate::ExperimentError;
 use std::collections::BTreeMap;
 
 /// LAMMPS's own account of a timed loop.
@@ -17,11 +18,15 @@ pub struct Loop {
     pub builds: u64,
 }
 
-/// Reads the account of the last loop.
+/// Reads the account of the last loop of a run, which an error names as `what`.
 ///
 /// # Errors
-/// What is missing.
-pub fn parse(text: &str) -> Result<Loop, &'static str> {
+/// Something is missing in it.
+pub fn timed(what: &str, text: &str) -> Result<Loop, ExperimentError> {
+    parse(text).map_err(|problem| ExperimentError::Printed { what: what.to_owned(), problem })
+}
+
+fn parse(text: &str) -> Result<Loop, &'static str> {
     let lines: Vec<&str> = text.lines().collect();
     let begin = lines.iter().rposition(|l| l.starts_with("Loop time of")).ok_or("no loop time")?;
     let words: Vec<&str> = lines[begin].split_whitespace().collect();

@@ -82,13 +82,13 @@ impl Compared {
 }
 
 #[derive(Debug, Clone, Default)]
-pub struct Outcome {
+pub struct Reproduction {
     pub values: Vec<Compared>,
     /// File names without extension, and plots.
     pub plots: Vec<(&'static str, Plot)>,
 }
 
-impl Outcome {
+impl Reproduction {
     /// Whether all values agree.
     pub fn passes(&self) -> bool {
         !self.values.is_empty() && self.values.iter().all(Compared::passes)
@@ -136,25 +136,12 @@ impl Outcome {
         measured: &[(&str, Vec<(f64, Measured)>)],
         published: &[(&str, Vec<(f64, f64)>)],
     ) {
-        let points = measured.iter().map(|(name, points)| Series {
-            name: (*name).into(),
-            points: points.iter().map(|(x, y)| (*x, y.value)).collect(),
-            errors: Some(points.iter().map(|(_, y)| y.error).collect()),
-            style: Style::Points,
+        let points = measured.iter().map(|(name, points)| {
+            let errors = points.iter().map(|(_, y)| y.error).collect();
+            Series::new(*name, bare(points), Style::Points).with_errors(errors)
         });
-        let lines = published.iter().map(|(name, points)| Series {
-            name: (*name).into(),
-            points: points.clone(),
-            errors: None,
-            style: Style::Line,
-        });
-        let plot = Plot {
-            title: title.into(),
-            x_label: axes[0].into(),
-            y_label: axes[1].into(),
-            series: points.chain(lines).collect(),
-            ..Plot::default()
-        };
+        let lines = published.iter().map(|(name, points)| Series::new(*name, points.clone(), Style::Line));
+        let plot = Plot::new(title, axes, points.chain(lines).collect());
         self.plots.push((file, plot));
     }
 }
@@ -251,7 +238,7 @@ mod tests {
 
     #[test]
     fn what_is_our_own_says_so() {
-        let mut outcome = Outcome::default();
+        let mut outcome = Reproduction::default();
         outcome.equal("x", exact(1.0), 1.0, 0.1);
         outcome.own("y", exact(1.0), Measured { value: 2.0, error: 0.1 });
         let own: Vec<Value> = outcome.values.iter().map(|v| v.to_json()["own"].clone()).collect();
@@ -280,6 +267,6 @@ mod tests {
         assert!(!vague(Rule::Equal, 10.0).passes() && vague(Rule::Equal, 10.0).deviation() == 0.0);
         assert!(vague(Rule::AtLeast, 11.0).passes() && !vague(Rule::AtLeast, 9.0).passes());
         assert!(vague(Rule::AtMost, 9.0).passes() && !vague(Rule::AtMost, 11.0).passes());
-        assert!(!Outcome::default().passes(), "a case without values says nothing");
+        assert!(!Reproduction::default().passes(), "a case without values says nothing");
     }
 }

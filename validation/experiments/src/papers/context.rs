@@ -5,6 +5,7 @@ use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::Scene;
+use psidpd_report::run::SeriesTable;
 use std::cell::RefCell;
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
@@ -122,15 +123,10 @@ impl Context {
         columns: [&str; N],
     ) -> Result<Vec<[f64; N]>, ExperimentError> {
         let path = self.folder.join(name).join("thermo.csv");
-        let text = std::fs::read_to_string(&path).map_err(ExperimentError::io(&path))?;
-        let mut lines = text.lines();
-        let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-        let at = columns.map(|c| header.iter().position(|h| *h == c).unwrap_or(usize::MAX));
-        let row = |line: &str| {
-            let cells: Vec<&str> = line.split(',').collect();
-            at.map(|k| cells.get(k).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN))
-        };
-        Ok(lines.map(row).collect())
+        let missing = || ExperimentError::Output { path: path.clone(), problem: "it is missing".into() };
+        let table = SeriesTable::read(&path)?.ok_or_else(missing)?;
+        let row = |k: usize| columns.map(|name| table.get(name).map_or(f64::NAN, |column| column[k]));
+        Ok((0..table.rows()).map(row).collect())
     }
 }
 

@@ -16,7 +16,7 @@ mod wang;
 mod warren;
 
 use crate::ExperimentError;
-pub use case::{Compared, Outcome, Rule};
+pub use case::{Compared, Reproduction, Rule};
 pub use context::{Context, Size};
 
 /// A figure or table.
@@ -26,25 +26,34 @@ pub struct Case {
     pub id: &'static str,
     pub paper: &'static str,
     pub what: &'static str,
-    run: Run,
+    add: Add,
 }
 
-type Run = fn(&Context) -> Result<Outcome, ExperimentError>;
+/// Makes the runs of a case and adds its values and plots.
+type Add = fn(&Context, &mut Reproduction) -> Result<(), ExperimentError>;
+
+/// A paper, and its cases: id, the comparison in a line, and the function that makes it.
+type Paper = (&'static str, &'static [(&'static str, &'static str, Add)]);
+
+const PAPERS: [Paper; 5] =
+    [pagonabarraga::PAPER, trofimov::PAPER, warren::PAPER, wang::PAPER, berendsen::PAPER];
 
 impl Case {
     /// Runs the case.
     ///
     /// # Errors
     /// A run stops, or a file cannot be written. A value that does not agree is no error.
-    pub fn run(&self, context: &Context) -> Result<Outcome, ExperimentError> {
-        (self.run)(context)
+    pub fn run(&self, context: &Context) -> Result<Reproduction, ExperimentError> {
+        let mut outcome = Reproduction::default();
+        (self.add)(context, &mut outcome)?;
+        Ok(outcome)
     }
 }
 
-pub fn cases() -> Vec<&'static Case> {
-    let papers: [&'static [Case]; 5] =
-        [pagonabarraga::CASES, trofimov::CASES, warren::CASES, wang::CASES, berendsen::CASES];
-    papers.into_iter().flatten().collect()
+pub fn cases() -> Vec<Case> {
+    let of =
+        |(paper, cases): Paper| cases.iter().map(move |(id, what, add)| Case { id, paper, what, add: *add });
+    PAPERS.into_iter().flat_map(of).collect()
 }
 
 #[cfg(test)]

@@ -2,8 +2,9 @@
 
 use super::outcome::Point;
 use super::quantity::Deviation;
-use super::setting::Host;
 use super::tolerance::{Tolerance, worst};
+use crate::code::Host;
+use psidpd_report::distinct;
 
 /// Bound of every quantity where none is given.
 const USUAL: f64 = 0.01;
@@ -45,13 +46,8 @@ pub fn unmeasured<'a>(points: &[Point], tolerances: &'a [Tolerance]) -> Option<&
 
 /// One percent for every quantity that most points resolve so well, and the names of the others.
 pub fn usual(points: &[Point]) -> (Vec<Tolerance>, Vec<String>) {
-    let mut names: Vec<&String> = Vec::new();
     let native = || points.iter().filter(|p| p.code == Host::Native && p.stable);
-    for d in native().flat_map(|p| &p.errors) {
-        if !names.contains(&&d.name) {
-            names.push(&d.name);
-        }
-    }
+    let names = distinct(native().flat_map(|p| &p.errors).map(|d| &d.name));
     let mostly = |name: &&String| {
         let of: Vec<&Deviation> = native().flat_map(|p| &p.errors).filter(|d| d.name == **name).collect();
         2 * of.iter().filter(|d| d.resolves(USUAL)).count() > of.len()

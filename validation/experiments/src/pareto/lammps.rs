@@ -5,12 +5,12 @@ use super::own_style::own_style;
 use super::quantity::{Class, Quantities};
 use super::recommend::scene_of;
 use super::sample::{Effort, FAR_OFF, Sampled, observe};
-use super::setting::{Host as Who, Physics, Setting};
+use super::setting::{Physics, Setting};
 use crate::ExperimentError;
+use crate::code::Host;
 use crate::lammps::host::PluginHost;
 use crate::lammps::style::PairStyle;
 use crate::lammps::{frames, log};
-use psidpd_lammps_host::Host;
 use psidpd_lammps_host::export::lammps::{self as deck, Script};
 use psidpd_observe::{Observers, Series};
 use std::path::{Path, PathBuf};
@@ -21,20 +21,20 @@ const LIMIT: Duration = Duration::from_secs(3600);
 
 /// LAMMPS with the plugin, in a folder for decks.
 #[derive(Debug)]
-pub struct Lammps {
+pub struct LammpsRuns {
     host: PluginHost,
     work: PathBuf,
     pub own: Option<PairStyle>,
 }
 
-impl Lammps {
+impl LammpsRuns {
     /// The LAMMPS that is installed; builds the plugin for it if necessary.
     ///
     /// # Errors
     /// There is none, or the plugin cannot be built.
-    pub fn open(origin: &Origin, work: &Path, note: &dyn Fn(&str)) -> Result<Lammps, ExperimentError> {
-        let host = PluginHost::open(Host::find()?, note)?;
-        Ok(Lammps { host, work: work.to_owned(), own: own_style(origin)? })
+    pub fn open(origin: &Origin, work: &Path, note: &dyn Fn(&str)) -> Result<LammpsRuns, ExperimentError> {
+        let host = PluginHost::find(note)?;
+        Ok(LammpsRuns { host, work: work.to_owned(), own: own_style(origin)? })
     }
 
     /// Seconds for a step, by LAMMPS's own clock, with no output in the loop.
@@ -43,8 +43,7 @@ impl Lammps {
     /// LAMMPS stops.
     pub fn time(&self, origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ExperimentError> {
         let text = self.run(origin, setting, &[10, steps], "time", "")?;
-        let account = log::parse(&text)
-            .map_err(|problem| ExperimentError::Printed { what: "a timed run of LAMMPS".into(), problem })?;
+        let account = log::timed("a timed run of LAMMPS", &text)?;
         Ok(account.seconds / account.steps as f64)
     }
 
@@ -66,7 +65,7 @@ impl Lammps {
             Effort::Seconds(s) => ((s / (step * every as f64)) as u64).clamp(20, 400),
             Effort::Samples(n) => n,
         };
-        let setting = Setting { host: Who::Lammps, physics: *physics, threads: std::num::NonZeroUsize::MIN };
+        let setting = Setting { host: Host::Lammps, physics: *physics, threads: std::num::NonZeroUsize::MIN };
         let output = format!(
             "thermo_style custom step temp press\nthermo {every}\n\
              dump frames all custom {every} frames.lammpstrj id x y z ix iy iz\ndump_modify frames sort id\n"
@@ -95,7 +94,7 @@ impl Lammps {
                 mean.value / origin.stage.kt
             )));
         }
-        let observe = observe(origin, every, Who::Lammps, true)?;
+        let observe = observe(origin, every, Host::Lammps, true)?;
         let mut observers = Observers::new(&observe, [origin.stage.name.as_str()]);
         let path = self.work.join(name).join("frames.lammpstrj");
         let scene = (origin.scene, origin.stage.name.as_str(), origin.stage.kt);
@@ -119,7 +118,7 @@ impl Lammps {
         let folder = self.work.join(name);
         let scene = scene_of(origin, &setting.physics, steps);
         deck::write_inputs(&scene, &origin.state, &folder)?;
-        let own = self.own.as_ref().filter(|_| setting.host == Who::Lammps);
+        let own = self.own.as_ref().filter(|_| setting.host == Host::Lammps);
         let commands = own.map(|own| (own.atom_style(), own.commands(origin.stage.kt, scene.seed)));
         if let Some(("mdpd", _)) = commands {
             origin.state.to_data_by_tag("psidpd pareto").write_mdpd(&folder.join(deck::START))?;

@@ -18,18 +18,19 @@ mod time;
 mod tolerance;
 
 use drift::EnergyDrift;
-use outcome::{Cost, Outcome, Point, Recommended, Reference};
+use outcome::{Comparison, Cost, Point, Recommended, Reference};
 use quantity::Deviation;
 pub use sample::Effort;
 pub use setting::Choice;
-use setting::Host;
 pub use time::Pace;
 pub use tolerance::Tolerance;
 
 use crate::ExperimentError;
+use crate::code::Host;
+use crate::files;
 use crate::jobs::{self, Job};
 use crate::machine::machine;
-use lammps::Lammps;
+use lammps::LammpsRuns;
 use origin::Origin;
 use own_style::is_another_law;
 use psidpd_core::engine::Precision;
@@ -79,9 +80,8 @@ const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 ///
 /// # Errors
 /// The scene cannot be run with its own step, or something cannot be written.
-pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
-    std::fs::create_dir_all(&options.out).map_err(ExperimentError::io(&options.out))?;
-    let out = options.out.canonicalize().map_err(ExperimentError::io(&options.out))?;
+pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comparison, ExperimentError> {
+    let out = files::absolute_folder(&options.out)?;
     let seconds = 60.0 * options.minutes;
     let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let spinner = progress.spinner("start");
@@ -90,7 +90,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     let known = known(&origin)?;
     let mut left_out = Vec::new();
     let lammps = match options.lammps {
-        true => match Lammps::open(&origin, &out.join("runs"), &|line| progress.note(line)) {
+        true => match LammpsRuns::open(&origin, &out.join("runs"), &|line| progress.note(line)) {
             Ok(lammps) => Some(lammps),
             Err(error) => {
                 left_out.push(format!("LAMMPS is not among the points: {error}."));
@@ -144,7 +144,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     if let Err(why) = &references.configurations {
         left_out.push(format!("This scene cannot run Monte Carlo, so small steps are the reference: {why}."));
     }
-    let mut outcome = Outcome {
+    let mut outcome = Comparison {
         format: 2,
         version: env!("CARGO_PKG_VERSION"),
         machine: machine(),
@@ -165,9 +165,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
         recommended: None,
     };
     outcome.recommended = recommend(&origin, &outcome);
-    let json = serde_json::to_string_pretty(&outcome)
-        .map_err(|e| ExperimentError::io(out.join("pareto.json"))(e.into()))?;
-    write_atomically(out.join("pareto.json"), (json + "\n").as_bytes())?;
+    files::write_json(&out.join("pareto.json"), &outcome)?;
     write_atomically(out.join("pareto.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
 }
@@ -339,7 +337,7 @@ type Own = (Option<Reference>, Vec<Point>);
 /// LAMMPS's own style.
 fn own_points(
     origin: &Origin,
-    lammps: &Lammps,
+    lammps: &LammpsRuns,
     seconds: f64,
     options: &Options,
     known: Known,
@@ -397,8 +395,8 @@ fn reference_of(origin: &Origin, physics: &Physics, sampled: &Sampled, known: Kn
     Reference { what: what(origin, physics), dt, samples, time, values }
 }
 
-fn recommend(origin: &Origin, outcome: &Outcome) -> Option<Recommended> {
-    let Outcome { points, tolerances, .. } = outcome;
+fn recommend(origin: &Origin, outcome: &Comparison) -> Option<Recommended> {
+    let Comparison { points, tolerances, .. } = outcome;
     let best = front::cheapest(points, tolerances, &[Host::Native])?;
     let timed = front::cheapest(points, tolerances, &[Host::Plugin]);
     let setting = points[best].setting;

@@ -2,13 +2,14 @@
 
 use super::drift::EnergyDrift;
 use super::quantity::{self, Class, Deviation};
-use super::setting::{Host, Setting};
+use super::setting::Setting;
 use super::tolerance::{self, Tolerance, Worst};
 use crate::bench::Spread;
+use crate::code::Host;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct Comparison {
     /// Changes when fields change their meaning.
     pub format: u32,
     pub version: &'static str,
@@ -132,11 +133,6 @@ impl Point {
     }
 
     pub fn name(&self) -> String {
-        let who = match self.code {
-            Host::Native => "native",
-            Host::Plugin => "plugin",
-            Host::Lammps => "lammps",
-        };
-        format!("{who}, {}", self.integrator)
+        format!("{}, {}", self.code.name(), self.integrator)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::origin::Origin;
 use crate::ExperimentError;
+use crate::fluids::dpd_model;
 use crate::lammps::style::PairStyle;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
@@ -36,11 +37,7 @@ pub fn own_style(origin: &Origin) -> Result<Option<PairStyle>, ExperimentError> 
         return Ok(same(origin, fluid, &model)?.then_some(PairStyle::Mdpd(pair)));
     }
     if let Some(a) = number("a") {
-        let text = format!(
-            "title = \"dpd\"\nspecies = [\"W\"]\n[[pair]]\nbetween = [\"W\", \"W\"]\nform = \"soft\"\n\
-             strength = {a:?}\nrange = {rc:?}\n[[thermostat]]\ngamma = {gamma:?}\nrange = {rc:?}\n"
-        );
-        let model = Model::parse("dpd", &text)?;
+        let model = dpd_model(a, gamma, rc)?;
         return Ok(same(origin, fluid, &model)?.then_some(PairStyle::Dpd { a, gamma, rc }));
     }
     Ok(None)

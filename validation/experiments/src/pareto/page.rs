@@ -1,10 +1,10 @@
 //! Results as tables, plots and a page.
 
-use super::outcome::{Outcome, Point, Reference};
+use super::outcome::{Comparison, Point, Reference};
 use super::quantity::{Class, Deviation};
-use super::setting::Host;
 use crate::ExperimentError;
-use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table};
+use crate::code::Host;
+use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table, distinct};
 
 /// An error in percent with its own; what is not resolved as what it is likely to be below.
 fn shown(d: &Deviation) -> String {
@@ -22,14 +22,9 @@ fn shown(d: &Deviation) -> String {
 }
 
 /// The quantities that some point has an error of, in the order of the first that has them.
-fn names(outcome: &Outcome) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for d in outcome.points.iter().flat_map(|p| &p.errors).chain(&outcome.reference.values) {
-        if !names.contains(&d.name) {
-            names.push(d.name.clone());
-        }
-    }
-    names
+fn names(outcome: &Comparison) -> Vec<String> {
+    let errors = outcome.points.iter().flat_map(|p| &p.errors).chain(&outcome.reference.values);
+    distinct(errors.map(|d| d.name.clone()))
 }
 
 fn row(names: &[String], errors: &[Deviation]) -> Vec<String> {
@@ -46,7 +41,7 @@ fn reference_row(names: &[String], who: &str, reference: &Reference) -> Vec<Stri
 }
 
 /// Every setting, the cheapest first; errors in percent.
-pub fn table(outcome: &Outcome) -> Table {
+pub fn table(outcome: &Comparison) -> Table {
     let names = names(outcome);
     let mut header: Vec<String> =
         ["setting", "dt", "precision", "threads", "s per time unit"].map(str::to_owned).to_vec();
@@ -78,7 +73,7 @@ pub fn table(outcome: &Outcome) -> Table {
 }
 
 /// Energy without thermostat.
-pub fn drifts(outcome: &Outcome) -> Table {
+pub fn drifts(outcome: &Comparison) -> Table {
     let mut table = Table::new([
         "conservative steps of",
         "dt",
@@ -107,39 +102,25 @@ fn group(p: &Point) -> String {
 }
 
 /// Points of error against cost, in groups; `error` and its bar are in percent or in units of a tolerance.
-fn groups(outcome: &Outcome, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
+fn groups(outcome: &Comparison, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
     let place = |p: &Point| Some((p.cost.as_ref()?.value, error(p)?[0]));
     let shown: Vec<&Point> = outcome.points.iter().filter(|p| place(p).is_some()).collect();
-    let mut names: Vec<String> = Vec::new();
-    for p in &shown {
-        if !names.contains(&group(p)) {
-            names.push(group(p));
-        }
-    }
     let series = |name: String| {
         let own: Vec<&&Point> = shown.iter().filter(|p| group(p) == name).collect();
         let points = own.iter().filter_map(|p| place(p)).collect();
         let errors = own.iter().map(|p| error(p).map_or(f64::NAN, |e| e[1])).collect();
-        Series { name, points, errors: Some(errors), style: Style::Points }
+        Series::new(name, points, Style::Points).with_errors(errors)
     };
-    names.into_iter().map(series).collect()
+    distinct(shown.iter().map(|p| group(p))).into_iter().map(series).collect()
 }
 
 fn plot(title: &str, y_label: String, series: Vec<Series>, levels: Vec<(f64, String)>) -> Plot {
-    Plot {
-        title: title.into(),
-        x_label: "wall seconds per unit of simulated time".into(),
-        y_label,
-        series,
-        log_x: true,
-        log_y: true,
-        levels,
-        marks: Vec::new(),
-    }
+    let labels = ["wall seconds per unit of simulated time".to_owned(), y_label];
+    Plot { log_x: true, log_y: true, levels, ..Plot::new(title, labels, series) }
 }
 
 /// The worst error of every setting against its cost; the front is a line.
-fn plot_of_worst(outcome: &Outcome) -> Option<Plot> {
+fn plot_of_worst(outcome: &Comparison) -> Option<Plot> {
     let error = |p: &Point| Some([p.worst.as_ref()?.ratio, f64::NAN]);
     let mut series = groups(outcome, error);
     if series.is_empty() {
@@ -149,13 +130,13 @@ fn plot_of_worst(outcome: &Outcome) -> Option<Plot> {
     let mut points: Vec<(f64, f64)> =
         front.filter_map(|p| Some((p.cost.as_ref()?.value, error(p)?[0]))).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    series.push(Series { name: "front".into(), points, errors: None, style: Style::Line });
+    series.push(Series::new("front", points, Style::Line));
     let label = "worst error over its tolerance".to_owned();
     Some(plot("Worst error against cost", label, series, vec![(1.0, "tolerance".into())]))
 }
 
 /// Error against cost for one kind of quantity.
-fn plot_of(outcome: &Outcome, class: Class) -> Option<Plot> {
+fn plot_of(outcome: &Comparison, class: Class) -> Option<Plot> {
     let error = |p: &Point| {
         let d = p.error(class)?;
         Some([100.0 * d.shown(), if d.resolved { 100.0 * d.error } else { f64::NAN }])
@@ -167,7 +148,7 @@ fn plot_of(outcome: &Outcome, class: Class) -> Option<Plot> {
     (!series.is_empty()).then(|| plot(&title, format!("error of {}, %", class.name()), series, levels))
 }
 
-pub fn recommendation(outcome: &Outcome) -> String {
+pub fn recommendation(outcome: &Comparison) -> String {
     let within: Vec<String> = outcome.tolerances.iter().map(ToString::to_string).collect();
     let within = within.join(", ");
     let mut text = match &outcome.unresolved[..] {
@@ -203,7 +184,7 @@ pub fn recommendation(outcome: &Outcome) -> String {
     text
 }
 
-pub fn explanation(outcome: &Outcome) -> String {
+pub fn explanation(outcome: &Comparison) -> String {
     let temperature = match outcome.temperature_is_known {
         true => "of the temperatures from kT",
         false => "of the kinetic temperature from that of the reference",
@@ -228,25 +209,22 @@ pub fn explanation(outcome: &Outcome) -> String {
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
+pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
     for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {
-        plots.push(Item::Figure {
-            svg: plot.render()?,
-            caption: "Without a bar: not resolved, at what the error is likely to be below.".into(),
-        });
+        let caption = "Without a bar: not resolved, at what the error is likely to be below.";
+        plots.push(Item::figure(&plot, caption)?);
     }
-    let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let mut settings = vec![Item::Prose(explanation(outcome)), Item::Table(table(outcome))];
     settings.extend(outcome.left_out.iter().cloned().map(Item::Prose));
     let mut sections = vec![
-        section("Recommendation", vec![Item::Prose(recommendation(outcome))]),
-        section("Speed against error", plots),
-        section("All settings", settings),
+        Section::new("Recommendation", vec![Item::Prose(recommendation(outcome))]),
+        Section::new("Speed against error", plots),
+        Section::new("All settings", settings),
     ];
     if !outcome.drifts.is_empty() {
-        sections.push(section("Energy without thermostat", vec![Item::Table(drifts(outcome))]));
+        sections.push(Section::new("Energy without thermostat", vec![Item::Table(drifts(outcome))]));
     }
     let report = Report {
         title: format!("Speed against error: {}", outcome.scene),

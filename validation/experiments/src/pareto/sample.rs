@@ -2,8 +2,9 @@
 
 use super::origin::Origin;
 use super::quantity::{Class, Quantities};
-use super::setting::{Host, Physics};
+use super::setting::Physics;
 use crate::ExperimentError;
+use crate::code::Host;
 use psidpd_core::document::Document;
 use psidpd_core::engine::Want;
 use psidpd_dynamics::run::{RunError, Simulation};

@@ -1,8 +1,8 @@
 //! The settings that are compared with each other: integrator × Δt × precision, and threads.
 
+use crate::code::Host;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::{Coupling, Integrator};
-use serde::Serialize;
 use std::num::NonZeroUsize;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,16 +11,6 @@ pub struct Physics {
     /// Δt in units of the scene's own.
     pub multiple: f64,
     pub precision: Precision,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Host {
-    Native,
-    /// `dpd/psi` in LAMMPS, which takes the same steps.
-    Plugin,
-    /// LAMMPS's own style for the fluid.
-    Lammps,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,10 @@
 //! What settings cost: all of them in turn, round after round, so that what slows the machine for a while slows all.
 
-use super::lammps::Lammps;
+use super::lammps::LammpsRuns;
 use super::origin::Origin;
-use super::setting::{Host, Setting};
+use super::setting::Setting;
 use crate::ExperimentError;
+use crate::code::Host;
 use psidpd_core::engine::Want;
 use psidpd_report::Progress;
 use std::time::Instant;
@@ -27,7 +28,7 @@ const MOST: u64 = 1 << 16;
 pub fn time(
     origin: &Origin,
     settings: &[Setting],
-    lammps: Option<&Lammps>,
+    lammps: Option<&LammpsRuns>,
     pace: Pace,
     progress: &Progress,
 ) -> Result<Vec<Vec<f64>>, ExperimentError> {

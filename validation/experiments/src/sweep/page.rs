@@ -2,17 +2,11 @@
 
 use super::{Axis, Point};
 use psidpd_report::quantity::with_error;
-use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table};
+use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table, distinct};
 
 /// Names of the results that any run has, in the order in which they come first.
 fn quantities(points: &[Point]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for value in points.iter().flat_map(|p| &p.headline.values) {
-        if !names.contains(&value.name) {
-            names.push(value.name.clone());
-        }
-    }
-    names
+    distinct(points.iter().flat_map(|p| &p.headline.values).map(|value| value.name.clone()))
 }
 
 /// A row for each run: the keys, each result with its error, whether it is finished, and how many notes there are.
@@ -74,27 +68,23 @@ pub fn table(axes: &[Axis], points: &[Point]) -> Table {
 /// # Errors
 /// A plot cannot be drawn.
 pub fn page(title: &str, axes: &[Axis], points: &[Point]) -> Result<Report, ReportError> {
-    let mut sections =
-        vec![Section { heading: "Results".into(), items: vec![Item::Table(table(axes, points))] }];
+    let mut sections = vec![Section::new("Results", vec![Item::Table(table(axes, points))])];
     let mut plots = Vec::new();
     if let Some(x) = axes.iter().position(Axis::is_numeric) {
         for name in quantities(points) {
             let plot = plot(&name, x, axes, points);
-            plots.push(Item::Figure {
-                svg: plot.render()?,
-                caption: "Bars are one standard deviation.".into(),
-            });
+            plots.push(Item::figure(&plot, "Bars are one standard deviation.")?);
         }
     }
     if !plots.is_empty() {
-        sections.push(Section { heading: "Plots".into(), items: plots });
+        sections.push(Section::new("Plots", plots));
     }
     let mut notes = Table::new(["run", "note"]);
     for p in points {
         p.error.iter().chain(&p.headline.notes).for_each(|n| notes.push([folder_name(p), n.clone()]));
     }
     if !notes.rows.is_empty() {
-        sections.push(Section { heading: "Before you use them".into(), items: vec![Item::Table(notes)] });
+        sections.push(Section::new("Before you use them", vec![Item::Table(notes)]));
     }
     let values = |a: &Axis| a.edits.iter().map(|e| e.value().to_owned()).collect::<Vec<_>>().join(", ");
     let mut facts: Vec<(String, String)> = axes.iter().map(|a| (a.key.clone(), values(a))).collect();
@@ -117,12 +107,7 @@ fn plot(name: &str, x: usize, axes: &[Axis], points: &[Point]) -> Plot {
         let of_these = match series.iter_mut().find(|s| s.name == others) {
             Some(found) => found,
             None => {
-                series.push(Series {
-                    name: others,
-                    errors: Some(Vec::new()),
-                    style: Style::Points,
-                    ..Series::default()
-                });
+                series.push(Series::new(others, Vec::new(), Style::Points).with_errors(Vec::new()));
                 let last = series.len() - 1;
                 &mut series[last]
             }
@@ -137,8 +122,8 @@ fn plot(name: &str, x: usize, axes: &[Axis], points: &[Point]) -> Plot {
     if series.len() == 1 && theory.len() > 1 {
         theory.sort_by(|a, b| a.0.total_cmp(&b.0));
         series[0].name = "measured".into();
-        series.push(Series { name: "mean field".into(), points: theory, errors: None, style: Style::Dashed });
+        series.push(Series::new("mean field", theory, Style::Dashed));
     }
     let y_label = if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
-    Plot { title: name.to_owned(), x_label: axes[x].key.clone(), y_label, series, ..Plot::default() }
+    Plot::new(name, [axes[x].key.clone(), y_label], series)
 }

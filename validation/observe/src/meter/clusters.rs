@@ -1,7 +1,7 @@
 use super::Meter;
 use super::linked::{DISTANCE, Distance, Linked};
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind, key};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -23,29 +23,20 @@ impl Meter for Clusters {
     const TABLE: Table = Table {
         path: "clusters",
         title: "clusters by distance",
-        array: false,
-        forms: ("", &[]),
         about: "Particles closer than `distance` are of one cluster, and so are their clusters (union-find). `count` of \
                 the clusters of at least `smallest` particles, `largest` and `mean_size` (the mean of the sizes in a \
                 sample, 0 if there are none), and the `distance`. `clusters_series` has them against time, in means over blocks of \
                 samples when there are more than 511.",
-        keys: &[
-            DISTANCE,
-            key(
-                "species",
-                ValueKind::Words("name of a species"),
-                Need::Default("all"),
-                "Which particles take part.",
-                "\"A\"",
-            ),
-            key(
-                "smallest",
-                ValueKind::Words("whole number from 1"),
-                Need::Default("1"),
-                "Particles in the smallest cluster that counts.",
-                "10",
-            ),
-        ],
+        keys: keys! {
+            use DISTANCE;
+            "species": ValueKind::Words("name of a species"), Need::Default("all"),
+                "Which particles take part."
+                => "\"A\"";
+            "smallest": ValueKind::Words("whole number from 1"), Need::Default("1"),
+                "Particles in the smallest cluster that counts."
+                => "10";
+        },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Clusters, FileError> {

@@ -3,10 +3,10 @@ use super::drop::circular_centre;
 use super::linked::{DISTANCE, Distance, Linked};
 use super::pendant::median_density;
 use crate::frame::Frame;
-use crate::keys::{Key, Need, Table, ValueKind, key};
+use crate::keys::{Key, Need, PLAIN, Table, ValueKind, keys};
 use crate::least_squares::least_squares;
 use crate::observation::{Kind, Observation};
-use crate::options::Options;
+use crate::options::{FACES, Options};
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
@@ -19,14 +19,6 @@ const FEWEST: usize = 4;
 
 /// A wall: its direction, and whether it is at the upper end.
 type Face = (usize, bool);
-const FACES: [(&str, Face); 6] = [
-    ("xlo", (0, false)),
-    ("xhi", (0, true)),
-    ("ylo", (1, false)),
-    ("yhi", (1, true)),
-    ("zlo", (2, false)),
-    ("zhi", (2, true)),
-];
 
 /// The density around the vertical through a drop on a wall, and the circle that fits its contour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -166,12 +158,17 @@ fn linear_circle(points: &[Point]) -> Option<[f64; 2]> {
     (centre.is_finite() && square > 0.0).then(|| [centre, square.sqrt()])
 }
 
+const ALONG: Key = Key {
+    about: "For a ridge of liquid that crosses the periodic box: its direction. A drop that is round needs none.",
+    need: Need::Default("none"),
+    example: "\"y\"",
+    ..crate::keys::AXIS
+};
+
 impl Meter for ContactAngle {
     const TABLE: Table = Table {
         path: "contact_angle",
         title: "contact angle of a drop on a wall",
-        array: false,
-        forms: ("", &[]),
         about: "Density of the moving particles against the distance from the vertical through the largest cluster's centre of \
                 mass and the height above the wall, and the circle that fits the contour where the density is \
                 `isodensity` (`contact_angle`): `angle` θ in degrees between the wall and the circle, through the \
@@ -181,52 +178,26 @@ impl Meter for ContactAngle {
                 is `contact_angle_profile`, the field `contact_angle_field`. A drop is a cap only if its weight is small: \
                 Δρ g R² ≪ γ. Layers of liquid next to the wall are left out of the fit (`above`). Jackknife errors; the \
                 choice of the surface is not in them: dθ = dz/(R sin θ).",
-        keys: &[
-            key(
-                "wall",
-                ValueKind::Words("`\"xlo\"`, `\"xhi\"`, `\"ylo\"`, `\"yhi\"`, `\"zlo\"` or `\"zhi\"`"),
-                Need::Default("the low end of the last direction"),
-                "The end of the box where the wall is: below a drop that sits, above one that hangs.",
-                "\"zhi\"",
-            ),
-            Key {
-                about: "For a ridge of liquid that crosses the periodic box: its direction. A drop that is round needs none.",
-                need: Need::Default("none"),
-                example: "\"y\"",
-                ..crate::keys::AXIS
-            },
-            key(
-                "surface",
-                ValueKind::Words("number from 0"),
-                Need::Default(
-                    "where the frozen particles of the wall's half of the box end; without these the end of the box",
-                ),
-                "Height of the wall's surface above the end of the box.",
-                "1.0",
-            ),
-            key(
-                "above",
-                ValueKind::Words("number from 0"),
-                Need::Default("the longest range of a conservative interaction"),
-                "Height above the surface from which the contour is fitted.",
-                "0.5",
-            ),
-            DISTANCE,
-            key(
-                "bins",
-                ValueKind::Words("array of two whole numbers from 4 to 2000"),
-                Need::Default("as many as make them 0.25 wide, or a little less"),
-                "Bins outwards, up to half the box, and away from the wall.",
-                "[20, 40]",
-            ),
-            key(
-                "isodensity",
-                ValueKind::Words("positive number"),
-                Need::Default("half the density of the liquid"),
-                "The density on the contour.",
-                "3.0",
-            ),
-        ],
+        keys: keys! {
+            "wall": ValueKind::Words("`\"xlo\"`, `\"xhi\"`, `\"ylo\"`, `\"yhi\"`, `\"zlo\"` or `\"zhi\"`"), Need::Default("the low end of the last direction"),
+                "The end of the box where the wall is: below a drop that sits, above one that hangs."
+                => "\"zhi\"";
+            use ALONG;
+            "surface": ValueKind::Words("number from 0"), Need::Default("where the frozen particles of the wall's half of the box end; without these the end of the box"),
+                "Height of the wall's surface above the end of the box."
+                => "1.0";
+            "above": ValueKind::Words("number from 0"), Need::Default("the longest range of a conservative interaction"),
+                "Height above the surface from which the contour is fitted."
+                => "0.5";
+            use DISTANCE;
+            "bins": ValueKind::Words("array of two whole numbers from 4 to 2000"), Need::Default("as many as make them 0.25 wide, or a little less"),
+                "Bins outwards, up to half the box, and away from the wall."
+                => "[20, 40]";
+            "isodensity": ValueKind::Words("positive number"), Need::Default("half the density of the liquid"),
+                "The density on the contour."
+                => "3.0";
+        },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<ContactAngle, FileError> {

@@ -1,11 +1,10 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// The number of rows of fields that are kept for error bars.
@@ -27,8 +26,6 @@ impl Meter for DensityField {
     const TABLE: Table = Table {
         path: "density_field",
         title: "density on a plane",
-        array: false,
-        forms: ("", &[]),
         about: "Number density in columns of the box, averaged over `axis`, of all particles and of each of several \
                 species: a map of drops, films and domains that stay where they are. The first two columns are the \
                 middles of the cells, the later of the two directions running fastest. The box must have right \
@@ -41,6 +38,7 @@ impl Meter for DensityField {
                 "Cells along the other two directions, in their order."
                 => "[10, 20]";
         },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<DensityField, FileError> {

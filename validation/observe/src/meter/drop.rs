@@ -3,7 +3,7 @@ use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
 use crate::flux::Carrier;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind, key};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::profile::flank_interface;
@@ -179,8 +179,6 @@ impl Meter for Drop {
     const TABLE: Table = Table {
         path: "drop",
         title: "radius and Laplace pressure of a drop",
-        array: false,
-        forms: ("", &[]),
         about: "The drop is the largest cluster of particles closer than `distance`, its centre the circular mean of \
                 them. `drop_profile`: `density`, and the spherical Irving–Kirkwood pressures `normal` P_N(r) and \
                 `tangential` P_T(r) of the momentum that the integrator carries, as in `stress_profile`: they balance, \
@@ -191,23 +189,16 @@ impl Meter for Drop {
                 Δp R/(d − 1). Jackknife errors. `distance` is the one that was used. A note says \
                 in how many samples the cluster met its own image. `drop_series`: gyration radius and particles of the drop against \
                 time.",
-        keys: &[
-            DISTANCE,
-            key(
-                "range",
-                ValueKind::Words("positive number, at most half the box"),
-                Need::Default("half the box"),
-                "Radius of the largest shell.",
-                "2.0",
-            ),
-            key(
-                "bins",
-                ValueKind::Words("whole number from 12 to 10000"),
-                Need::Default("as many as make them 0.1 thick, or a little less"),
-                "How many shells.",
-                "30",
-            ),
-        ],
+        keys: keys! {
+            use DISTANCE;
+            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("half the box"),
+                "Radius of the largest shell."
+                => "2.0";
+            "bins": ValueKind::Words("whole number from 12 to 10000"), Need::Default("as many as make them 0.1 thick, or a little less"),
+                "How many shells."
+                => "30";
+        },
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

@@ -1,6 +1,6 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::Table;
+use crate::keys::{PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -19,12 +19,10 @@ impl Meter for Energy {
     const TABLE: Table = Table {
         path: "energy",
         title: "energy by terms",
-        array: false,
-        forms: ("", &[]),
         about: "Per particle of the whole system: `total`, `kinetic`, `potential`, `psi_SPECIES` for Σ ψ over the \
                 particles of a species, and `phi_K_A_B` for Σ φ of the K-th `[[pair]]` of the model, between A \
                 and B.",
-        keys: &[],
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Energy, FileError> {

@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, Table};
+use crate::keys::{AXIS, BINS, PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::profile::{DensityProfile, interface, slab_edges};
@@ -20,8 +20,6 @@ impl Meter for InterfaceWidth {
     const TABLE: Table = Table {
         path: "interface_width",
         title: "width of the interfaces of a slab",
-        array: false,
-        forms: ("", &[]),
         about: "w = (ρ_L − ρ_V)/max|dρ/dz|, as Warren, Phys. Rev. E 68, 066702 (2003), eq. 19, defines it, from a fit of \
                 (ρ_L + ρ_V)/2 − (ρ_L − ρ_V)/2 tanh((|z| − z₀)/d) to both flanks of the recentred density profile, \
                 averaged over each bin: w = 2d. Differences of neighbouring bins would overrate the slope in \
@@ -34,6 +32,7 @@ impl Meter for InterfaceWidth {
                 slope of a straight line through three tenths of the interface. If nothing can be fitted `width` has no \
                 value. Jackknife errors. No values if the profile is not that of one slab.",
         keys: &[AXIS, BINS],
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<InterfaceWidth, FileError> {

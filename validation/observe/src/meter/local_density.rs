@@ -1,10 +1,9 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
-use psidpd_core::document::keys::keys;
 use psidpd_core::document::{FileError, FileErrorKind};
 use psidpd_core::model::kernel::Kernel;
 use serde::{Deserialize, Serialize};
@@ -55,8 +54,6 @@ impl Meter for LocalDensity {
     const TABLE: Table = Table {
         path: "local_density",
         title: "distribution of a weighted local density",
-        array: false,
-        forms: ("", &[]),
         about: "P(n) of n = Σ_j w(r_ij), of all species, at the particles of each species: `p_SPECIES` (`p` with one), \
                 normalised to 1. `local_density_means`: for species B at A, `mean_A_B` = ⟨n_B⟩; `relative_A_B` = \
                 ⟨n_B⟩/ρ_B with ρ_B the mean density of the box, N_B − 1 of V for A = B; `wg_A_B` = [w g] = ∫ w g \
@@ -74,6 +71,7 @@ impl Meter for LocalDensity {
                 "Where the histogram ends; it begins at 0."
                 => "20.0";
         },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<LocalDensity, FileError> {

@@ -1,11 +1,10 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// The mean-square displacement and the diffusion coefficient of each species.
@@ -118,8 +117,6 @@ impl Meter for Msd {
     const TABLE: Table = Table {
         path: "msd",
         title: "mean-square displacement and diffusion",
-        array: false,
-        forms: ("", &[]),
         about: "⟨|r(t₀ + t) − r(t₀)|²⟩ of the particles of each species that move, positions unwrapped by the count of boxes travelled, from many \
                 origins t₀: `msd_SPECIES` (`msd` with one). `diffusion`: D from the least-squares slope over the second \
                 half of the times, slope/(2d), for each origin seen to the end; its error is that of the mean over \
@@ -136,6 +133,7 @@ impl Meter for Msd {
                 "Whether displacements are those from the centre of mass of all particles."
                 => "true";
         },
+        ..PLAIN
     };
 
     const OF_MOTION: bool = true;

@@ -2,7 +2,7 @@ use super::Meter;
 use super::drop::circular_centre;
 use super::linked::{DISTANCE, Distance, Linked};
 use crate::frame::Frame;
-use crate::keys::{AXIS, Key, Need, Table, ValueKind, key};
+use crate::keys::{AXIS, Key, Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -101,12 +101,16 @@ impl Pendant {
     }
 }
 
+const ALONG: Key = Key {
+    about: "The vertical, along an edge of the box at right angles to the others.",
+    need: Need::Default("the last direction"),
+    ..AXIS
+};
+
 impl Meter for Pendant {
     const TABLE: Table = Table {
         path: "pendant",
         title: "isosurface and Bond number of a hanging drop",
-        array: false,
-        forms: ("", &[]),
         about: "Density of the largest cluster's surroundings against the distance from the vertical through its centre \
                 of mass and the height (`pendant_field`: columns `r`, `z`, `density`), the surface where it is \
                 `isodensity` (`pendant_profile`: `radius` against the height), and the solution of Young and Laplace's \
@@ -115,49 +119,26 @@ impl Meter for Pendant {
                 `residual` the root mean square distance of the surface from the fit, and with `weight` the `tension` \
                 ρ_L g m/capillary. The part of the surface next to the support is left out of the fit. Jackknife \
                 errors.",
-        keys: &[
-            Key {
-                about: "The vertical, along an edge of the box at right angles to the others.",
-                need: Need::Default("the last direction"),
-                ..AXIS
-            },
-            key(
-                "apex",
-                ValueKind::Words("`\"low\"` or `\"high\"`"),
-                Need::Default("`\"low\"`"),
-                "At which end of the axis the drop ends; it hangs from the other.",
-                "\"high\"",
-            ),
-            DISTANCE,
-            key(
-                "bins",
-                ValueKind::Words("array of two whole numbers from 4 to 2000"),
-                Need::Default("as many as make them 0.25 wide, or a little less"),
-                "Bins outwards, up to half the box, and along the axis.",
-                "[20, 40]",
-            ),
-            key(
-                "isodensity",
-                ValueKind::Words("positive number"),
-                Need::Default("half the density of the liquid"),
-                "The density of the surface.",
-                "3.0",
-            ),
-            key(
-                "part",
-                ValueKind::Words("number from 0.1 to 1"),
-                Need::Default("0.8"),
-                "The part of the height of the surface, from the apex, that is fitted.",
-                "0.7",
-            ),
-            key(
-                "weight",
-                ValueKind::Words("positive number"),
-                Need::Default("none"),
-                "The force g m on a particle along the axis.",
-                "0.02",
-            ),
-        ],
+        keys: keys! {
+            use ALONG;
+            "apex": ValueKind::Words("`\"low\"` or `\"high\"`"), Need::Default("`\"low\"`"),
+                "At which end of the axis the drop ends; it hangs from the other."
+                => "\"high\"";
+            use DISTANCE;
+            "bins": ValueKind::Words("array of two whole numbers from 4 to 2000"), Need::Default("as many as make them 0.25 wide, or a little less"),
+                "Bins outwards, up to half the box, and along the axis."
+                => "[20, 40]";
+            "isodensity": ValueKind::Words("positive number"), Need::Default("half the density of the liquid"),
+                "The density of the surface."
+                => "3.0";
+            "part": ValueKind::Words("number from 0.1 to 1"), Need::Default("0.8"),
+                "The part of the height of the surface, from the apex, that is fitted."
+                => "0.7";
+            "weight": ValueKind::Words("positive number"), Need::Default("none"),
+                "The force g m on a particle along the axis."
+                => "0.02";
+        },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Pendant, FileError> {

@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{BINS, Need, Table, ValueKind, key};
+use crate::keys::{BINS, Need, PLAIN, Table, ValueKind, key};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -60,8 +60,6 @@ impl Meter for Poiseuille {
     const TABLE: Table = Table {
         path: "poiseuille",
         title: "shear viscosity (periodic Poiseuille flow)",
-        array: false,
-        forms: ("", &[]),
         about: "For a scene with a body force along `flow` that is reversed in the upper half of the box along `axis` \
                 (Backer et al., J. Chem. Phys. 122, 154503 (2005)): v = ρ a z (D − z)/2η in each half of width D, \
                 fitted to the mean velocity in bins by least squares. `viscosity`, and `deviation`, the root mean \
@@ -92,6 +90,7 @@ impl Meter for Poiseuille {
             ),
             BINS,
         ],
+        ..PLAIN
     };
 
     const OF_MOTION: bool = true;

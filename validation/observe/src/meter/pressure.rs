@@ -1,6 +1,6 @@
 use super::Meter;
 use crate::frame::Frame;
-use crate::keys::Table;
+use crate::keys::{PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -23,8 +23,6 @@ impl Meter for Pressure {
     const TABLE: Table = Table {
         path: "pressure",
         title: "pressure tensor",
-        array: false,
-        forms: ("", &[]),
         about: "Three tensors with the same limit as the time step goes to 0. `carried` is the flux of momentum that the \
                 integrator makes: Σ m u u with the velocities u that moved the particles in the step, and the virial \
                 Σ r_ij ⊗ F_ij of all pair forces where they acted, drag included; the random force, whose mean is 0, is \
@@ -36,7 +34,7 @@ impl Meter for Pressure {
                 `thermostat_every`, sample at steps of all phases. `configurational` is the scalar ρkT + tr W/(dV) of conservative \
                 forces with the kT of the stage: what configurations tell, without the scatter of velocities and their \
                 error at a time step, as a Monte Carlo run has it. In a dilute fluid it has much the least noise.",
-        keys: &[],
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

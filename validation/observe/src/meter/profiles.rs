@@ -3,7 +3,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, RECENTRE, Table};
+use crate::keys::{AXIS, BINS, PLAIN, RECENTRE, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -131,10 +131,9 @@ impl Quantity for Density {
     const TABLE: Table = Table {
         path: "density_profile",
         title: "density along an axis",
-        array: false,
-        forms: ("", &[]),
         about: "Number density in slices of the box: `density`, and `density_SPECIES` of each of several species.",
         keys: KEYS,
+        ..PLAIN
     };
 
     const MOMENTS: bool = false;
@@ -160,10 +159,9 @@ impl Quantity for Composition {
     const TABLE: Table = Table {
         path: "composition_profile",
         title: "composition along an axis",
-        array: false,
-        forms: ("", &[]),
         about: "`fraction_SPECIES`: the mean number of particles of a species in a slice over that of all.",
         keys: KEYS,
+        ..PLAIN
     };
 
     const MOMENTS: bool = false;
@@ -185,11 +183,10 @@ impl Quantity for Temperature {
     const TABLE: Table = Table {
         path: "temperature_profile",
         title: "temperature along an axis",
-        array: false,
-        forms: ("", &[]),
         about: "Kinetic kT in slices of the box, about the mean flow of the slice: \
                 (⟨Σ m v²⟩ − ⟨Σ m v⟩²/⟨Σ m⟩)/(d ⟨n⟩). Jackknife errors.",
         keys: KEYS,
+        ..PLAIN
     };
 
     const MOMENTS: bool = true;
@@ -215,10 +212,9 @@ impl Quantity for Velocity {
     const TABLE: Table = Table {
         path: "velocity_profile",
         title: "flow velocity along an axis",
-        array: false,
-        forms: ("", &[]),
         about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on.",
         keys: KEYS,
+        ..PLAIN
     };
 
     const OF_MOTION: bool = true;

@@ -2,12 +2,11 @@ use super::Meter;
 use super::distances::{Shells, count};
 use super::species_pairs::SpeciesPairs;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -33,8 +32,6 @@ impl Meter for Rdf {
     const TABLE: Table = Table {
         path: "rdf",
         title: "radial distribution functions",
-        array: false,
-        forms: ("", &[]),
         about: "Pairs in spherical shells (in two dimensions rings) over their number in an ideal gas of as many \
                 particles in the same box, N_A (N_A − 1)/2 or N_A N_B pairs in V: exactly 1 on average in an ideal \
                 gas. `g` of all particles, and `g_A_B` of each two of several species.",
@@ -46,6 +43,7 @@ impl Meter for Rdf {
                 "How many shells."
                 => "40";
         },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Rdf, FileError> {

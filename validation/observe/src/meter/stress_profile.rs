@@ -2,7 +2,7 @@ use super::Meter;
 use super::across::Across;
 use crate::flux::Carrier;
 use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, RECENTRE, Table};
+use crate::keys::{AXIS, BINS, PLAIN, RECENTRE, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -54,8 +54,6 @@ impl Meter for StressProfile {
     const TABLE: Table = Table {
         path: "stress_profile",
         title: "pressure tensor along an axis (Irving–Kirkwood)",
-        array: false,
-        forms: ("", &[]),
         about: "P_N and P_T in slices of the box: momentum carried by each particle, with the velocity that moved it, along \
                 its way in the step, and by the force of each pair, many-body part and drag included, along the \
                 straight line from i to j (Irving and Kirkwood, J. Chem. Phys. 18, 817 (1950)). That is the flux of \
@@ -65,6 +63,7 @@ impl Meter for StressProfile {
                 the particles in `normal`), `difference` P_N − P_T, and `integral` ∫(P_N − P_T) from the lower end of \
                 the axis. `stress_profile_integral` is the whole of it: the surface tension of all interfaces together.",
         keys: &[AXIS, BINS, RECENTRE],
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

@@ -2,12 +2,11 @@ use super::Meter;
 use super::species_pairs::SpeciesPairs;
 use super::waves::waves;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -42,8 +41,6 @@ impl Meter for StructureFactor {
     const TABLE: Table = Table {
         path: "structure_factor",
         title: "structure factors",
-        array: false,
-        forms: ("", &[]),
         about: "Direct sums over the wave vectors of the periodic box, averaged over shells of about equal |k|: `s` \
                 = ⟨|Σ exp(ik·r)|²⟩/N of all particles, and of each two of several species `s_A_B` = \
                 ⟨Re ρ_A(k) ρ_B(−k)⟩/√(N_A N_B) (Ashcroft and Langreth). Shells with many vectors keep an even \
@@ -59,6 +56,7 @@ impl Meter for StructureFactor {
                 "The most wave vectors in a shell."
                 => "6";
         },
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<StructureFactor, FileError> {

@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{AXIS, Need, Table, ValueKind, key};
+use crate::keys::{AXIS, Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -48,8 +48,6 @@ impl Meter for SurfaceTension {
     const TABLE: Table = Table {
         path: "surface_tension",
         title: "surface tension of a slab, by stress and by free energy",
-        array: false,
-        forms: ("", &[]),
         about: "`stress` is (L/m)(P_N − P_T) with the flux of momentum that the integrator makes in the whole box, as \
                 `carried` of `pressure`, m the number of interfaces, P_T the mean of the other directions. \
                 `stress_conservative` has the velocities at the ends of steps and conservative forces alone. Both have \
@@ -58,23 +56,16 @@ impl Meter for SurfaceTension {
                 with their box at constant volume to 1 ± ε times the area, the many-body energy is computed again, \
                 and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. The two \
                 routes agree in equilibrium, to the error of the time step. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
-        keys: &[
-            AXIS,
-            key(
-                "interfaces",
-                ValueKind::Words("whole number from 1 to 1000"),
-                Need::Default("2"),
-                "How many interfaces are normal to the axis.",
-                "1",
-            ),
-            key(
-                "perturbation",
-                ValueKind::Words("number from 1e-7 to 0.1"),
-                Need::Default("0.0001"),
-                "ε, the relative change of the area.",
-                "5e-4",
-            ),
-        ],
+        keys: keys! {
+            use AXIS;
+            "interfaces": ValueKind::Words("whole number from 1 to 1000"), Need::Default("2"),
+                "How many interfaces are normal to the axis."
+                => "1";
+            "perturbation": ValueKind::Words("number from 1e-7 to 0.1"), Need::Default("0.0001"),
+                "ε, the relative change of the area."
+                => "5e-4";
+        },
+        ..PLAIN
     };
 
     const NEEDS_FLUX: bool = true;

@@ -1,7 +1,7 @@
 use super::Meter;
 use crate::configurational;
 use crate::frame::Frame;
-use crate::keys::Table;
+use crate::keys::{PLAIN, Table};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
@@ -21,15 +21,13 @@ impl Meter for Temperature {
     const TABLE: Table = Table {
         path: "temperature",
         title: "temperature, kinetic and configurational",
-        array: false,
-        forms: ("", &[]),
         about: "`kinetic` is 2K/f, f being d(N − 1) in a periodic box and without walls or frozen particles \
                 (`output.md`). `configurational` is ⟨Σ F·F⟩/⟨−Σ ∇·F⟩ with the conservative forces alone \
                 (Rugh; Butler et al., J. Chem. Phys. 109, 6519 (1998)), with ∇·F from the second derivatives of ψ, \
                 kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \
                 At large time steps the two err differently. There is no configurational temperature for a force that is not a gradient, for one that jumps at its range (the linear kernel), and in boxes narrower \
                 than twice the range.",
-        keys: &[],
+        ..PLAIN
     };
 
     fn read(options: &Options) -> Result<Temperature, FileError> {

@@ -1,12 +1,11 @@
 use super::Meter;
 use super::msd::Clock;
 use crate::frame::Frame;
-use crate::keys::{Need, Table, ValueKind};
+use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::document::keys::keys;
 use psidpd_core::engine::Want;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -79,8 +78,6 @@ impl Meter for Viscosity {
     const TABLE: Table = Table {
         path: "viscosity",
         title: "shear viscosity (Green–Kubo)",
-        array: false,
-        forms: ("", &[]),
         about: "η(t) = V/kT ∫₀ᵗ C(t′) dt′ with the autocorrelation C of the shear stress of all forces, drag and noise \
                 included, averaged over all shears: C = ⟨P:P(t)⟩/((d − 1)(d + 2)) of the traceless tensor. Sampled \
                 at every step and summed by the trapezoid rule, this is Einstein and Helfand's slope of the square \
@@ -94,6 +91,7 @@ impl Meter for Viscosity {
                 "The longest time, in steps. A checkpoint holds 128 times as many numbers."
                 => "100";
         },
+        ..PLAIN
     };
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;

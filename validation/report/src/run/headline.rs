@@ -2,9 +2,9 @@
 
 use super::super::quantity::with_error;
 use super::super::{Item, Section, Table};
-use super::observables::Observable;
 use super::series::{self, last_stage};
 use psidpd_formats::{About, Expected};
+use psidpd_observe::Observation;
 use psidpd_observe::drift::drift;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::Serialize;
@@ -58,16 +58,16 @@ pub fn gather(
     about: Option<&About>,
     particles: Option<f64>,
     table: Option<&series::Table>,
-    observables: &[Observable],
+    observables: &[Observation],
 ) -> Headline {
     let stage = about.and_then(|a| a.stages.last());
     let mut all = Headline::default();
-    let of_stage = |o: &&Observable| stage.is_none_or(|s| o.stage == s.name) || o.stage.is_empty();
+    let of_stage = |o: &&Observation| stage.is_none_or(|s| o.stage == s.name) || o.stage.is_empty();
     let scalar = |from: &[(&str, &str)]| {
         from.iter().find_map(|(name, column)| {
             let found = observables.iter().filter(of_stage).find(|o| o.name == *name)?;
-            let (value, error) = found.scalar(column)?;
-            Some((value, error, format!("{name}.{column}")))
+            let found = found.scalar(column)?;
+            Some((found.value, Some(found.error), format!("{name}.{column}")))
         })
     };
     let d = about.map_or(3, |a| a.dimensions);
@@ -175,8 +175,8 @@ pub fn gather(
     }
     all.notes.extend(about.and_then(|a| image_of_drop(a, &all)));
     for o in observables.iter().filter(of_stage) {
-        if let Some(text) = o.note.as_deref().filter(|text| !text.is_empty() && o.x.is_none()) {
-            all.notes.push(format!("{}: {text}", o.name));
+        if !o.note.is_empty() && o.x.is_none() {
+            all.notes.push(format!("{}: {}", o.name, o.note));
         }
     }
     all
@@ -242,8 +242,8 @@ impl Headline {
             self.notes.iter().for_each(|n| notes.push([n.clone()]));
             items.push(Item::Table(notes));
         }
-        items.push(Item::Prose("Errors are one standard deviation of the mean.".into()));
-        Some(Section { heading: "Results".into(), items })
+        items.push(Item::prose("Errors are one standard deviation of the mean."));
+        Some(Section::new("Results", items))
     }
 }
 
@@ -290,7 +290,7 @@ mod tests {
         );
     }
 
-    fn drop(radius: f64) -> Observable {
+    fn drop(radius: f64) -> Observation {
         let column = |name: &str, value: f64| serde_json::json!({"name": name, "unit": "length", "values": [value], "errors": [0.1]});
         serde_json::from_value(serde_json::json!({
             "name": "drop", "kind": "scalar", "note": "It percolates.",

@@ -16,7 +16,6 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 pub use headline::{Headline, HeadlineValue, headline};
-pub use observables::{Observable, ObservableAxis, ObservableColumn};
 pub use series::Table as SeriesTable;
 
 /// The files that a report is made from, with their descriptions.
@@ -84,9 +83,8 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
         sections.insert(0, section);
     }
     if !notes.is_empty() {
-        let text = notes.join("\n\n");
-        let items = vec![Item::Prose(text)];
-        sections.insert(0, Section { heading: "What could not be read".into(), items });
+        let items = vec![Item::Prose(notes.join("\n\n"))];
+        sections.insert(0, Section::new("What could not be read", items));
     }
     Ok(Report {
         title,
@@ -132,7 +130,7 @@ fn files_section(folder: &Path) -> Section {
     if !missing.is_empty() {
         items.push(Item::Prose(format!("Not there: {}.", missing.join("; "))));
     }
-    Section { heading: "Files".into(), items }
+    Section::new("Files", items)
 }
 
 fn size(bytes: u64) -> String {

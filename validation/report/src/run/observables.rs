@@ -5,78 +5,12 @@ use super::super::quantity::with_error;
 use super::super::text::typeset;
 use super::super::{Item, Plot, Section, Series, Style, Table};
 use psidpd_formats::FormatError;
-use serde::Deserialize;
+use psidpd_observe::observation::Column;
+use psidpd_observe::{Kind, Observation};
 use std::path::Path;
 
-/// An observable of a stage, as in `observables.json`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Observable {
-    /// The name for machines.
-    pub name: String,
-    /// The name for people.
-    #[serde(default)]
-    pub title: String,
-    #[serde(default)]
-    pub stage: String,
-    /// The kind is scalar, profile, curve, series or field.
-    #[serde(default)]
-    pub kind: String,
-    /// The abscissa; `None` for scalars and fields.
-    #[serde(default)]
-    pub x: Option<ObservableAxis>,
-    /// For a field the first columns are the coordinates of its points.
-    #[serde(default)]
-    pub columns: Vec<ObservableColumn>,
-    /// The number of samples in the means.
-    #[serde(default)]
-    pub samples: Option<f64>,
-    /// Remarks for readers.
-    #[serde(default)]
-    pub note: Option<String>,
-}
-
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct ObservableAxis {
-    pub name: String,
-    /// The unit; empty for a pure number.
-    #[serde(default)]
-    pub unit: Option<String>,
-    pub values: Vec<Option<f64>>,
-}
-
-/// Values with errors.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct ObservableColumn {
-    pub name: String,
-    /// The unit; empty for a pure number.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// Unknown values are null.
-    #[serde(deserialize_with = "one_or_many")]
-    pub values: Vec<Option<f64>>,
-    /// One standard deviation of each value.
-    #[serde(default, deserialize_with = "one_or_many")]
-    pub errors: Vec<Option<f64>>,
-}
-
-/// Reads a single number as a list of one number, and null as an empty list.
-fn one_or_many<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<Option<f64>>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum Values {
-        Many(Vec<Option<f64>>),
-        One(f64),
-        None(()),
-    }
-    Ok(match Values::deserialize(from)? {
-        Values::Many(many) => many,
-        Values::One(one) => vec![Some(one)],
-        Values::None(()) => Vec::new(),
-    })
-}
-
 /// Reads the list; `None` if the file does not exist.
-pub fn read(path: &Path) -> Result<Option<Vec<Observable>>, FormatError> {
+pub fn read(path: &Path) -> Result<Option<Vec<Observation>>, FormatError> {
     let Some(text) = super::text(path)? else { return Ok(None) };
     serde_json::from_str(&text).map(Some).map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
 }
@@ -84,52 +18,53 @@ pub fn read(path: &Path) -> Result<Option<Vec<Observable>>, FormatError> {
 /// A curve with more points is a line with a band; one with fewer is points with bars.
 const SINGLE_POINTS: usize = 40;
 
-pub fn section(observables: Option<&[Observable]>) -> Section {
-    let heading = "Observables".to_owned();
+pub fn section(observables: Option<&[Observation]>) -> Section {
+    let heading = "Observables";
     let Some(all) = observables.filter(|o| !o.is_empty()) else {
         let text = match observables {
             None => "There is no observables.json: the scene asks for no observables.",
             Some(_) => "observables.json is empty.",
         };
-        return Section { heading, items: vec![Item::Prose(text.into())] };
+        return Section::new(heading, vec![Item::prose(text)]);
     };
-    let mut items = vec![Item::Prose(
-        "Errors are one standard deviation of the mean; bands and bars show them.".to_owned(),
-    )];
+    let mut items =
+        vec![Item::prose("Errors are one standard deviation of the mean; bands and bars show them.")];
     let scalars = scalar_table(all);
     if !scalars.rows.is_empty() {
         items.push(Item::Table(scalars));
     }
-    for observable in all.iter().filter(|o| !o.is_scalar()) {
+    for observable in all.iter().filter(|o| !is_scalar(o)) {
         if observable.x.is_some() {
             draw_curve(observable, &mut items);
         } else {
             draw_field(observable, &mut items);
         }
     }
-    Section { heading, items }
+    Section::new(heading, items)
 }
 
-fn scalar_table(all: &[Observable]) -> Table {
+fn scalar_table(all: &[Observation]) -> Table {
     let mut table = Table::new(["observable", "value ± error", "unit", "stage", "samples", "note"]);
-    for o in all.iter().filter(|o| o.is_scalar()) {
+    for o in all.iter().filter(|o| is_scalar(o)) {
+        let samples = o.samples.to_string();
         if o.columns.is_empty() {
-            let note = o.note.clone().unwrap_or_default();
-            table.push([o.label(), "—".into(), String::new(), o.stage.clone(), o.samples(), note]);
+            table.push([
+                label(o),
+                "—".into(),
+                String::new(),
+                o.stage.clone(),
+                samples.clone(),
+                o.note.clone(),
+            ]);
         }
         for (k, c) in o.columns.iter().enumerate() {
             let several = o.columns.len() > 1 || c.values.len() > 1;
-            let label = if several { format!("{}: {}", o.label(), c.name) } else { o.label() };
-            let values: Vec<String> = c
-                .values
-                .iter()
-                .enumerate()
-                .map(|(i, v)| with_error(v.unwrap_or(f64::NAN), c.errors.get(i).copied().flatten()))
-                .collect();
-            let note = if k == 0 { o.note.clone().unwrap_or_default() } else { String::new() };
-            let unit = c.unit.as_deref().map_or(String::new(), typeset);
+            let label = if several { format!("{}: {}", label(o), c.name) } else { label(o) };
+            let values: Vec<String> =
+                c.values.iter().enumerate().map(|(i, v)| with_error(*v, c.errors.get(i).copied())).collect();
+            let note = if k == 0 { o.note.clone() } else { String::new() };
             let value = if values.is_empty() { "—".into() } else { values.join(", ") };
-            table.push([label, value, unit, o.stage.clone(), o.samples(), note]);
+            table.push([label, value, typeset(&c.unit), o.stage.clone(), samples.clone(), note]);
         }
     }
     use super::super::Align::{Left, Right};
@@ -137,60 +72,31 @@ fn scalar_table(all: &[Observable]) -> Table {
     table
 }
 
-impl Observable {
-    /// The value and error of a column, if the observable is a single number.
-    pub fn scalar(&self, column: &str) -> Option<(f64, Option<f64>)> {
-        let found = self.columns.iter().find(|c| self.is_scalar() && c.name == column)?;
-        Some(((*found.values.first()?)?, found.errors.first().copied().flatten()))
-    }
+fn is_scalar(o: &Observation) -> bool {
+    o.x.is_none() && o.kind != Kind::Field
+}
 
-    fn is_scalar(&self) -> bool {
-        self.x.is_none() && self.kind != "field"
-    }
+fn label(o: &Observation) -> String {
+    if o.title.is_empty() { o.name.clone() } else { o.title.clone() }
+}
 
-    fn label(&self) -> String {
-        if self.title.is_empty() { self.name.clone() } else { self.title.clone() }
-    }
+fn caption(o: &Observation) -> String {
+    let stage = if o.stage.is_empty() { String::new() } else { format!("Stage “{}”, ", o.stage) };
+    format!("{stage}{} samples. {}", o.samples, o.note).trim().to_owned()
+}
 
-    fn samples(&self) -> String {
-        self.samples.map_or(String::new(), |n| n.to_string())
-    }
-
-    fn caption(&self) -> String {
-        let mut parts = Vec::new();
-        if !self.stage.is_empty() {
-            parts.push(format!("Stage “{}”", self.stage));
-        }
-        if let Some(n) = self.samples {
-            parts.push(format!("{n} samples"));
-        }
-        let mut caption = parts.join(", ");
-        if !caption.is_empty() {
-            caption.push('.');
-        }
-        if let Some(note) = self.note.as_deref().filter(|n| !n.is_empty()) {
-            caption.push(' ');
-            caption.push_str(note);
-        }
-        caption.trim().to_owned()
+/// A name with its unit, unless it is a pure number.
+fn named(name: &str, unit: &str) -> String {
+    match unit {
+        "" | "1" => name.to_owned(),
+        unit => format!("{name} [{}]", typeset(unit)),
     }
 }
 
-fn named(name: &str, unit: Option<&String>) -> String {
-    match unit.map(String::as_str) {
-        None | Some("" | "1") => name.to_owned(),
-        Some(unit) => format!("{name} [{}]", typeset(unit)),
-    }
-}
-
-fn numbers(values: &[Option<f64>]) -> Vec<f64> {
-    values.iter().map(|v| v.unwrap_or(f64::NAN)).collect()
-}
-
-fn figure(o: &Observable, svg: Result<String, super::ReportError>) -> Item {
-    match svg {
-        Ok(svg) => Item::Figure { svg, caption: o.caption() },
-        Err(error) => Item::Prose(format!("{}: {error}", o.label())),
+fn figure(o: &Observation, plot: Result<String, super::ReportError>) -> Item {
+    match plot {
+        Ok(svg) => Item::Figure { svg, caption: caption(o) },
+        Err(error) => Item::Prose(format!("{}: {error}", label(o))),
     }
 }
 
@@ -198,30 +104,23 @@ fn figure(o: &Observable, svg: Result<String, super::ReportError>) -> Item {
 const COORDINATES: [&str; 4] = ["x", "y", "z", "r"];
 
 /// Draws values on a grid as a map, and other values as points.
-fn draw_field(o: &Observable, items: &mut Vec<Item>) {
+fn draw_field(o: &Observation, items: &mut Vec<Item>) {
     let coordinates = o.columns.iter().take_while(|c| COORDINATES.contains(&c.name.as_str())).count();
     let [first, second, ..] = o.columns.as_slice() else {
         let error = super::ReportError::Plot("a field needs columns of coordinates".into());
         return items.push(figure(o, Err(error)));
     };
-    let (xs, ys) = (numbers(&first.values), numbers(&second.values));
-    let axes = [first, second].map(|c| named(&c.name, c.unit.as_ref()));
-    let grid = if coordinates == 2 { Grid::of(&xs, &ys) } else { None };
+    let (xs, ys) = (&first.values, &second.values);
+    let axes = [first, second].map(|c| named(&c.name, &c.unit));
+    let grid = if coordinates == 2 { Grid::of(xs, ys) } else { None };
     let values = &o.columns[coordinates.clamp(1, 2)..];
     let Some(grid) = grid.filter(|_| !values.is_empty()) else {
-        let series = Series {
-            name: String::new(),
-            points: xs.into_iter().zip(ys).collect(),
-            errors: (!second.errors.is_empty()).then(|| numbers(&second.errors)),
-            style: Style::Points,
-        };
-        let [x_label, y_label] = axes;
-        let plot = Plot { title: o.label(), x_label, y_label, series: vec![series], ..Plot::default() };
-        return items.push(figure(o, plot.render()));
+        let series = with_errors(second, xs, "", Style::Points);
+        return items.push(figure(o, Plot::new(label(o), axes, vec![series]).render()));
     };
     for c in values {
-        let title = if values.len() > 1 { format!("{}: {}", o.label(), c.name) } else { o.label() };
-        let (values, label) = (grid.sort(&numbers(&c.values)), named(&c.name, c.unit.as_ref()));
+        let title = if values.len() > 1 { format!("{}: {}", label(o), c.name) } else { label(o) };
+        let (values, label) = (grid.sort(&c.values), named(&c.name, &c.unit));
         let size = [grid.x.len(), grid.y.len()];
         let ranges = [ends(&grid.x), ends(&grid.y)];
         let map = field_of_values(&title, &label, axes.clone(), ranges, size, &values);
@@ -264,47 +163,31 @@ impl Grid {
     }
 }
 
-fn draw_curve(o: &Observable, items: &mut Vec<Item>) {
+fn draw_curve(o: &Observation, items: &mut Vec<Item>) {
     let Some(x) = &o.x else { return };
     let mut push = |svg| items.push(figure(o, svg));
-    let xs = numbers(&x.values);
     // Each unit gets its own plot, because a shared axis would be meaningless.
-    let mut units: Vec<Option<&String>> = Vec::new();
-    for c in &o.columns {
-        let unit = c.unit.as_ref().filter(|u| !u.is_empty() && *u != "1");
-        if !units.contains(&unit) {
-            units.push(unit);
-        }
-    }
+    let unit_of = |c: &Column| if c.unit == "1" { String::new() } else { c.unit.clone() };
+    let units = crate::distinct(o.columns.iter().map(unit_of));
     if units.is_empty() {
         push(Err(super::ReportError::Plot("there are no values".into())));
     }
-    let style = match o.kind.as_str() {
-        "series" => Style::Line,
-        _ if xs.len() <= SINGLE_POINTS => Style::Points,
-        _ => Style::Line,
-    };
+    let is_line = o.kind == Kind::Series || x.values.len() > SINGLE_POINTS;
+    let style = if is_line { Style::Line } else { Style::Points };
     for unit in &units {
-        let of_unit = |c: &&ObservableColumn| c.unit.as_ref().filter(|u| !u.is_empty() && *u != "1") == *unit;
-        let columns: Vec<&ObservableColumn> = o.columns.iter().filter(of_unit).collect();
+        let columns: Vec<&Column> = o.columns.iter().filter(|c| unit_of(c) == *unit).collect();
         let single = columns.len() == 1;
-        let y_label =
-            if single { named(&columns[0].name, *unit) } else { named("", *unit).trim().to_owned() };
-        let series = columns.iter().map(|c| Series {
-            name: if single { String::new() } else { c.name.clone() },
-            points: xs.iter().copied().zip(numbers(&c.values)).collect(),
-            errors: (!c.errors.is_empty()).then(|| numbers(&c.errors)),
-            style,
-        });
-        let plot = Plot {
-            title: o.label(),
-            x_label: named(&x.name, x.unit.as_ref()),
-            y_label,
-            series: series.collect(),
-            ..Plot::default()
-        };
-        push(plot.render());
+        let y_label = if single { named(&columns[0].name, unit) } else { named("", unit).trim().to_owned() };
+        let name = |c: &Column| if single { String::new() } else { c.name.clone() };
+        let series = columns.iter().map(|c| with_errors(c, &x.values, name(c), style)).collect();
+        push(Plot::new(label(o), [named(&x.name, &x.unit), y_label], series).render());
     }
+}
+
+/// A column against `x`, with its errors if it has any.
+fn with_errors(c: &Column, x: &[f64], name: impl Into<String>, style: Style) -> Series {
+    let errors = (!c.errors.is_empty()).then(|| c.errors.clone());
+    Series { errors, ..Series::new(name, x.iter().copied().zip(c.values.iter().copied()).collect(), style) }
 }
 
 /// The outer edges of evenly spaced cells whose middles are given.

@@ -48,8 +48,8 @@ impl Table {
 const POINTS: usize = 1200;
 
 pub fn section(table: Option<&Table>, about: Option<&About>, particles: Option<usize>) -> Section {
-    let heading = "Series".to_owned();
-    let say = |text: &str| Section { heading: heading.clone(), items: vec![Item::Prose(text.into())] };
+    let heading = "Series";
+    let say = |text: &str| Section::new(heading, vec![Item::prose(text)]);
     let Some(table) = table else {
         return say("There is no thermo.csv: the scene asks for none, or the run has not begun.");
     };
@@ -60,12 +60,12 @@ pub fn section(table: Option<&Table>, about: Option<&About>, particles: Option<u
     let mut items = vec![Item::Prose(curves.describe())];
     items.push(Item::Table(curves.means(particles)));
     for (plot, caption) in curves.plots(particles) {
-        match plot.render() {
-            Ok(svg) => items.push(Item::Figure { svg, caption }),
-            Err(error) => items.push(Item::Prose(format!("{}: {error}", plot.title))),
-        }
+        items.push(
+            Item::figure(&plot, caption)
+                .unwrap_or_else(|error| Item::Prose(format!("{}: {error}", plot.title))),
+        );
     }
-    Section { heading, items }
+    Section::new(heading, items)
 }
 
 /// The rows of the last stage that has any.
@@ -212,11 +212,7 @@ impl<'a> Curves<'a> {
             for (name, label) in names {
                 // In two dimensions all components that involve z are zero.
                 if let Some(values) = self.take(name).filter(|v| v.iter().any(|p| *p != 0.0)) {
-                    plot.series.push(Series {
-                        name: label.into(),
-                        points: self.running(values),
-                        ..Series::default()
-                    });
+                    plot.series.push(Series::new(label, self.running(values), Style::Line));
                 }
             }
             if !plot.series.is_empty() {
@@ -287,30 +283,15 @@ impl<'a> Curves<'a> {
         } else {
             Vec::new()
         };
-        Plot {
-            title: title.into(),
-            x_label: self.x.0.into(),
-            y_label: label.into(),
-            marks,
-            ..Plot::default()
-        }
+        Plot { marks, ..Plot::new(title, [self.x.0, label], Vec::new()) }
     }
 
     /// Plots single rows and their running mean.
     fn plot(&self, title: &str, label: &str, values: &[f64]) -> Plot {
         let mut plot = self.empty(title, label);
         let rows: Vec<(f64, f64)> = self.x.1.iter().copied().zip(values.iter().copied()).collect();
-        plot.series.push(Series {
-            name: "rows".into(),
-            points: thin(&rows),
-            errors: None,
-            style: Style::Faint,
-        });
-        plot.series.push(Series {
-            name: "running mean".into(),
-            points: self.running(values),
-            ..Series::default()
-        });
+        plot.series.push(Series::new("rows", thin(&rows), Style::Faint));
+        plot.series.push(Series::new("running mean", self.running(values), Style::Line));
         plot
     }
 

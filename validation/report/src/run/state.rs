@@ -52,9 +52,8 @@ impl State {
 pub fn section(folder: &Path, state: Option<&State>, about: Option<&About>) -> Section {
     let mut items = Vec::new();
     match state {
-        None => items.push(Item::Prose(
-            "There is no final.data, dump or XYZ file that could be read: no picture of the particles."
-                .into(),
+        None => items.push(Item::prose(
+            "There is no final.data, dump or XYZ file that could be read: no picture of the particles.",
         )),
         Some(state) => figures(state, about, &mut items),
     }
@@ -67,14 +66,13 @@ pub fn section(folder: &Path, state: Option<&State>, about: Option<&About>) -> S
             ),
             caption: "The run, from the pictures in snapshots/.".into(),
         }),
-        Ok(None) => items.push(Item::Prose(
+        Ok(None) => items.push(Item::prose(
             "There are no snapshots along the run to be shown as a film: [output] snapshot = N makes one every \
-             N steps."
-                .into(),
+             N steps.",
         )),
         Err(error) => items.push(Item::Prose(format!("No film: {error}"))),
     }
-    Section { heading: "Pictures".into(), items }
+    Section::new("Pictures", items)
 }
 
 fn figures(state: &State, about: Option<&About>, items: &mut Vec<Item>) {

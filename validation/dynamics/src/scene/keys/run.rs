@@ -4,14 +4,12 @@ use super::scene::{
     GRADIENT, INTEGRATOR, LAMBDA, MAX_MOVE, NOISE, SWEEPS, THERMOSTAT_EVERY, THERMOSTAT_STEP,
 };
 use super::ValueKind::*;
-use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
+use super::{Key, OPTIONAL, PLAIN, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
 
 pub const BODY_FORCE: Table = Table {
     path: "body_force",
-    title: "",
     array: true,
-    forms: ("", &[]),
     about: "An external acceleration. A scene may have several, which add up. Potential energies and virials do \
             not include it.",
     keys: &[
@@ -31,6 +29,7 @@ pub const BODY_FORCE: Table = Table {
              [[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n\
              [[part]]\nshape = \"rest\"\ndensity = 0.1"),
     ],
+    ..PLAIN
 };
 
 const STAGE_INTEGRATOR: Key = Key {
@@ -83,9 +82,7 @@ const STAGE_MAX_MOVE: Key = Key {
 
 pub const STAGE: Table = Table {
     path: "stage",
-    title: "",
     array: true,
-    forms: ("", &[]),
     about: "The stages of a run, one after the other, each with its own conditions; they replace `steps`.",
     keys: &[
         key("name", Text, REQUIRED,
@@ -118,13 +115,11 @@ pub const STAGE: Table = Table {
             "Whether body forces act; true if left out.",
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\n[[stage]]\nname = \"settle\"\nsteps = 1000\nbody_forces = false"),
     ],
+    ..PLAIN
 };
 
 pub const OUTPUT: Table = Table {
     path: "output",
-    title: "",
-    array: false,
-    forms: ("", &[]),
     about: "What a run writes in addition to its final state.",
     keys: &[
         key("thermo", Count, OPTIONAL,
@@ -141,4 +136,5 @@ pub const OUTPUT: Table = Table {
              left out, 0 for a checkpoint only at the end.",
             "[output]\ncheckpoint = 10000"),
     ],
+    ..PLAIN
 };

@@ -1,7 +1,7 @@
 //! Keys of the top level, the box and the masses.
 
 use super::ValueKind::*;
-use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
+use super::{Key, OPTIONAL, PLAIN, REQUIRED, Table, key, names};
 use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use crate::scene::domain::BOUNDARIES;
 use psidpd_core::engine::Precision;
@@ -52,9 +52,6 @@ pub(super) const MAX_MOVE: Key = key("max_move", Positive, OPTIONAL,
 
 pub const TOP: Table = Table {
     path: "",
-    title: "",
-    array: false,
-    forms: ("", &[]),
     about: "The fluid, its temperature, the box and the length of the run. A scene needs a model, kT, a box, \
             particles (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
     keys: &[
@@ -95,13 +92,11 @@ pub const TOP: Table = Table {
         SWEEPS,
         MAX_MOVE,
     ],
+    ..PLAIN
 };
 
 pub const BOX: Table = Table {
     path: "box",
-    title: "",
-    array: false,
-    forms: ("", &[]),
     about: "The box, if it needs more than lengths.",
     keys: &[
         key("lengths", Lengths, OPTIONAL,
@@ -115,13 +110,12 @@ pub const BOX: Table = Table {
              particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
     ],
+    ..PLAIN
 };
 
 pub const MASSES: Table = Table {
     path: "masses",
-    title: "",
-    array: false,
-    forms: ("", &[]),
     about: "Masses of the species; 1, or the mass in the data file, for species left out.",
     keys: &[key("SPECIES", Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
+    ..PLAIN
 };

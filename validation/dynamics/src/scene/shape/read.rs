@@ -4,21 +4,12 @@ use super::Shape;
 use crate::scene::number::{axis, vector};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
+pub use psidpd_observe::options::FACES;
 
 /// Share of the box by which a region may reach beyond it, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
 pub const SHAPES: &[&str] = &["box", "slab", "layer", "sphere", "cylinder", "rest"];
-
-/// The names of the faces of a box: axis, and whether the face is the upper one.
-pub const FACES: [(&str, (usize, bool)); 6] = [
-    ("xlo", (0, false)),
-    ("xhi", (0, true)),
-    ("ylo", (1, false)),
-    ("yhi", (1, true)),
-    ("zlo", (2, false)),
-    ("zhi", (2, true)),
-];
 
 pub struct Shapes<'a> {
     /// Number of dimensions, 2 or 3.

@@ -2,14 +2,14 @@
 
 use super::IMMISCIBLE;
 use crate::ExperimentError;
-use crate::papers::case::{Outcome, bare, exact, profile};
+use crate::machine::peak_kilobytes;
+use crate::papers::case::{Reproduction, bare, exact, profile};
 use crate::papers::context::{Change, Context};
 
 const SMALL: &str = include_str!("../../../../scenes/drop-collision.toml");
 const FULL: &str = include_str!("../../../../scenes/full/drop-collision.toml");
 
-pub fn tension(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn tension(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let [edge, height] = context.pick([6.0, 12.0], [10.0, 20.0]);
     let scene = format!(
         "kT = 1.0\nseed = 1\nbox = [{edge:?}, {edge:?}, {height:?}]\ndensity = 10.0\ndt = 0.01\nequilibrate = {}\nsteps = {}\n\
@@ -26,11 +26,10 @@ pub fn tension(context: &Context) -> Result<Outcome, ExperimentError> {
     outcome.equal("tension by the free energy", observed.scalar("surface_tension", "free_energy"), 28.0, 0.5);
     let fraction = profile(&observed, "composition_profile", "fraction_D");
     outcome.plot("fraction", "Two liquids", ["z", "fraction of D"], &[("fraction", fraction)], &[]);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn merge(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn merge(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[])?;
     let series = |column| profile(&observed, "clusters_series", column);
     let largest = series("largest");
@@ -46,11 +45,10 @@ pub fn merge(context: &Context) -> Result<Outcome, ExperimentError> {
         &[],
         &[("largest", bare(&largest))],
     );
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn size(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn size(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let box_: toml_edit::Value =
         [60.0, 60.0, 104.1667].into_iter().map(|l| l / 100_f64.cbrt()).collect::<toml_edit::Array>().into();
     let changes: &[Change] = &[(&["box"], box_)];
@@ -64,17 +62,11 @@ pub fn size(context: &Context) -> Result<Outcome, ExperimentError> {
     let seconds = begun.elapsed().as_secs_f64();
     let particles = context.pick(3.75e4, 3.75e6);
     // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.
-    let status = std::path::PathBuf::from("/proc/self/status");
-    let text =
-        std::fs::read_to_string(&status).map_err(|source| ExperimentError::Io { path: status, source })?;
-    let peak = text
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<f64>().ok());
-    outcome.at_most("memory, GB", exact(peak.unwrap_or(f64::NAN) / 1e6), 4.0);
+    outcome.at_most("memory, GB", exact(peak_kilobytes()? as f64 / 1e6), 4.0);
     outcome.at_most(
         "seconds for a step of 3.75 million particles",
         exact(seconds / 20.0 * 3.75e6 / particles),
         60.0,
     );
-    Ok(outcome)
+    Ok(())
 }

@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::STANDARD;
-use crate::papers::case::{Outcome, exact};
+use crate::papers::case::{Reproduction, exact};
 use crate::papers::context::Context;
 
 fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, ExperimentError> {
@@ -17,8 +17,7 @@ fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, Experim
     context.scene(&format!("{integrator}-{dt}"), STANDARD, &scene)
 }
 
-pub fn compare(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn compare(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let fine = [run(context, "lowe-andersen", 0.01)?, run(context, "velocity-verlet", 0.01)?];
     outcome.equal("kinetic temperature", fine[0].temperature(), 1.0, 0.0);
     let [redrawn, dragged] = fine.map(|observed| observed.pressure());
@@ -31,5 +30,5 @@ pub fn compare(context: &Context) -> Result<Outcome, ExperimentError> {
         exact(redrawn / dragged),
         1.0,
     );
-    Ok(outcome)
+    Ok(())
 }

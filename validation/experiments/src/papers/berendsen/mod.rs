@@ -4,41 +4,39 @@ mod collision;
 mod compressibility;
 mod lowe_andersen;
 
-use super::Case;
+use super::Paper;
 use super::context::Fluid;
 use crate::models::STANDARD;
 
-const PAPER: &str = "H. J. C. Berendsen, Simulating the Physical World, Cambridge (2007), chapter 11";
 const IMMISCIBLE: &str = include_str!("../../../../models/drop-collision.toml");
 
-const fn case(id: &'static str, what: &'static str, run: super::Run) -> Case {
-    Case { id, paper: PAPER, what, run }
-}
-
-pub const CASES: &[Case] = &[
-    case(
-        "berendsen-alpha",
-        "standard DPD: p = rho kT + alpha a rho^2 with alpha = 0.101(1)",
-        compressibility::alpha,
-    ),
-    case(
-        "berendsen-water",
-        "standard DPD: a rho = 75 kT has the compressibility of water, 1/kappa = 16",
-        compressibility::water,
-    ),
-    case(
-        "berendsen-lowe-andersen",
-        "Lowe and Andersen's thermostat: temperature and pressure",
-        lowe_andersen::compare,
-    ),
-    case("berendsen-tension", "like 14.5, unlike 41.5, density 10: tension 28", collision::tension),
-    case("berendsen-fig11.1", "two drops that meet at a Weber number of 4 become one", collision::merge),
-    case(
-        "berendsen-size",
-        "3.75 million particles (quick: a hundredth): memory of a few steps",
-        collision::size,
-    ),
-];
+pub const PAPER: Paper = (
+    "H. J. C. Berendsen, Simulating the Physical World, Cambridge (2007), chapter 11",
+    &[
+        (
+            "berendsen-alpha",
+            "standard DPD: p = rho kT + alpha a rho^2 with alpha = 0.101(1)",
+            compressibility::alpha,
+        ),
+        (
+            "berendsen-water",
+            "standard DPD: a rho = 75 kT has the compressibility of water, 1/kappa = 16",
+            compressibility::water,
+        ),
+        (
+            "berendsen-lowe-andersen",
+            "Lowe and Andersen's thermostat: temperature and pressure",
+            lowe_andersen::compare,
+        ),
+        ("berendsen-tension", "like 14.5, unlike 41.5, density 10: tension 28", collision::tension),
+        ("berendsen-fig11.1", "two drops that meet at a Weber number of 4 become one", collision::merge),
+        (
+            "berendsen-size",
+            "3.75 million particles (quick: a hundredth): memory of a few steps",
+            collision::size,
+        ),
+    ],
+);
 
 fn fluid() -> Fluid<'static> {
     Fluid { model: STANDARD, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" }

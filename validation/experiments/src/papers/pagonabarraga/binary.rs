@@ -3,7 +3,7 @@
 use super::BINARY;
 use crate::ExperimentError;
 use crate::bulk::Observed;
-use crate::papers::case::{Outcome, bare, exact, layers, profile, ratio};
+use crate::papers::case::{Reproduction, bare, exact, layers, profile, ratio};
 use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 
@@ -105,8 +105,7 @@ fn without_waves([wide, narrow]: [Measured; 2]) -> Measured {
     Measured { value, error: (0.5 * error / value).min(error.sqrt()) }
 }
 
-pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = mixture(context)?;
     outcome.equal("kinetic temperature", observed.temperature(), KT, 0.05);
     let width = composition(&observed).width;
@@ -131,11 +130,10 @@ pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
         &[],
         &[("mean of xx and yy", series(2))],
     );
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig11(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = mixture(context)?;
     let layers = composition(&observed);
     let theory = mean_field(BINARY, KT)?;
@@ -172,5 +170,5 @@ pub fn fig11(context: &Context) -> Result<Outcome, ExperimentError> {
         ("density over its mean", density.iter().map(|(y, d)| (*y, d.value / RHO)).collect()),
     ];
     outcome.plot("profiles", "Binary mixture", ["y", "fraction, density"], &[], &lines);
-    Ok(outcome)
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::ExperimentError;
 use crate::models::VAN_DER_WAALS;
-use crate::papers::case::{Outcome, exact, line};
+use crate::papers::case::{Reproduction, exact, line};
 use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_core::model::Model;
 use psidpd_core::theory::critical_point_of_model;
@@ -18,8 +18,7 @@ fn critical(alpha: f64) -> [f64; 2] {
     [x, x * (2.0 + 3.0 * alpha * x) * (1.0 - x).powi(2)]
 }
 
-pub fn fig1(_: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig1(_: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let (b, a) = (0.016, 1.9 * 0.016);
     let mut hot = Vec::new();
     let mut lines = Vec::new();
@@ -42,7 +41,7 @@ pub fn fig1(_: &Context) -> Result<Outcome, ExperimentError> {
     }
     outcome.at_most("compressibility at 1.1 T_c and rho_c: alpha_3 = 5 over 0", exact(hot[1] / hot[0]), 1.0);
     outcome.plot("compressibility", "1.1 T_c", ["density over rho_c", "compressibility"], &[], &lines);
-    Ok(outcome)
+    Ok(())
 }
 
 /// Where a quantity that rises with temperature changes its sign, by bisection.
@@ -58,8 +57,7 @@ fn root(
     Ok(0.5 * (low + high))
 }
 
-pub fn fig2(_: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig2(_: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let (b, a) = (0.016, 1.9 * 0.016);
     let mut lines = Vec::new();
     for alpha in [0.0, 5.0] {
@@ -87,5 +85,5 @@ pub fn fig2(_: &Context) -> Result<Outcome, ExperimentError> {
         lines.push((names[1], line(0.0, 1.0, tension)));
     }
     outcome.plot("lines", "Pressure and tension vanish", ["b rho", "kT b/a"], &[], &lines);
-    Ok(outcome)
+    Ok(())
 }

@@ -4,7 +4,7 @@ use super::QUADRATIC;
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{LINEAR, STANDARD};
-use crate::papers::case::{Outcome, bare, difference, line, profile};
+use crate::papers::case::{Reproduction, bare, difference, line, profile};
 use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
@@ -20,8 +20,7 @@ pub fn groot_warren(
     context.bulk(&format!("{name}-{rho}"), &fluid, &[rho])
 }
 
-pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     // ψ = α a n with the quadratic kernel is the pair force of strength a′ = 30 α a/π, 3.5 % less than a.
     let a = 25.0 * 0.101 * 30.0 / std::f64::consts::PI;
     let pairwise = with_parameters(STANDARD, &[("a", a)])?;
@@ -48,7 +47,7 @@ pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
         &measured,
         &[("rho kT + 0.101 a' rho²", published)],
     );
-    Ok(outcome)
+    Ok(())
 }
 
 /// ∫(g − 1)² d³r: how far from an ideal gas the fluid is, hole and shells together.
@@ -64,26 +63,25 @@ fn structure(observed: &Observed) -> (Measured, Vec<(f64, f64)>) {
     (Measured { value: sum, error: variance.sqrt() }, bare(&g))
 }
 
-fn compared(context: &Context, rho: f64) -> Result<(Outcome, Measured), ExperimentError> {
-    let mut outcome = Outcome::default();
+fn compared(context: &Context, rho: f64, outcome: &mut Reproduction) -> Result<Measured, ExperimentError> {
     let rdf = "rdf = { range = 1.5, bins = 75 }";
     let (linear, g) = structure(&groot_warren(context, "linear", LINEAR, rho, rdf)?);
     let (quadratic, h) = structure(&groot_warren(context, "quadratic", QUADRATIC, rho, rdf)?);
     let lines = [("linear kernel", g), ("quadratic kernel", h)];
     outcome.plot("rdf", &format!("g(r) at density {rho}"), ["r", "g"], &[], &lines);
-    Ok((outcome, difference(linear, quadratic)))
+    Ok(difference(linear, quadratic))
 }
 
 const WHAT: &str = "integral of (g - 1)^2, linear minus quadratic";
 
-pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
-    let (mut outcome, difference) = compared(context, 3.0)?;
+pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    let difference = compared(context, 3.0, outcome)?;
     outcome.at_most(WHAT, difference, 0.0);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
-    let (mut outcome, difference) = compared(context, 14.0)?;
+pub fn fig5(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    let difference = compared(context, 14.0, outcome)?;
     outcome.at_least(WHAT, difference, 0.0);
-    Ok(outcome)
+    Ok(())
 }

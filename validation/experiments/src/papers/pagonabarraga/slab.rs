@@ -3,7 +3,7 @@
 use super::SLAB;
 use crate::ExperimentError;
 use crate::bulk::Observed;
-use crate::papers::case::{Outcome, bare, difference, exact, profile, ratio};
+use crate::papers::case::{Reproduction, bare, difference, exact, profile, ratio};
 use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 
@@ -26,8 +26,7 @@ fn slab(context: &Context) -> Result<(Context, Observed), ExperimentError> {
     Ok((context, observed))
 }
 
-pub fn fig7(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig7(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let (context, observed) = slab(context)?;
     // "Does not shift, and corresponds to its nominally assigned value": the last digit of that.
     outcome.equal("kinetic temperature", observed.temperature(), KT, 0.005);
@@ -44,11 +43,10 @@ pub fn fig7(context: &Context) -> Result<Outcome, ExperimentError> {
     let series = |k: usize| rows.iter().map(|row| (row[0], row[k])).collect();
     outcome.plot("temperature", "Slab", ["time", "kT"], &[], &[("kinetic", series(1))]);
     outcome.plot("pressure", "Slab", ["time", "pressure"], &[], &[("mean of xx and yy", series(2))]);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let (_, observed) = slab(context)?;
     let shape = |column| observed.scalar("interface_width", column);
     let (gas, liquid) = (shape("vapour"), shape("liquid"));
@@ -77,11 +75,10 @@ pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
         &[],
         &[("normal", bare(&stress("normal"))), ("tangential", bare(&stress("tangential")))],
     );
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig9(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig9(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let (_, observed) = slab(context)?;
     let free_energy = observed.scalar("surface_tension", "free_energy");
     // Both of configurations alone. What the integrator carries is smaller in proportion to the step: 5 % at 0.01, 2 % at
@@ -96,5 +93,5 @@ pub fn fig9(context: &Context) -> Result<Outcome, ExperimentError> {
         &[],
         &[("P_N − P_T", bare(&profiles("difference"))), ("integral", bare(&profiles("integral")))],
     );
-    Ok(outcome)
+    Ok(())
 }

@@ -4,13 +4,12 @@ use super::QUADRATIC;
 use super::groot_warren::groot_warren;
 use crate::ExperimentError;
 use crate::models::LINEAR;
-use crate::papers::case::{Outcome, bare, difference, exact, profile};
+use crate::papers::case::{Reproduction, bare, difference, exact, profile};
 use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 use std::f64::consts::PI;
 
-pub fn minimum(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn minimum(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut lines = Vec::new();
     for (kernel, model) in [("quadratic", QUADRATIC), ("linear", LINEAR)] {
         let theory = mean_field(model, 1.0)?;
@@ -31,5 +30,5 @@ pub fn minimum(context: &Context) -> Result<Outcome, ExperimentError> {
         lines.push((if kernel == "linear" { "linear kernel" } else { "quadratic kernel" }, bare(&s)));
     }
     outcome.plot("structure", "S(k) at density 3", ["k", "S"], &[], &lines);
-    Ok(outcome)
+    Ok(())
 }

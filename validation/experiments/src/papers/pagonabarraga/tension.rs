@@ -2,13 +2,12 @@
 
 use super::{BINARY, binary};
 use crate::ExperimentError;
-use crate::papers::case::{Outcome, exact};
+use crate::papers::case::{Reproduction, exact};
 use crate::papers::context::{Context, mean_field};
 use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 
-pub fn fig12(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig12(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     // kT_c = rho (lambda - lambda_A) = 10 · 0.8.
     let model = Model::parse("model.toml", BINARY)?;
     let tension = |kt: f64| -> Result<f64, ExperimentError> {
@@ -42,5 +41,5 @@ pub fn fig12(context: &Context) -> Result<Outcome, ExperimentError> {
         &[("by the stress", points)],
         &[("mean field", curve)],
     );
-    Ok(outcome)
+    Ok(())
 }

@@ -2,11 +2,10 @@
 
 use crate::ExperimentError;
 use crate::models::VAN_DER_WAALS;
-use crate::papers::case::{Outcome, line};
+use crate::papers::case::{Reproduction, line};
 use crate::papers::context::{Context, Fluid};
 
-pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     // The equation of state with the printed parameters: a = 1.9 b, alpha_3 = 5.
     let (kt, b) = (2.5, 0.016);
     let pressure = |rho: f64| rho * kt / (1.0 - b * rho) - 1.9 * b * rho * rho * (1.0 + 5.0 * b * rho);
@@ -27,5 +26,5 @@ pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
         &[("measured", points)],
         &[("equation of state", published)],
     );
-    Ok(outcome)
+    Ok(())
 }

@@ -3,12 +3,11 @@
 use super::{FIT_DENSITIES, K2, K3, K4, fluid, point};
 use crate::ExperimentError;
 use crate::calibrate::{Fit, Point, fit_density};
-use crate::papers::case::{Outcome, difference, line, ratio};
+use crate::papers::case::{Reproduction, difference, line, ratio};
 use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
-pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     for (k, model) in [(3, K3), (4, K4)] {
         for rho in [4.0, 8.0] {
             let observed = context.bulk(&format!("k{k}-rho{rho}"), &fluid(model), &[rho])?;
@@ -17,7 +16,7 @@ pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
             outcome.equal(format!("-[r w' g]/3, k = {k}, density {rho}"), rwg, 1.0 / 1.05, 0.005 / 1.05);
         }
     }
-    Ok(outcome)
+    Ok(())
 }
 
 /// A linear fit of ρ(⟨n⟩) over densities 2 to 10.
@@ -25,7 +24,7 @@ fn straight(points: &[Point]) -> Option<Fit> {
     fit_density(points, 0, 1)
 }
 
-pub fn compare_line(outcome: &mut Outcome, points: &[Point], offset: f64, slope: f64) {
+pub fn compare_line(outcome: &mut Reproduction, points: &[Point], offset: f64, slope: f64) {
     let Some(fit) = straight(points) else { return };
     let error = |m: usize| fit.errors[m].unwrap_or(f64::NAN);
     // The errors of the paper's coefficients are not printed: those of ours hold for both.
@@ -44,19 +43,17 @@ pub fn compare_line(outcome: &mut Outcome, points: &[Point], offset: f64, slope:
     );
 }
 
-pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig5(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut points = Vec::new();
     for rho in FIT_DENSITIES {
         points.push(point(&context.bulk(&format!("rho{rho}"), &fluid(K3), &[rho])?, rho));
     }
-    compare_line(&mut outcome, &points, 1.54, 1.047);
-    Ok(outcome)
+    compare_line(outcome, &points, 1.54, 1.047);
+    Ok(())
 }
 
 /// ⟨n⟩ of standard DPD, `p = ρkT + Aρ²`.
-pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let strengths = [(0.0, "A = 0"), (5.0, "A = 5"), (20.0, "A = 20"), (100.0, "A = 100")];
     let mut curves: Vec<(&str, Vec<(f64, Measured)>)> = Vec::new();
     for (a, name) in strengths {
@@ -103,5 +100,5 @@ pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
         );
     }
     outcome.plot("means", "Standard DPD", ["density", "<n>"], &curves, &[("density", line(0.0, 9.0, |x| x))]);
-    Ok(outcome)
+    Ok(())
 }

@@ -5,12 +5,11 @@ use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::calibrate::Point;
 use crate::models::HUGGINS;
-use crate::papers::case::{Outcome, bare, exact, layers, profile};
+use crate::papers::case::{Reproduction, bare, exact, layers, profile};
 use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_observe::Measured;
 
-pub fn table3(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = context.bulk("e1.6", &fluid(HUGGINS), &[8.0, 8.0])?;
     // One digit after the point is printed, and no error.
     outcome.equal("pressure", observed.pressure(), 954.5, 0.05);
@@ -34,7 +33,7 @@ pub fn table3(context: &Context) -> Result<Outcome, ExperimentError> {
     }
     let theory = mean_field(HUGGINS, 1.0)?.pressure(&[8.0, 8.0]);
     outcome.equal("pressure of the theory", exact(theory), 969.4, 0.05);
-    Ok(outcome)
+    Ok(())
 }
 
 const SCENE: &str = include_str!("../../../../scenes/full/huggins-demixing.toml");
@@ -66,8 +65,7 @@ fn binodal(strength: f64) -> Result<[f64; 2], ExperimentError> {
     Ok(theory.composition_binodal(16.0)?.composition)
 }
 
-pub fn fig9(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig9(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = demixed(context, 1.9)?;
     let density = profile(&observed, "density_profile", "density");
     let extreme = |sign: f64| {
@@ -87,11 +85,10 @@ pub fn fig9(context: &Context) -> Result<Outcome, ExperimentError> {
     let part = |name| bare(&profile(&observed, "density_profile", name));
     let lines = [("total", bare(&density)), ("A", part("density_A")), ("B", part("density_B"))];
     outcome.plot("density", "e_AA = 1.9", ["z", "density"], &[], &lines);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let strengths = context.pick(&[1.9, 2.1, 2.3][..], &[1.8, 1.9, 2.0, 2.1, 2.2, 2.3][..]);
     let mut points = Vec::new();
     for strength in strengths {
@@ -120,5 +117,5 @@ pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
         &[("measured", points)],
         &lines,
     );
-    Ok(outcome)
+    Ok(())
 }

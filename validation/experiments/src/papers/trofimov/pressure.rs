@@ -4,14 +4,14 @@ use super::density::compare_line;
 use super::{FIT_DENSITIES, K2, K3, K3_CORRECTED, K4, LENNARD_JONES, fluid, point};
 use crate::ExperimentError;
 use crate::calibrate::DUMMY_SLOPE;
-use crate::papers::case::{Outcome, line};
+use crate::papers::case::{Reproduction, line};
 use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_observe::Measured;
 
 /// p/p_theory at several densities, with the plot of both.
 fn pressures(
     context: &Context,
-    outcome: &mut Outcome,
+    outcome: &mut Reproduction,
     model: &str,
     densities: &[f64],
 ) -> Result<Vec<(f64, Measured)>, ExperimentError> {
@@ -35,24 +35,28 @@ fn pressures(
     Ok(shares)
 }
 
-fn too_low(context: &Context, model: &str, share: f64) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
-    for (rho, p) in pressures(context, &mut outcome, model, &[3.0, 6.0, 10.0])? {
+fn too_low(
+    context: &Context,
+    outcome: &mut Reproduction,
+    model: &str,
+    share: f64,
+) -> Result<(), ExperimentError> {
+    for (rho, p) in pressures(context, outcome, model, &[3.0, 6.0, 10.0])? {
         let missing = Measured { value: 1.0 - p.value, error: p.error };
         outcome.at_least(format!("share of the pressure that is missing at density {rho}"), missing, share);
     }
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig2(context: &Context) -> Result<Outcome, ExperimentError> {
-    too_low(context, K3, 0.20)
+pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    too_low(context, outcome, K3, 0.20)
 }
 
-pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
-    too_low(context, K4, 0.40)
+pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    too_low(context, outcome, K4, 0.40)
 }
 
-fn agrees(context: &Context, outcome: &mut Outcome, model: &str) -> Result<(), ExperimentError> {
+fn agrees(context: &Context, outcome: &mut Reproduction, model: &str) -> Result<(), ExperimentError> {
     for (rho, p) in pressures(context, outcome, model, &[4.0, 6.0, 8.0, 10.0])? {
         // The paper states an error of 1 % of the pressure.
         outcome.equal(format!("pressure over the wanted one at density {rho}"), p, 1.0, 0.01);
@@ -60,14 +64,11 @@ fn agrees(context: &Context, outcome: &mut Outcome, model: &str) -> Result<(), E
     Ok(())
 }
 
-pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
-    agrees(context, &mut outcome, K3_CORRECTED)?;
-    Ok(outcome)
+pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    agrees(context, outcome, K3_CORRECTED)
 }
 
-pub fn fig7(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig7(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     // The first guess rho~ = rho: at each density the power law k = 2 of the strength 1.05 psi'(rho).
     let theory = mean_field(LENNARD_JONES, 1.0)?;
     let mut points = Vec::new();
@@ -76,7 +77,6 @@ pub fn fig7(context: &Context) -> Result<Outcome, ExperimentError> {
         let model = with_parameters(K2, &[("A", strength)])?;
         points.push(point(&context.bulk(&format!("first-rho{rho}"), &fluid(&model), &[rho])?, rho));
     }
-    compare_line(&mut outcome, &points, 1.39, 1.062);
-    agrees(context, &mut outcome, LENNARD_JONES)?;
-    Ok(outcome)
+    compare_line(outcome, &points, 1.39, 1.062);
+    agrees(context, outcome, LENNARD_JONES)
 }

@@ -2,11 +2,10 @@
 
 use super::{K2, K4};
 use crate::ExperimentError;
-use crate::papers::case::{Outcome, exact};
+use crate::papers::case::{Reproduction, exact};
 use crate::papers::context::{Context, mean_field};
 
-pub fn fig1(_: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig1(_: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let ratio = |model: &str, rho: f64| -> Result<f64, ExperimentError> {
         let theory = mean_field(model, 1.0)?;
         Ok(rho * theory.pressure_slope(&[rho]) / theory.pressure(&[rho]))
@@ -31,5 +30,5 @@ pub fn fig1(_: &Context) -> Result<Outcome, ExperimentError> {
     };
     let lines = [("p = rho kT + 10 rho²", curve(0.0)), ("slope 2", curve(2.0))];
     outcome.plot("stiffness", "Inverse compressibility", ["pressure", "1/compressibility"], &[], &lines);
-    Ok(outcome)
+    Ok(())
 }

@@ -3,10 +3,11 @@
 use super::{STRONG, WEAK};
 use crate::ExperimentError;
 use crate::models::SPLINE;
-use crate::papers::case::{Outcome, bare, exact, profile};
+use crate::papers::case::{Reproduction, bare, exact, profile};
 use crate::papers::context::{Change, Context};
 use psidpd_core::model::Model;
 use psidpd_core::theory::thermodynamic_limit;
+use psidpd_observe::Measured;
 
 const WEAK_SCENE: &str = include_str!("../../../../scenes/full/spline-demixing-b08.toml");
 const STRONG_SCENE: &str = include_str!("../../../../scenes/full/spline-demixing-b10.toml");
@@ -17,7 +18,8 @@ fn gathered(
     context: &Context,
     model: &str,
     scene: &str,
-) -> Result<(Outcome, psidpd_observe::Measured), ExperimentError> {
+    outcome: &mut Reproduction,
+) -> Result<Measured, ExperimentError> {
     let changes: &[Change] = &[
         (&["box"], 10.0.into()),
         (&["steps"], 2500.into()),
@@ -25,32 +27,29 @@ fn gathered(
         (&["observe", "every"], 20.into()),
     ];
     let observed = context.shipped("demixing", model, scene, changes)?;
-    let mut outcome = Outcome::default();
     let s = profile(&observed, "structure_factor", "s");
     outcome.plot("structure", "Structure factor", ["k", "S"], &[], &[("S", bare(&s))]);
     let particles = 2.0 * context.pick(1e3, 8e3);
-    let first = s.first().map_or(psidpd_observe::Measured::NONE, |(_, s)| s.times(1.0 / particles));
-    Ok((outcome, first))
+    Ok(s.first().map_or(Measured::NONE, |(_, s)| s.times(1.0 / particles)))
 }
 
 /// Between a mixture, 0.001 in the small box, and a drop: S of a ball of all particles with a tenth of the volume is
 /// half of N.
 const APART: f64 = 0.05;
 
-pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
-    let (mut outcome, first) = gathered(context, WEAK, WEAK_SCENE)?;
+pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    let first = gathered(context, WEAK, WEAK_SCENE, outcome)?;
     outcome.at_most("S/N at the longest wave, B = 0.8", first, APART);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
-    let (mut outcome, first) = gathered(context, STRONG, STRONG_SCENE)?;
+pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    let first = gathered(context, STRONG, STRONG_SCENE, outcome)?;
     outcome.at_least("S/N at the longest wave, B = 1.0", first, APART);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn limit(_: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn limit(_: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     for (first, stable) in [(17.0, 0.0), (19.0, 1.0)] {
         // a A = 9.5 · A.
         let text = SPLINE.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
@@ -64,7 +63,7 @@ pub fn limit(_: &Context) -> Result<Outcome, ExperimentError> {
             0.0,
         );
     }
-    Ok(outcome)
+    Ok(())
 }
 
 #[cfg(test)]

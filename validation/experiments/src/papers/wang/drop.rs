@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::SPLINE;
-use crate::papers::case::{Outcome, bare, profile, ratio};
+use crate::papers::case::{Reproduction, bare, profile, ratio};
 use crate::papers::context::{Change, Context};
 use psidpd_observe::Measured;
 
@@ -36,8 +36,7 @@ fn drop(context: &Context, which: usize) -> Result<Observed, ExperimentError> {
     context.shipped(&format!("drop-{count}"), SPLINE, scene, changes)
 }
 
-pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = drop(context, 3)?;
     let [liquid, vapour, tension] =
         ["liquid", "vapour", "tension"].map(|column| observed.scalar("drop", column));
@@ -48,7 +47,7 @@ pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
     outcome.equal("tension by Laplace's law", tension, LAPLACE[0], LAPLACE[1]);
     let density = profile(&observed, "drop_profile", "density");
     outcome.plot("density", "Drop of 5960", ["r", "density"], &[("density", density)], &[]);
-    Ok(outcome)
+    Ok(())
 }
 
 /// How far the surface reaches to either side: two of its widths, 1.3.
@@ -69,8 +68,7 @@ fn mean(observed: &Observed, from: f64, to: f64, f: impl Fn(f64, f64) -> f64) ->
     Measured { value: sum / weight, error: variance.sqrt() / weight }
 }
 
-pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = drop(context, 3)?;
     let radius = observed.scalar("drop", "radius").value;
     // Beyond two widths of the surface; a hundredth of the peak can be read in the figure.
@@ -94,11 +92,10 @@ pub fn fig8(context: &Context) -> Result<Outcome, ExperimentError> {
     // Through the middle of the drop, as the paper does it, once across the surface.
     outcome.equal("integral of P_n - P_t across the surface", integral, 3.320, 0.0005);
     outcome.plot("difference", "Drop of 5960", ["r", "P_N − P_T"], &[("P_N − P_T", difference)], &[]);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = drop(context, 3)?;
     let (inside, outside) = (observed.scalar("drop", "inside"), observed.scalar("drop", "outside"));
     // Of the tension by Laplace's law, with R of eq. (17), which goes with the third root of the density.
@@ -121,11 +118,10 @@ pub fn fig10(context: &Context) -> Result<Outcome, ExperimentError> {
         &[],
         &[("normal", column("normal")), ("tangential", column("tangential"))],
     );
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig11(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let which: &[usize] = context.pick(&[0, 3], &[0, 1, 2, 3, 4, 5, 6]);
     let mut points = Vec::new();
     for k in which {
@@ -157,5 +153,5 @@ pub fn fig11(context: &Context) -> Result<Outcome, ExperimentError> {
         &[("measured", points)],
         &[("3.245 · 2/R", published)],
     );
-    Ok(outcome)
+    Ok(())
 }

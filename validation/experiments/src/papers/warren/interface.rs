@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
-use crate::papers::case::{Outcome, bare, difference, profile};
+use crate::papers::case::{Reproduction, bare, difference, profile};
 use crate::papers::context::{Context, Fluid};
 use psidpd_observe::Measured;
 
@@ -66,8 +66,7 @@ fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result
     context.scene(name, model, &scene)
 }
 
-pub fn table2(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let printed = [
         ("set 5", SET5, [5.08, 0.01], [0.78, 0.05], [4.95, 0.03], [49.0, 2.0]),
         ("set 6", SET6, [6.05, 0.01], [0.66, 0.03], [7.45, 0.04], [47.0, 2.0]),
@@ -92,11 +91,10 @@ pub fn table2(context: &Context) -> Result<Outcome, ExperimentError> {
         let name = format!("dp/drho of {set} at the density of its liquid");
         outcome.equal(name, rise.times(0.5 / NEAR), slope[0], slope[1]);
     }
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut plotted = Vec::new();
     for (set, model, states) in SETS {
         let mut gaps = Vec::new();
@@ -119,11 +117,10 @@ pub fn fig3(context: &Context) -> Result<Outcome, ExperimentError> {
         plotted.push((set, ends));
     }
     outcome.plot("tie-lines", "Vapour and liquid", ["density", "kT"], &[], &plotted);
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     for (set, model, states) in SETS {
         let mut lines = Vec::new();
         for (state, name) in states.into_iter().zip(["kT = 0.5", "kT = 1", "kT = 2"]) {
@@ -151,11 +148,10 @@ pub fn fig4(context: &Context) -> Result<Outcome, ExperimentError> {
         let file = if set == "set 5" { "profiles-set5" } else { "profiles-set6" };
         outcome.plot(file, &format!("Warren, {set}"), ["z", "density"], &[], &lines);
     }
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig5(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut plotted = Vec::new();
     for (set, model, states) in SETS {
         let (mut tensions, mut widths) = (Vec::new(), Vec::new());
@@ -177,5 +173,5 @@ pub fn fig5(context: &Context) -> Result<Outcome, ExperimentError> {
         plotted.extend([(names[0], tensions), (names[1], widths)]);
     }
     outcome.plot("temperature", "Warren", ["kT", "tension, width"], &plotted, &[]);
-    Ok(outcome)
+    Ok(())
 }

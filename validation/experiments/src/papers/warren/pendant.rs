@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
-use crate::papers::case::{Outcome, bare, profile};
+use crate::papers::case::{Reproduction, bare, profile};
 use crate::papers::context::{Change, Context};
 
 /// Name, model, scene, tension from the shape with its error, and from the planar interface.
@@ -23,8 +23,7 @@ fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, E
     context.shipped(name, model, scene, changes)
 }
 
-pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = hang(context, DROPS[2])?;
     // The curve of the figure goes through its circles, whose size is about this.
     outcome.at_most(
@@ -40,11 +39,10 @@ pub fn fig6(context: &Context) -> Result<Outcome, ExperimentError> {
         &[],
         &[("surface at half the density", bare(&radius))],
     );
-    Ok(outcome)
+    Ok(())
 }
 
-pub fn table3(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     for drop in DROPS {
         let (name, _, _, shape, planar) = drop;
         let tension = hang(context, drop)?.scalar("pendant", "tension");
@@ -56,5 +54,5 @@ pub fn table3(context: &Context) -> Result<Outcome, ExperimentError> {
             planar[1],
         );
     }
-    Ok(outcome)
+    Ok(())
 }

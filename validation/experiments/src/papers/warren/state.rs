@@ -3,12 +3,11 @@
 use super::ALPHA;
 use crate::ExperimentError;
 use crate::models::{SET5, SET6, STANDARD};
-use crate::papers::case::{Outcome, line};
+use crate::papers::case::{Reproduction, line};
 use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
-pub fn table1(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn table1(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut points = Vec::new();
     let printed: [(f64, f64, f64); 5] =
         [(0.5, 4.0, 0.5), (0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
@@ -59,7 +58,7 @@ pub fn table1(context: &Context) -> Result<Outcome, ExperimentError> {
         &[("converged", points), ("by the protocol of the paper", same)],
         &[("Table 1", published)],
     );
-    Ok(outcome)
+    Ok(())
 }
 
 /// c as the paper finds it: Groot and Warren's integrator with λ = ½ and a step of 0.05, A from 0 to 50, B r_d⁴ from 1 to 10, and
@@ -105,8 +104,7 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), E
     Ok((Measured { value: c, error: (scatter * (n - 1.0) / n).sqrt() }, kept.len(), all))
 }
 
-pub fn fig1(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig1(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut points = Vec::new();
     for a in [10.0, 25.0, 50.0] {
         let model = with_parameters(STANDARD, &[("a", a)])?;
@@ -160,7 +158,7 @@ pub fn fig1(context: &Context) -> Result<Outcome, ExperimentError> {
         &[("measured", collapsed)],
         &[("c = 3.07", line(0.0, 100.0, |x| -2.0 * ALPHA[0] * 3.07 * x))],
     );
-    Ok(outcome)
+    Ok(())
 }
 
 /// Eq. (18) and its error from those of α, c and d.
@@ -176,8 +174,7 @@ fn eq18(a: f64, b: f64, rho: f64) -> Measured {
     Measured { value, error }
 }
 
-pub fn fig2(context: &Context) -> Result<Outcome, ExperimentError> {
-    let mut outcome = Outcome::default();
+pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     for (set, model, b, densities) in
         [("set 5", SET5, 40.0, [5.5, 6.5, 7.5]), ("set 6", SET6, 25.0, [6.5, 7.0, 7.5])]
     {
@@ -201,7 +198,7 @@ pub fn fig2(context: &Context) -> Result<Outcome, ExperimentError> {
             &[("eq. (18)", published)],
         );
     }
-    Ok(outcome)
+    Ok(())
 }
 
 #[cfg(test)]
