@@ -167,7 +167,8 @@ void FixSplitting::check_others()
       stop(name + " reads the pair style where forces are first computed, with aboba in the middle of a step: use two-stage");
     for (const char *known :
          {"shake", "rattle", "langevin", "qtb", "ttm", "srd", "lb/", "smd", "tmd", "colvars", "plumed", "atc", "hyper/", "pimd",
-          "drude/transform", "wall/gran", "wall/body", "electron/stopping", "rx", "package_omp", "package_intel"}) {
+          "drude/transform", "wall/gran", "wall/body", "electron/stopping", "rx", "append/atoms", "electrode/thermo", "grem",
+          "imd", "nonaffine/displacement", "pafi", "press/langevin", "sgcmc", "package_omp", "package_intel"}) {
       if (!begins(other->style, known) && strcmp(other->id, known) != 0) continue;
       stop(name + " expects one evaluation of forces in a step of velocity Verlet: use fix nve");
     }

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! With a number of sides as fifth word the particles are those of a rank that has ghosts on 2 (along z), 4
-//! or 6 sides; the sixth word is the number of particles, 2000 unless given.
+//! or 6 sides; the sixth word is the number of particles, 2000 unless given. With the fifth word `thermostat` drag
+//! and noise act apart from the forces instead, for the time of six steps, by the midpoint rule.
 //!
 //! The difference between runs of different length is the cost of the additional evaluations. The
 //! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
@@ -15,6 +16,9 @@
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
+use psidpd_core::engine::noise::Law;
+use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update};
+use psidpd_core::engine::{Pool, Settings};
 use setup::{Cloud, Rank, choose, faces, sweep};
 use std::process::ExitCode;
 
@@ -26,7 +30,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES [PARTICLES]]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat [PARTICLES]]"
             );
             ExitCode::FAILURE
         }
@@ -41,9 +45,25 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
     let fluid = subject.fluid();
     let mut sweep = sweep(&fluid, precision, set);
-    let faces = faces(rest.first())?;
     let count = rest.get(1).map_or(Ok(COUNT), |n| n.parse()).map_err(|_| "PARTICLES is a number")?;
-    let force = match faces {
+    if rest.first().is_some_and(|word| word == "thermostat") {
+        let mut cloud = Cloud::new(subject, &fluid, count);
+        let settings = Settings { precision, instructions: set, ..Settings::default() };
+        let mut thermostat =
+            PairThermostat::new(sweep.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
+        let (pool, dt) = (Pool::new(settings.threads), 6.0 * cloud.dt());
+        for number in 0..evaluations {
+            cloud.drift();
+            let Cloud { domain, x, v, tag, kind, .. } = &mut cloud;
+            let bodies = Bodies { domain, x, tag, species: kind, mass: &[1.0; 2], frozen: &[] };
+            thermostat.find_pairs(&pool, &bodies, dt, false).map_err(|e| e.to_string())?;
+            thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);
+            thermostat.act(&pool, Update::Midpoint, v);
+        }
+        println!("{count} {}", cloud.v.iter().map(|v| v[0].abs()).sum::<f64>());
+        return Ok(());
+    }
+    let force = match faces(rest.first())? {
         0 => {
             let mut cloud = Cloud::new(subject, &fluid, count);
             for _ in 0..evaluations {

@@ -105,6 +105,8 @@ fn fixes_that_are_refused_and_fixes_that_are_not() {
         "smd cfor 1 tether 3 3 3 0",
         "ttm 1 1 1 1 1 1 1 1 1 1",
         "langevin 1 1 1 7",
+        "press/langevin iso 1 1 1 temp 1 1 7",
+        "nonaffine/displacement integrated fixed 0",
     ] {
         let name = fix.split(' ').next().unwrap();
         let error = with(&format!("all {fix}")).expect_err(fix);

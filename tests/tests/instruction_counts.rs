@@ -28,7 +28,7 @@ fn baseline() -> PathBuf {
 fn count(program: &Path, case: &[&str], evaluations: u32) -> (f64, f64) {
     let mut run = Command::new("valgrind");
     run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program);
-    // The arguments are fluid, precision and instruction set; after the number, the sides with ghosts.
+    // The arguments are fluid, precision and instruction set; after the number, the sides with ghosts or `thermostat`.
     run.args(&case[..3]).arg(evaluations.to_string()).args(&case[3..]);
     let output = run.output().unwrap_or_else(|e| {
         panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
@@ -62,11 +62,13 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
     for fluid in ["mdpd", "dpd", "formula"] {
         for precision in ["mixed", "double"] {
             for instructions in ["portable", "avx2"] {
-                // The additional cost of ghosts hardly depends on the instruction set.
-                let faces = if instructions == "avx2" { &[None, Some("6")][..] } else { &[None] };
-                for faces in faces {
+                // The additional cost of ghosts hardly depends on the instruction set. The thermostat apart from the
+                // forces is counted on its own.
+                let more =
+                    if instructions == "avx2" { &[None, Some("6"), Some("thermostat")][..] } else { &[None] };
+                for more in more {
                     let mut case = vec![fluid, precision, instructions];
-                    case.extend(faces);
+                    case.extend(more);
                     let count = per_particle_step(&program, &case);
                     println!("{:<24} {count:8.1}", case.join(" "));
                     counts.insert(case.join(" "), (10.0 * count).round() / 10.0);

@@ -119,6 +119,9 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
         let AddPairs { start, pairs, xi, terms, p, sums } = self.0;
+        // With equal lengths one comparison is enough for both arrays.
+        let count = p.len().min(sums.len());
+        let (p, sums) = (&p[..count], &mut sums[..count]);
         // SAFETY: all loads and stores are at arrays of four numbers.
         unsafe {
             let minus_drag = I::Quad::splat(-terms.drag);

@@ -19,7 +19,7 @@ impl PairThermostat {
         let factor = 2.0 / *dt;
         let noise = if noise { factor * kt.sqrt() } else { 0.0 };
         let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
-        sums.gather(lists.order(), v);
+        sums.gather(pool, lists.order(), v);
         sums.compute(pool, *set, planes, terms);
         let virial = virial(pool, planes, sums, lists.ghosts(), terms);
         // Frozen particles receive forces like others; the integrator does not move them.

@@ -22,7 +22,6 @@
 //! `v + δ`, which the virial uses.
 
 use super::PairThermostat;
-use super::part::Part;
 use super::particle_loops::{Advance, Finish, Multiply, Start};
 use super::pass::{Sums, Terms, Wide, add_to_host, virial};
 use crate::engine::sweep::Pool;
@@ -67,26 +66,36 @@ struct Share<'a> {
     below: &'a [Wide],
     mass: &'a [f64],
     inverse_mass: &'a [f64],
-    part: &'a mut Part,
+    residual: &'a mut [Wide],
+    solution: &'a mut [Wide],
+}
+
+/// Takes the first `count` vectors off `rest`.
+fn first<'a>(rest: &mut &'a mut [Wide], count: usize) -> &'a mut [Wide] {
+    rest.split_off_mut(..count).unwrap_or_default()
 }
 
 impl PairThermostat {
     /// Does `work` for every plane; returns the sums of the scalar products, in the order of the planes.
-    fn on_planes(&mut self, pool: &Pool, work: impl Fn(&mut Share, InstructionSet) + Sync) -> [f64; 2] {
-        let PairThermostat { planes, set, mass, inverse_mass, sums, parts, .. } = self;
+    fn on_planes(
+        &mut self,
+        pool: &Pool,
+        work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        let PairThermostat { planes, set, mass, inverse_mass, sums, residual, solution, .. } = self;
         let Sums { p, of_plane } = sums;
-        let mut rest = &mut p[..];
-        let mut shares: Vec<Share> = Sums::halves(of_plane, planes)
-            .zip(planes.iter().zip(parts))
-            .map(|((image, below), (plane, part))| {
+        let mut rest = [&mut p[..], residual, solution];
+        let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
+            .zip(planes.iter())
+            .map(|((image, below), plane)| {
                 let own = plane.found.own.clone();
-                let p = rest.split_off_mut(..own.len()).unwrap_or_default();
+                let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
                 let (mass, inverse_mass) = (&mass[own.clone()], &inverse_mass[own]);
-                Share { p, image, below, mass, inverse_mass, part }
+                (Share { p, image, below, mass, inverse_mass, residual, solution }, [0.0; 2])
             })
             .collect();
-        pool.each(&mut shares, |share| work(share, *set));
-        shares.iter().fold([0.0; 2], |sums, share| [0, 1].map(|k| sums[k] + share.part.sums[k]))
+        pool.each(&mut shares, |(share, sums)| *sums = work(share, *set));
+        shares.iter().fold([0.0; 2], |all, (_, sums)| [0, 1].map(|k| all[k] + sums[k]))
     }
 
     /// Applies the midpoint rule with noise, or without noise the implicit Euler rule of drag alone.
@@ -114,17 +123,18 @@ impl PairThermostat {
     /// Computes the first residual and direction from the velocities `v` of the host, and returns the
     /// square of the residual's norm. On several ranks all sums here are those of one rank.
     pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
-        let PairThermostat { planes, lists, set, sums, parts, kt, progress, .. } = self;
+        let PairThermostat { planes, lists, set, sums, residual, solution, kt, progress, .. } = self;
         let tolerance = if noise { TOLERANCE } else { TOLERANCE_OF_DRAG };
         *progress = Progress { tolerance, ..Progress::default() };
-        parts.resize_with(planes.len(), Part::default);
+        for vectors in [residual, solution] {
+            vectors.resize(lists.order().len(), Wide::ZERO);
+        }
         let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
-        sums.gather(lists.order(), v);
+        sums.gather(pool, lists.order(), v);
         sums.compute(pool, *set, planes, start);
         let [first, _] =
-            self.on_planes(pool, |Share { p, image: own, below, inverse_mass, part, .. }, set| {
-                let Part { residual, solution, sums } = &mut **part;
-                *sums = [vectors::run(set, Start { inverse_mass, own, below, residual, solution, p }), 0.0];
+            self.on_planes(pool, |Share { p, image: own, below, inverse_mass, residual, .. }, set| {
+                [vectors::run(set, Start { inverse_mass, own, below, residual, p }), 0.0]
             });
         first
     }
@@ -133,8 +143,8 @@ impl PairThermostat {
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
         self.sums.compute(pool, self.set, &self.planes, Terms { noise: 0.0, drag: -1.0 });
-        self.on_planes(pool, |Share { p, image, below, mass, inverse_mass, part }, set| {
-            part.sums = vectors::run(set, Multiply { p, mass, inverse_mass, image, below });
+        self.on_planes(pool, |Share { p, image, below, mass, inverse_mass, .. }, set| {
+            vectors::run(set, Multiply { p, mass, inverse_mass, image, below })
         })
     }
 
@@ -162,16 +172,20 @@ impl PairThermostat {
             self.effort.add(progress.iterations, inaccurate);
         }
         let rest = if self.progress.drag < STRONG { 1.0 } else { 0.0 };
-        self.on_planes(pool, |Share { p, image, inverse_mass, part, .. }, set| {
-            let Part { residual, solution, .. } = &mut **part;
+        let is_first = self.progress.iterations == 1;
+        self.on_planes(pool, |Share { p, image, inverse_mass, residual, solution, .. }, set| {
             match goes_on {
                 true => {
-                    vectors::run(set, Advance { alpha, beta, inverse_mass, image, solution, residual, p });
+                    let advance =
+                        Advance { is_first, alpha, beta, inverse_mass, image, solution, residual, p };
+                    vectors::run(set, advance);
                 }
                 false => {
-                    vectors::run(set, Finish { alpha, rest, inverse_mass, p, image, residual, solution });
+                    let finish = Finish { is_first, alpha, rest, inverse_mass, p, image, residual, solution };
+                    vectors::run(set, finish);
                 }
             }
+            [0.0; 2]
         });
         goes_on
     }
@@ -182,12 +196,8 @@ impl PairThermostat {
     }
 
     /// Adds `factor` times the solution to the velocities `v`.
-    pub(super) fn add_solution(&mut self, pool: &Pool, factor: f64, v: &mut [[f64; 3]]) {
-        let PairThermostat { planes, lists, sums, parts, .. } = self;
-        for (p, part) in sums.of_planes(planes).iter_mut().zip(parts) {
-            p.copy_from_slice(&part.solution);
-        }
-        add_to_host(pool, lists.place(), &sums.p, factor, v);
+    pub(super) fn add_solution(&self, pool: &Pool, factor: f64, v: &mut [[f64; 3]]) {
+        add_to_host(pool, self.lists.place(), &self.solution, factor, v);
     }
 
     /// The virial of drag at the velocities `v`, and of noise.
@@ -195,7 +205,7 @@ impl PairThermostat {
         let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
         let scale = 2.0 / *dt;
         let noise = if noise { scale * kt.sqrt() } else { 0.0 };
-        sums.gather(lists.order(), v);
+        sums.gather(pool, lists.order(), v);
         sums.close(planes);
         virial(pool, planes, sums, lists.ghosts(), Terms { noise, drag: scale })
     }

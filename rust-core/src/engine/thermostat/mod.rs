@@ -23,7 +23,6 @@ mod effort;
 mod forces;
 mod measure;
 mod midpoint;
-mod part;
 mod particle_loops;
 mod pass;
 mod planes;
@@ -46,8 +45,7 @@ use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, Places, Pool};
 use midpoint::Progress;
-use part::Part;
-use pass::Sums;
+use pass::{Sums, Wide};
 use planes::Plane;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
@@ -91,7 +89,9 @@ pub struct PairThermostat {
     /// Tag of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     tag: Vec<u32>,
     sums: Sums,
-    parts: Vec<Part>,
+    /// Residual and solution of each sorted particle.
+    residual: Vec<Wide>,
+    solution: Vec<Wide>,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
     impulses: Vec<Vec<f64>>,
     progress: Progress,
@@ -131,7 +131,8 @@ impl PairThermostat {
             inverse_mass: Vec::new(),
             tag: Vec::new(),
             sums: Sums::default(),
-            parts: Vec::new(),
+            residual: Vec::new(),
+            solution: Vec::new(),
             impulses: Vec::new(),
             progress: Progress::default(),
             effort: Effort::default(),
@@ -173,7 +174,7 @@ impl PairThermostat {
         species_of_kind: &[i32],
         dt: f64,
         virial: bool,
-        mass: impl Fn(usize) -> f64,
+        mass: impl Fn(usize) -> f64 + Sync,
     ) -> Result<(), EngineError> {
         (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
         let margin = if self.is_exact { MARGIN } else { 0.0 };
@@ -185,16 +186,14 @@ impl PairThermostat {
         if self.is_exact {
             self.measure(pool, around.domain, particles, species_of_kind);
         }
-        let order = self.lists.order().iter().map(|k| *k as usize);
-        self.tag.clear();
-        self.tag.extend(order.clone().map(|k| particles.tag[k] as u32));
-        if let Some(last) = self.planes.last() {
-            self.tag.extend_from_within(last.found.next.clone());
+        let PairThermostat { lists, planes, tag, .. } = self;
+        let order = lists.order();
+        pass::fill(pool, tag, order, |k| particles.tag[k] as u32);
+        if let Some(last) = planes.last() {
+            tag.extend_from_within(last.found.next.clone());
         }
-        self.mass.clear();
-        self.mass.extend(order.map(mass));
-        self.inverse_mass.clear();
-        self.inverse_mass.extend(self.mass.iter().map(|m| m.recip()));
+        pass::fill(pool, &mut self.mass, order, &mass);
+        pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
         Ok(())
     }
 

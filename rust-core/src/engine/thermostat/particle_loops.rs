@@ -3,15 +3,13 @@
 use super::pass::Wide;
 use crate::engine::vectors::Loop;
 
-/// Sets the residual to the sum of `own` and `below`, the solution to zero and `p` to `M⁻¹ r`;
-/// returns `r · M⁻¹ r`.
+/// Sets the residual to the sum of `own` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
 pub struct Start<'a> {
     pub inverse_mass: &'a [f64],
     pub own: &'a [Wide],
     /// Contributions of the plane below; empty if it has no pairs with these particles.
     pub below: &'a [Wide],
-    pub residual: &'a mut Vec<Wide>,
-    pub solution: &'a mut Vec<Wide>,
+    pub residual: &'a mut [Wide],
     pub p: &'a mut [Wide],
 }
 
@@ -20,19 +18,15 @@ impl Loop for Start<'_> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Start { inverse_mass, own, below, residual, solution, p } = self;
-        solution.clear();
-        solution.resize(own.len(), Wide::ZERO);
-        residual.clear();
-        residual.extend_from_slice(own);
-        for (r, below) in residual.iter_mut().zip(below) {
-            *r = plus(*r, 1.0, *below);
-        }
+        let Start { inverse_mass, own, below, residual, p } = self;
         let mut sum = Wide::ZERO;
-        for ((p, r), inverse) in p.iter_mut().zip(residual).zip(inverse_mass) {
+        let particles = residual.iter_mut().zip(p).zip(own).zip(inverse_mass);
+        let each = |(((r, p), own), inverse): (((&mut Wide, &mut Wide), &Wide), &f64), below: Wide| {
+            *r = plus(*own, 1.0, below);
             *p = times(Wide([*inverse; 4]), *r);
             sum = plus(sum, 1.0, times(*p, *r));
-        }
+        };
+        with_below(particles, below, each);
         total(sum)
     }
 }
@@ -55,23 +49,32 @@ impl Loop for Multiply<'_> {
     #[inline(always)]
     fn run(self) -> [f64; 2] {
         let Multiply { p, mass, inverse_mass, image, below } = self;
-        for (image, below) in image.iter_mut().zip(below) {
-            *image = plus(*image, 1.0, *below);
-        }
         let (mut curvature, mut square) = (Wide::ZERO, Wide::ZERO);
-        for (((image, p), m), inverse) in image.iter_mut().zip(p).zip(mass).zip(inverse_mass) {
+        let particles = image.iter_mut().zip(p).zip(mass).zip(inverse_mass);
+        let each = |(((image, p), m), inverse): (((&mut Wide, &Wide), &f64), &f64), below: Wide| {
             let (inertia, counts) = if m.is_finite() { (*m, 1.0) } else { (0.0, 0.0) };
-            *image = plus(*image, inertia, *p);
+            *image = plus(plus(*image, 1.0, below), inertia, *p);
             curvature = plus(curvature, counts, times(*p, *image));
             square = plus(square, *inverse, times(*image, *image));
-        }
+        };
+        with_below(particles, below, each);
         [total(curvature), total(square)]
     }
 }
 
-/// Computes `solution ← solution + alpha p`, `residual ← residual − alpha image` and then
+/// Calls `each` for all particles, with the contribution of the plane below or zero.
+#[inline(always)]
+fn with_below<P>(particles: impl Iterator<Item = P>, below: &[Wide], mut each: impl FnMut(P, Wide)) {
+    match below.is_empty() {
+        true => particles.for_each(|particle| each(particle, Wide::ZERO)),
+        false => particles.zip(below).for_each(|(particle, below)| each(particle, *below)),
+    }
+}
+
+/// Computes `solution ← solution + alpha p`, or `alpha p` if there is none yet, `residual ← residual − alpha image` and then
 /// `p ← M⁻¹ residual + beta p`.
 pub struct Advance<'a> {
+    pub is_first: bool,
     pub alpha: f64,
     pub beta: f64,
     pub inverse_mass: &'a [f64],
@@ -86,19 +89,21 @@ impl Loop for Advance<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Advance { alpha, beta, inverse_mass, image, solution, residual, p } = self;
+        let Advance { is_first, alpha, beta, inverse_mass, image, solution, residual, p } = self;
         for ((((s, r), p), image), inverse) in
             solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
         {
-            *s = plus(*s, alpha, *p);
+            *s = plus(if is_first { Wide::ZERO } else { *s }, alpha, *p);
             *r = plus(*r, -alpha, *image);
             *p = plus(times(Wide([beta; 4]), *p), *inverse, *r);
         }
     }
 }
 
-/// The last step: computes `p ← solution + alpha p` and `solution ← p + rest M⁻¹ (residual − alpha image)`.
+/// The last step: computes `p ← solution + alpha p` and `solution ← p + rest M⁻¹ (residual − alpha image)`, without
+/// the old solution if there is none yet.
 pub struct Finish<'a> {
+    pub is_first: bool,
     pub alpha: f64,
     pub rest: f64,
     pub inverse_mass: &'a [f64],
@@ -113,11 +118,11 @@ impl Loop for Finish<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Finish { alpha, rest, inverse_mass, p, image, residual, solution } = self;
+        let Finish { is_first, alpha, rest, inverse_mass, p, image, residual, solution } = self;
         for ((((s, r), p), image), inverse) in
             solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
         {
-            *p = plus(*s, alpha, *p);
+            *p = plus(if is_first { Wide::ZERO } else { *s }, alpha, *p);
             *s = plus(*p, rest * *inverse, plus(*r, -alpha, *image));
         }
     }

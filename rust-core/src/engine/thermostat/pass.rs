@@ -21,20 +21,11 @@ pub struct Sums {
 
 impl Sums {
     /// Sorts the vectors `v` of the host.
-    pub fn gather(&mut self, order: &[u32], v: &[[f64; 3]]) {
-        self.p.clear();
-        self.p.extend(order.iter().map(|k| {
-            let [x, y, z] = v[*k as usize];
+    pub fn gather(&mut self, pool: &Pool, order: &[u32], v: &[[f64; 3]]) {
+        fill(pool, &mut self.p, order, |k| {
+            let [x, y, z] = v[k];
             Wide([x, y, z, 0.0])
-        }));
-    }
-
-    /// The vectors of each plane, for writing.
-    pub fn of_planes<'a>(&'a mut self, planes: &[Plane]) -> Vec<&'a mut [Wide]> {
-        let count = planes.last().map_or(0, |plane| plane.found.own.end);
-        self.p.truncate(count);
-        let mut rest = &mut self.p[..];
-        planes.iter().map(|p| rest.split_off_mut(..p.found.own.len()).unwrap_or_default()).collect()
+        });
     }
 
     /// Copies the vectors of the first plane to the end, for the pairs of the last plane.
@@ -143,6 +134,29 @@ pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, ghosts: &[bool], terms
         (0..6).for_each(|c| sum[c] += virial[c]);
     }
     sum
+}
+
+/// Fills an array in the order of cells with the values of the host's particles.
+pub fn fill<T: Copy + Default + Send>(
+    pool: &Pool,
+    to: &mut Vec<T>,
+    order: &[u32],
+    value: impl Fn(usize) -> T + Sync,
+) {
+    let (count, threads) = (order.len(), pool.threads());
+    to.resize(count, T::default());
+    let mut rest = &mut to[..];
+    let mut parts: Vec<_> = (0..threads)
+        .map(|number| {
+            let range = part(count, number, threads);
+            (rest.split_off_mut(..range.len()).unwrap_or_default(), &order[range])
+        })
+        .collect();
+    pool.each(&mut parts, |(to, order)| {
+        for (to, k) in to.iter_mut().zip(*order) {
+            *to = value(*k as usize);
+        }
+    });
 }
 
 /// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not left out.

@@ -92,6 +92,9 @@ impl PairThermostat {
         let species = plan.gamma.len().isqrt();
         for Plane { found, .. } in planes {
             let PlanePairs { own, next, list: PairList { start, pairs, stretch, .. } } = found;
+            if [&*own, next].iter().all(|range| !ghosts[(*range).clone()].contains(&true)) {
+                continue;
+            }
             for (i, of_i) in pairs_of_each(start) {
                 let i = own.start + i;
                 for k in of_i {
@@ -106,7 +109,8 @@ impl PairThermostat {
                     let [x, y] = of_host.map(|k| particles.x[k]);
                     let d = around.domain.minimum_image(x, y);
                     let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
-                    let w = (1.0 - r / plan.range[law]).max(0.0).powf(plan.exponent[law]);
+                    let (t, exponent) = ((1.0 - r / plan.range[law]).max(0.0), plan.exponent[law]);
+                    let w = if exponent == 1.0 { t } else { t.powf(exponent) };
                     let factor = (0.5 * dt * plan.gamma[law]).sqrt() * w / r;
                     if factor > 0.0 && factor.is_finite() {
                         pair.g = d.map(|d| (factor * d) as f32);
