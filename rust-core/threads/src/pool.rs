@@ -5,9 +5,11 @@
 //! starts the workers. Each worker does its part and marks itself as done. The caller does its own part
 //! and returns when no worker is busy: then no thread uses the borrowed work.
 
+mod meeting;
 mod sync;
 
 use crate::shared_slice::SharedSlice;
+use meeting::Meeting;
 use std::cell::RefCell;
 use std::num::NonZeroUsize;
 use sync::{
@@ -121,6 +123,11 @@ impl Pool {
         self.process != std::process::id()
     }
 
+    /// Whether the calling thread does all work.
+    fn is_alone(&self) -> bool {
+        self.workers.is_empty() || self.is_forked() || Within::is_inside(&self.shared)
+    }
+
     /// The number of threads, including the caller's.
     pub fn threads(&self) -> usize {
         1 + self.workers.len()
@@ -133,7 +140,7 @@ impl Pool {
     /// # Panics
     /// Panics if `work` panics on any thread.
     pub fn run(&self, work: &(dyn Fn(usize) + Sync)) {
-        if self.workers.is_empty() || self.is_forked() || Within::is_inside(&self.shared) {
+        if self.is_alone() {
             return (0..self.threads()).for_each(work);
         }
         // Locals are dropped in the opposite order: the turn ends when no worker is busy.
@@ -167,6 +174,42 @@ impl Pool {
             // ranges of different numbers disjoint.
             let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
             part.iter_mut().for_each(&work);
+        });
+    }
+
+    /// Does the work of all stages with each of `things`, which are divided among the threads as in [`Pool::each`]. A
+    /// stage begins when the previous one is done with all things: there the threads wait for each other, which costs
+    /// less than half of a further piece of work.
+    ///
+    /// # Panics
+    /// Panics if a stage panics on any thread; later stages are then left out.
+    pub fn in_stages<T: Send>(&self, things: &mut [T], stages: &[&(dyn Fn(&mut T) + Sync)]) {
+        if self.is_alone() || things.len() == 1 {
+            return stages.iter().for_each(|stage| things.iter_mut().for_each(stage));
+        }
+        let (threads, things) = (self.threads(), SharedSlice::new(things));
+        let meeting = Meeting::new(threads, self.shared.spins);
+        self.run(&|t| {
+            // SAFETY: `run` calls this once for each number of a thread, and `part` makes
+            // ranges of different numbers disjoint.
+            let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
+            let mut panic = None;
+            for (number, stage) in stages.iter().enumerate() {
+                if number > 0 {
+                    meeting.wait(number - 1);
+                }
+                // A thread that panicked still comes to the meetings.
+                if !meeting.has_failed() {
+                    let work = std::panic::AssertUnwindSafe(|| part.iter_mut().for_each(stage));
+                    if let Err(what) = std::panic::catch_unwind(work) {
+                        meeting.fail();
+                        panic = Some(what);
+                    }
+                }
+            }
+            if let Some(what) = panic {
+                std::panic::resume_unwind(what);
+            }
         });
     }
 }

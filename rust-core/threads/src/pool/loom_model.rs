@@ -49,6 +49,18 @@ fn pieces_follow_each_other() {
     });
 }
 
+/// In the second stage each thread writes what the other wrote in the first.
+#[test]
+fn stages_follow_each_other() {
+    model(|| {
+        let pool = pool();
+        let numbers = Numbers([UnsafeCell::new(0), UnsafeCell::new(0)]);
+        let numbers = &numbers;
+        pool.in_stages(&mut [0, 1], &[&|t| numbers.write(*t, 1), &|t| numbers.write(1 - *t, 2)]);
+        assert_eq!([numbers.read(0), numbers.read(1)], [2, 2]);
+    });
+}
+
 #[test]
 fn two_callers_wait_for_each_other() {
     model(|| {

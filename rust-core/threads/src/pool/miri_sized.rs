@@ -36,6 +36,47 @@ fn each_thing_is_done_once() {
     }
 }
 
+/// Each stage reads what all things have written in the one before.
+#[test]
+fn stages_wait_for_all_things() {
+    for threads in 1..5 {
+        let pool = pool(threads);
+        for count in [0, 1, 2, 7] {
+            let done = [const { AtomicUsize::new(0) }; 3];
+            let stage = |number: usize| {
+                let done = &done;
+                move |_: &mut usize| {
+                    let before =
+                        number.checked_sub(1).map_or(count, |before| done[before].load(Ordering::Relaxed));
+                    assert_eq!(before, count, "{threads} threads");
+                    done[number].fetch_add(1, Ordering::Relaxed);
+                }
+            };
+            pool.in_stages(&mut vec![0; count], &[&stage(0), &stage(1), &stage(2)]);
+            assert!(done.iter().all(|done| done.load(Ordering::Relaxed) == count));
+        }
+    }
+}
+
+#[test]
+fn a_panic_in_a_stage_reaches_the_caller_and_ends_the_stages() {
+    let pool = pool(3);
+    for thread in 0..3 {
+        let later = AtomicUsize::new(0);
+        let caught = catch_unwind(AssertUnwindSafe(|| {
+            let panics = |t: &mut usize| assert_ne!(*t, thread, "on purpose");
+            let counts = |_: &mut usize| {
+                later.fetch_add(1, Ordering::Relaxed);
+            };
+            pool.in_stages(&mut [0, 1, 2], &[&panics, &counts]);
+        }));
+        assert!(caught.is_err() && later.into_inner() == 0);
+        let mut things = [1; 3];
+        pool.in_stages(&mut things, &[&|thing| *thing += 1, &|thing| *thing *= 2]);
+        assert_eq!(things, [4; 3]);
+    }
+}
+
 #[test]
 fn a_panic_of_a_worker_reaches_the_caller_and_the_next_piece_is_done() {
     let pool = pool(2);
