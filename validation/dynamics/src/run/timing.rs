@@ -13,7 +13,7 @@ pub struct Timing {
 }
 
 /// An uninterrupted part of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// The step after which the session began.
     pub from_step: u64,
@@ -23,6 +23,9 @@ pub struct Session {
     pub wall_seconds: f64,
     /// Particles times steps over the wall time.
     pub particle_steps_per_second: f64,
+    /// The GPU that made the steps, with its driver; left out for the CPU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     /// Iterations of an implicit thermostat; left out without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thermostat: Option<Iterations>,
@@ -33,7 +36,9 @@ pub struct Session {
 pub struct Iterations {
     /// Mean of all updates.
     pub mean: f64,
-    pub most: usize,
+    /// `None` from a GPU, which does not count them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most: Option<usize>,
     /// Updates that ended before they were accurate.
     pub inaccurate: u64,
 }
@@ -41,7 +46,7 @@ pub struct Iterations {
 impl Iterations {
     pub(super) fn of(effort: Effort) -> Option<Iterations> {
         let Effort { most, inaccurate, .. } = effort;
-        effort.mean().map(|mean| Iterations { mean, most, inaccurate })
+        effort.mean().map(|mean| Iterations { mean, most: (most > 0).then_some(most), inaccurate })
     }
 }
 

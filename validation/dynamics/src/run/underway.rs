@@ -138,6 +138,7 @@ impl<'a> Run<'a> {
         self.watch = Watch::default();
         self.scene.enter(stage, &mut self.simulation)?;
         self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
+        self.simulation.fetch()?;
         self.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
@@ -146,8 +147,7 @@ impl<'a> Run<'a> {
                 self.checkpoint()?;
             }
         }
-        self.keep_state();
-        Ok(())
+        self.keep_state()
     }
 
     fn step(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
@@ -164,12 +164,16 @@ impl<'a> Run<'a> {
         let watched = Watch::is_due(stage, self.position.done + 1);
         if watched {
             self.simulation.end_step()?;
+            self.simulation.fetch()?;
             self.watch.sample(&mut self.simulation, stage, self.position.done + 1)?;
         }
         let sampled = self.observers.may_sample(number, &stage.name);
         if is_last || totals || sampled || self.writes(number) {
             self.simulation.end_step()?;
             self.simulation.refresh(want)?;
+            if is_last || sampled || self.writes(number) {
+                self.simulation.fetch()?;
+            }
         }
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
@@ -232,8 +236,9 @@ impl<'a> Run<'a> {
                 }
             }
         }
-        if totals {
-            self.keep_state();
+        // Totals alone do not bring the particles from a device.
+        if totals && self.simulation.is_here() {
+            self.keep_state()?;
         }
         let deviations = match self.position.done == stage.steps {
             true => self.watch.deviations(stage),
@@ -245,7 +250,8 @@ impl<'a> Run<'a> {
     }
 
     /// Keeps the present state as the last good one. The output of this step must be written already.
-    fn keep_state(&mut self) {
+    fn keep_state(&mut self) -> Result<(), RunError> {
+        self.simulation.fetch()?;
         self.good.step = self.simulation.step_number();
         self.good.position = self.position;
         self.simulation.copy_state(&mut self.good.state);
@@ -259,11 +265,12 @@ impl<'a> Run<'a> {
         if let Some(output) = &mut self.output {
             self.good.files = output.written();
         }
+        Ok(())
     }
 
     fn checkpoint(&mut self) -> Result<(), RunError> {
         self.simulation.end_step()?;
-        self.keep_state();
+        self.keep_state()?;
         self.store_good()
     }
 
@@ -294,6 +301,7 @@ impl<'a> Run<'a> {
             wall_seconds,
             // The clock may not have advanced, and JSON has no infinity.
             particle_steps_per_second: made / wall_seconds.max(1e-9),
+            device: self.simulation.device_name(),
             thermostat: Iterations::of(self.simulation.effort()),
         });
         timing
@@ -330,7 +338,7 @@ impl<'a> Run<'a> {
     }
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
-        self.keep_state();
+        self.keep_state()?;
         let path = self.folder.path().join("final.data");
         write_data(&path, &self.data_title(self.steps), &self.good.state, self.scene.model.species())?;
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
