@@ -17,8 +17,12 @@
 
 mod device;
 mod error;
+mod geometry;
+mod kernels;
 mod settings;
+mod shader;
 mod simulation;
+mod table;
 
 pub use device::{Device, DeviceInfo, devices};
 pub use error::{GpuError, Stop, Unsupported};

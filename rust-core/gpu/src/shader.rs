@@ -100,11 +100,11 @@ const LOOP: &str = "let here = cell_of(own);
             if (y == NONE || z == NONE) { continue; }
             let cells = (z * P.cells.y + y) * P.cells.x;
             for (var part = 0u; part < 2u; part++) {
-                let from = cells + select(along_x.x, along_x.z, part == 1u);
+                let begin = cells + select(along_x.x, along_x.z, part == 1u);
                 let to = cells + select(along_x.y, along_x.w, part == 1u);
-                if (from == to) { continue; }
+                if (begin == to) { continue; }
                 let end = first_of(to);
-                for (var j = first_of(from); j < end; j++) {
+                for (var j = first_of(begin); j < end; j++) {
                     let at = pos[j];
                     let d = separation(own, at);
                     let r2 = dot(d, d);
@@ -117,6 +117,11 @@ fn unsupported(what: impl Into<String>) -> Unsupported {
 
 fn too_large(_: TooLarge) -> Unsupported {
     unsupported("a formula this long, with the continuations of its bounds")
+}
+
+/// The formula `sum + factor x` with the variable `x`.
+fn plus(sum: &Formula, factor: &Formula, x: usize) -> Result<Formula, TooLarge> {
+    sum.minus(&factor.times(&Formula::linear(0.0, [(x, -1.0)])?)?)
 }
 
 /// Numbers of the model, by their place among the constants.
@@ -385,8 +390,8 @@ impl Writer<'_> {
                 let v = variables[*k];
                 let first = sum.derivative(v)?;
                 let second = first.derivative(v)?;
-                sum = sum.plus(&first.times(&Formula::variable(all + v))?)?;
-                sum = sum.plus(&second.times(&Formula::variable(2 * all + v))?)?;
+                sum = plus(&sum, &first, all + v)?;
+                sum = plus(&sum, &second, 2 * all + v)?;
             }
             Ok(sum)
         };
@@ -396,7 +401,7 @@ impl Writer<'_> {
             if bounded.iter().any(|(other, _)| *other == k) {
                 // q stands for δ, or for 0 where ψ′ stays constant.
                 let curvature = slope.derivative(*v)?;
-                slope = slope.plus(&curvature.times(&Formula::variable(3 * all + v))?)?;
+                slope = plus(&slope, &curvature, 3 * all + v)?;
             }
             outside.push(continued(&slope, Some(k))?);
         }

@@ -75,7 +75,7 @@ struct Status {
 @group(0) @binding(12) var<storage, read_write> slots: array<vec2<u32>>;
 @group(0) @binding(13) var<storage, read_write> slopes: array<f32>;
 @group(0) @binding(14) var<storage, read_write> status: Status;
-@group(0) @binding(15) var<storage, read_write> partial: array<f32>;
+@group(0) @binding(15) var<storage, read_write> group_sums: array<f32>;
 @group(0) @binding(16) var<storage, read_write> table: array<f32>;
 // Conjugate gradients: residual, solution, direction and its image.
 @group(0) @binding(17) var<storage, read_write> residual: array<vec4<f32>>;
@@ -149,7 +149,7 @@ fn neighbour(at: u32, k: u32, along: u32) -> u32 {
     return next - 1u;
 }
 
-// The cells along x next to a cell: two ranges [from, to), the second of which may be empty.
+// The cells along x next to a cell: two ranges [begin, to), the second of which may be empty.
 fn ranges(at: u32) -> vec4<u32> {
     let n = P.cells.x;
     if (n < 3u) { return vec4(0u, n, 0u, 0u); }
@@ -279,15 +279,15 @@ fn m_tanh(x: f32) -> f32 {
 
 // The polynomial piece of a table: row 0 has the number of pieces; each row the knot, the inverse width, and six coefficients
 // of powers of the part of the piece. Returns the value, the slope and the second derivative.
-fn m_table(from: u32, x: f32) -> vec3<f32> {
-    let pieces = u32(table[from]);
+fn m_table(begin: u32, x: f32) -> vec3<f32> {
+    let pieces = u32(table[begin]);
     var low = 0u;
     var high = pieces;
     while (high - low > 1u) {
         let middle = (low + high) / 2u;
-        if (table[from + 8u + 8u * middle] <= x) { low = middle; } else { high = middle; }
+        if (table[begin + 8u + 8u * middle] <= x) { low = middle; } else { high = middle; }
     }
-    let at = from + 8u + 8u * low;
+    let at = begin + 8u + 8u * low;
     let inverse = table[at + 1u];
     let t = (x - table[at]) * inverse;
     var value = vec3(0.0);
@@ -325,5 +325,5 @@ fn largest_of_group(value: f32, lane: u32) -> f32 {
 
 fn store_sum(block: u32, entry: u32, value: f32, lane: u32) {
     let sum = sum_of_group(value, lane);
-    if (lane == 0u) { partial[block * ENTRIES + entry] = sum; }
+    if (lane == 0u) { group_sums[block * ENTRIES + entry] = sum; }
 }

@@ -69,7 +69,7 @@ fn heat_decide(@builtin(local_invocation_index) lane: u32) {
     var own = vec3(0.0);
     for (var block = lane; block < P.blocks; block += LANES) {
         let at = block * ENTRIES + 27u;
-        own += vec3(partial[at], partial[at + 1u], partial[at + 2u]);
+        own += vec3(group_sums[at], group_sums[at + 1u], group_sums[at + 2u]);
     }
     let first = sum_of_group(own.x, lane);
     let curvature = sum_of_group(own.y, lane);

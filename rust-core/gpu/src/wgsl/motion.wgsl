@@ -99,21 +99,21 @@ fn scan_group(value: u32, lane: u32) -> u32 {
 fn scan_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) lane: u32) {
     let block = block_of(group, groups);
-    let from = block * SCAN + lane * (SCAN / LANES);
+    let begin = block * SCAN + lane * (SCAN / LANES);
     var local: array<u32, SCAN / LANES>;
     var total = 0u;
     // A failed step keeps its order, with which it may go on.
     let length = select(arrayLength(&counts), 0u, halted());
     for (var k = 0u; k < SCAN / LANES; k++) {
         local[k] = total;
-        if (from + k < length) {
-            total += atomicLoad(&counts[from + k]);
-            atomicStore(&counts[from + k], 0u);
+        if (begin + k < length) {
+            total += atomicLoad(&counts[begin + k]);
+            atomicStore(&counts[begin + k], 0u);
         }
     }
     let before = scan_group(total, lane);
     for (var k = 0u; k < SCAN / LANES; k++) {
-        if (from + k < length) { starts[from + k] = before + local[k]; }
+        if (begin + k < length) { starts[begin + k] = before + local[k]; }
     }
     if (lane == 0u && block < arrayLength(&sums) && length > 0u) { sums[block] = shared_counts[LANES - 1u]; }
 }
@@ -124,8 +124,8 @@ fn scan_sums(@builtin(local_invocation_index) lane: u32) {
     let length = arrayLength(&sums);
     let writes = !halted();
     var carry = 0u;
-    for (var from = 0u; from < length; from += LANES) {
-        let k = from + lane;
+    for (var begin = 0u; begin < length; begin += LANES) {
+        let k = begin + lane;
         var value = 0u;
         if (k < length) { value = sums[k]; }
         let before = scan_group(value, lane);
@@ -151,10 +151,10 @@ fn sort(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     if (halted() || i >= P.count) { return; }
     let own = pos[i];
     let cell = cell_index(cell_of(own));
-    let from = first_of(cell);
+    let begin = first_of(cell);
     let to = first_of(cell + 1u);
-    var place = from;
-    for (var k = from; k < to; k++) {
+    var place = begin;
+    for (var k = begin; k < to; k++) {
         if (pos[slots[k].y].w < own.w) { place += 1u; }
     }
     sorted_pos[place] = own;
@@ -192,5 +192,5 @@ fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
         store_sum(block, 23u + k, support[k], lane);
     }
     let largest = largest_of_group(max(abs(f.x), max(abs(f.y), abs(f.z))), lane);
-    if (lane == 0u) { partial[block * ENTRIES + 26u] = largest; }
+    if (lane == 0u) { group_sums[block * ENTRIES + 26u] = largest; }
 }

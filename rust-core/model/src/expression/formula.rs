@@ -77,13 +77,6 @@ impl Formula {
         Ok(Self::from_nodes(graph.extract(root)))
     }
 
-    /// The formula `self + other`.
-    ///
-    /// Like all arithmetic on formulas, fails only beyond the limit of operations.
-    pub fn plus(&self, other: &Self) -> Result<Self, TooLarge> {
-        self.with(other, Graph::add)
-    }
-
     /// The formula `self − other`.
     ///
     /// Like all arithmetic on formulas, fails only beyond the limit of operations.

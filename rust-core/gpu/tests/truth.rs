@@ -1,0 +1,93 @@
+//! Forces, energies and virials beside the plain reference.
+#![cfg(feature = "wgpu")]
+
+mod common;
+
+use common::{Random, device, difference, particles, settings};
+use nalgebra::Matrix3;
+use psidpd_core::engine::{PeriodicBox, Step};
+use psidpd_core::model::Fluid;
+use psidpd_core::truth;
+use psidpd_gpu::{Device, GpuSimulation, Particles, Rule};
+
+const DT: f64 = 0.01;
+
+/// Errors of forces and virials, relative to the largest force and to `Σ |F| r_c`, and of the energy.
+struct Errors {
+    conservative: f64,
+    all: f64,
+    energy: f64,
+    virial: f64,
+}
+
+fn errors(device: &Device, fluid: &Fluid, domain: &PeriodicBox, particles: &Particles) -> Errors {
+    let Particles { x, v, species, tag, .. } = particles;
+    let species: Vec<usize> = species.iter().map(|s| *s as usize).collect();
+    let truth = truth::conservative(fluid, x, &species, domain).unwrap();
+    let step = Step { seed: 12345, number: 7, dt: DT };
+    let (heat, of_heat) = truth::drag_and_noise(fluid, x, v, tag, &species, domain, step);
+    let largest = |f: &[[f64; 3]]| f.iter().flatten().fold(0.0, |m: f64, f| m.max(f.abs()));
+    let mut gpu = GpuSimulation::new(device, fluid, settings(fluid, domain)).unwrap();
+    gpu.upload(particles, 7).unwrap();
+    let mut found = Particles::default();
+    let two_stage = Rule::TwoStage { lambda: 0.21, every: 1 };
+    gpu.prepare(DT, two_stage, true).unwrap();
+    gpu.download(&mut found).unwrap();
+    let totals = gpu.totals().unwrap();
+    let conservative = difference((&found, &found.force), (particles, &truth.forces)) / largest(&truth.forces);
+    let all: Vec<[f64; 3]> =
+        truth.forces.iter().zip(&heat).map(|(a, b)| [0, 1, 2].map(|c| a[c] + b[c])).collect();
+    gpu.prepare(DT, Rule::VelocityVerlet, true).unwrap();
+    gpu.download(&mut found).unwrap();
+    let with_heat = gpu.totals().unwrap();
+    let sum: f64 = truth.forces.iter().map(|f| f.iter().map(|f| f.abs()).sum::<f64>()).sum();
+    let virial = (0..6).flat_map(|k| {
+        [(totals.virial[k] - truth.virial[k]) / sum, (with_heat.thermostat_virial[k] - of_heat[k]) / sum.max(largest(&heat))]
+    });
+    Errors {
+        conservative,
+        all: difference((&found, &found.force), (particles, &all)) / largest(&all),
+        energy: (totals.excess + totals.pair - truth.energy).abs() / truth.energy.abs(),
+        virial: virial.fold(0.0, |m, e| m.max(e.abs())),
+    }
+}
+
+fn density(fluid: &Fluid) -> f64 {
+    if fluid.title.contains("Lennard") { 0.7 } else { 5.0 }
+}
+
+/// The box of every model: tilted in every second.
+fn domain(fluid: &Fluid, tilts: bool) -> PeriodicBox {
+    let cutoff = fluid.cutoff();
+    let tilt = if tilts { 0.7 } else { 0.0 };
+    let depth = if fluid.dimensions == 2 { 1.0 } else { 3.9 * cutoff };
+    let flat = if fluid.dimensions == 2 { 0.0 } else { tilt };
+    let wide = if fluid.dimensions == 2 { 9.0 } else { 4.3 };
+    let edges = Matrix3::new(wide * cutoff, tilt, -flat, 0.0, 3.7 * cutoff, flat, 0.0, 0.0, depth);
+    PeriodicBox::new([-1.0, 0.5, 0.0], edges, [true; 3]).unwrap()
+}
+
+#[test]
+fn every_shipped_model_has_the_forces_of_the_reference() {
+    let device = device();
+    let mut wrong = Vec::new();
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../validation/models");
+    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    for (k, name) in names.iter().filter(|name| name.ends_with(".toml")).enumerate() {
+        let fluid = common::model(name).at(1.0).unwrap();
+        let domain = domain(&fluid, k % 2 == 1);
+        let particles = particles(&mut Random(k as u64), &fluid, &domain, density(&fluid));
+        let e = errors(&device, &fluid, &domain, &particles);
+        let line = format!(
+            "{name}: {} particles, forces {:.1e}, with drag and noise {:.1e}, energy {:.1e}, virial {:.1e}",
+            particles.x.len(), e.conservative, e.all, e.energy, e.virial
+        );
+        println!("{line}");
+        let good = e.conservative <= 2e-5 && e.all <= 2e-5 && e.energy <= 1e-6 && e.virial <= 2e-6;
+        if !good {
+            wrong.push(line);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
