@@ -19,7 +19,7 @@ pub const LANES: u32 = 128;
 /// Cells that a workgroup sums.
 pub const SCAN: u32 = 1024;
 /// Sums of each workgroup.
-pub const ENTRIES: u32 = 32;
+pub const ENTRIES: u32 = 36;
 /// Most constants: a uniform buffer has 64 KiB.
 const MOST_CONSTANTS: usize = 16_384;
 /// Most species, whose masses have a place.

@@ -26,7 +26,7 @@ const STEPS_AT_ONCE: u64 = 64;
 const STEPS_UNSEEN: u64 = 512;
 /// Tolerance of conjugate gradients and least tolerance, as on the CPU; single precision ends before its `FINEST` of 10⁻⁶.
 const TOLERANCE: f32 = 2e-2;
-const FINEST: f32 = 1e-5;
+const FINEST: f32 = 3e-5;
 /// Most iterations of one update.
 const MOST_ITERATIONS: u32 = 512;
 
@@ -164,7 +164,7 @@ impl GpuSimulation {
             count: 0,
             side: 0,
             sequence: 0,
-            iterations: 6,
+            iterations: 2,
             out_of_bounds: [0; 2],
             effort: [0; 3],
         })
@@ -693,6 +693,8 @@ impl Heat {
             runs.push("heat_image", false, runs.groups, self.arguments);
             runs.push("heat_decide", false, 1, self.arguments);
             runs.push("heat_advance", false, runs.groups, self.arguments);
+            runs.push("heat_judge", false, 1, self.arguments);
+            runs.push("heat_turn", false, runs.groups, self.arguments);
         }
         if let Some(arguments) = self.of_virial {
             runs.push("heat_virial", false, runs.groups, arguments);

@@ -63,63 +63,82 @@ fn heat_image(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     store_sum(block_of(group, groups), 29u, square, lane);
 }
 
-// Sums the blocks in a fixed order, and decides how far to go along the direction. c is the tolerance, d that of the least residual.
-@compute @workgroup_size(LANES)
-fn heat_decide(@builtin(local_invocation_index) lane: u32) {
+// Sums three entries of all blocks in a fixed order.
+fn sum_of_blocks(entry: u32, lane: u32) -> vec3<f32> {
     var own = vec3(0.0);
     for (var block = lane; block < P.blocks; block += LANES) {
-        let at = block * ENTRIES + 27u;
+        let at = block * ENTRIES + entry;
         own += vec3(group_sums[at], group_sums[at + 1u], group_sums[at + 2u]);
     }
-    let first = sum_of_group(own.x, lane);
-    let curvature = sum_of_group(own.y, lane);
-    let square = sum_of_group(own.z, lane);
+    return vec3(sum_of_group(own.x, lane), sum_of_group(own.y, lane), sum_of_group(own.z, lane));
+}
+
+// Decides how far to go along the direction. c is the tolerance, d the least relative residual.
+@compute @workgroup_size(LANES)
+fn heat_decide(@builtin(local_invocation_index) lane: u32) {
+    // r·M⁻¹r of the first residual, p·Ap and Ap·M⁻¹Ap.
+    let found = sum_of_blocks(27u, lane);
     if (lane != 0u || halted()) { return; }
     if (status.state != 0u) {
         status.state = 2u;
         return;
     }
     if (status.iterations == 0u) {
-        status.drag = max(sqrt(square / first) - 1.0, 1.0);
+        status.drag = max(sqrt(found.z / found.x) - 1.0, 1.0);
         let relative = max(I.c / status.drag, I.d);
-        status.now = first;
-        status.enough = relative * relative * first;
+        status.now = found.x;
+        status.enough = relative * relative * found.x;
     }
     status.iterations += 1u;
-    var alpha = 0.0;
-    if (curvature > 0.0) { alpha = status.now / curvature; }
-    let next = alpha * alpha * square - status.now;
-    let goes_on = next > status.enough && status.iterations < 500u;
-    status.alpha = alpha;
-    status.beta = next / status.now;
-    status.rest = select(0.0, 1.0, status.drag < 10.0);
-    status.now = next;
-    if (!goes_on) {
-        status.state = 1u;
-        status.updates += 1u;
-        status.total_iterations += status.iterations;
-        if (!is_finite(next) || next > status.enough || I.c < I.d * status.drag) { status.inaccurate += 1u; }
-    }
+    status.alpha = 0.0;
+    if (found.y > 0.0) { status.alpha = status.now / found.y; }
 }
 
-// Moves along the direction, and computes the next one. After the last iteration the direction is the whole change to the
-// midpoint, and the solution has the residual added.
+// Moves along the direction.
 @compute @workgroup_size(LANES)
 fn heat_advance(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) lane: u32) {
     let i = index_of(group, groups, lane);
+    var square = 0.0;
+    if (!halted() && status.state == 0u && i < P.count) {
+        let rest = residual[i].xyz - status.alpha * image[i].xyz;
+        solution[i] += status.alpha * direction[i];
+        residual[i] = vec4(rest, 0.0);
+        square = inverse_mass(vel[i]) * dot(rest, rest);
+    }
+    store_sum(block_of(group, groups), 30u, square, lane);
+}
+
+// Decides whether to go on. The norm is that of the residual itself: in single precision the recurrence of the CPU,
+// α² Ap·M⁻¹Ap − r·M⁻¹r, loses its digits under strong drag.
+@compute @workgroup_size(LANES)
+fn heat_judge(@builtin(local_invocation_index) lane: u32) {
+    let next = sum_of_blocks(30u, lane).x;
+    if (lane != 0u || halted() || status.state != 0u) { return; }
+    status.beta = next / status.now;
+    status.rest = select(0.0, 1.0, status.drag < 10.0);
+    status.now = next;
+    if (is_finite(next) && next > status.enough && status.iterations < 500u) { return; }
+    status.state = 1u;
+    status.updates += 1u;
+    status.total_iterations += status.iterations;
+    if (!is_finite(next) || next > status.enough || I.c < I.d * status.drag) { status.inaccurate += 1u; }
+}
+
+// Computes the next direction. After the last iteration it is the whole change to the midpoint, and the solution has the
+// residual added.
+@compute @workgroup_size(LANES)
+fn heat_turn(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
     if (halted() || status.state == 2u || i >= P.count) { return; }
     let inverse = inverse_mass(vel[i]);
-    let p = direction[i].xyz;
-    let at = solution[i].xyz + status.alpha * p;
-    let rest = residual[i].xyz - status.alpha * image[i].xyz;
     if (status.state == 0u) {
-        solution[i] = vec4(at, 0.0);
-        residual[i] = vec4(rest, 0.0);
-        direction[i] = vec4(status.beta * p + inverse * rest, 0.0);
+        direction[i] = status.beta * direction[i] + inverse * residual[i];
     } else {
-        direction[i] = vec4(at, 0.0);
-        solution[i] = vec4(at + (status.rest * inverse) * rest, 0.0);
+        let at = solution[i];
+        direction[i] = at;
+        solution[i] = at + (status.rest * inverse) * residual[i];
     }
 }
 
