@@ -53,7 +53,7 @@ pub enum DeviceError {
     NotBuilt,
     #[error("no GPU was found: no Vulkan or Metal driver answers")]
     NotFound,
-    #[error("there is no device gpu:{asked}: psidpd devices lists gpu:0 to gpu:{last}")]
+    #[error("there is no device gpu:{asked}: the last that psidpd devices lists is gpu:{last}")]
     Number { asked: usize, last: usize },
     /// The GPU does not compute this.
     #[error("not on a GPU: {0}")]

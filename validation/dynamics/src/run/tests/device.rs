@@ -13,7 +13,7 @@ fn the_key_is_read_and_a_wrong_name_has_its_line() {
     assert_eq!(read("").unwrap().device, Device::Cpu);
     assert_eq!(read("device = \"gpu:2\"").unwrap().device, Device::Gpu(2));
     let error = read("device = \"cuda\"").unwrap_err().to_string();
-    assert!(error.contains("line 6") && error.contains("cpu, gpu, gpu:N"), "{error}");
+    assert!(error.contains("s.toml:6:") && error.contains("cpu, gpu, gpu:N"), "{error}");
 }
 
 /// Nothing falls back to the CPU.
@@ -24,7 +24,7 @@ fn a_program_without_gpus_says_how_to_build_one_with_them() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let Err(RunError::File(error)) = Runner::begin(&scene, &out, Begin::New) else { panic!() };
-    assert!(error.to_string().contains("line 6") && error.kind().to_string().contains("built without"));
+    assert!(error.to_string().contains("s.toml:6:") && error.kind().to_string().contains("built without"));
     assert!(error.help().unwrap().contains("--features gpu"), "{error}");
     assert!(!out.join("thermo.csv").exists() && Live::new(scene, std::num::NonZeroUsize::MIN).is_err());
     // As with the option, where no file has the key.

@@ -82,8 +82,9 @@ fn a_checkpoint_goes_on_with_another_device() {
     let devices: Vec<bool> = timing.sessions.iter().map(|s| s.device.is_some()).collect();
     assert_eq!(devices, [false, true, false, true, false]);
     // Single precision can put a density on the other side of a bound.
+    assert!(expected.out_of_bounds.iter().sum::<u64>() > 100, "{expected:?}");
     for (found, expected) in summary.out_of_bounds.into_iter().zip(expected.out_of_bounds) {
-        assert!(expected > 100 && found.abs_diff(expected) <= expected / 1000, "{found} {expected}");
+        assert!(found.abs_diff(expected) <= 1 + expected / 1000, "{found} {expected}");
     }
     let [(a, _), (b, _)] = [&whole, &mixed].map(|out| {
         let state = read_state(&Store::new(out).path()).unwrap();
@@ -110,32 +111,29 @@ fn a_checkpoint_goes_on_with_another_device() {
 fn means(scene: &Scene) -> Vec<psidpd_observe::Estimate> {
     let mut live = Live::new(scene.clone(), NonZeroUsize::MIN).unwrap();
     let mut series = vec![Vec::new(); 3];
-    for k in 0..240 {
+    for k in 0..150 {
         live.run(8, || false).unwrap();
         let now = live.simulation();
         let pressure = now.scalar_pressure(now.conservative_pressure_tensor());
         let values = [now.temperature(), pressure, now.potential_energy() / now.len() as f64];
         // A fifth for the start to settle.
-        if k >= 48 {
+        if k >= 30 {
             values.iter().zip(&mut series).for_each(|(value, series)| series.push(*value));
         }
     }
     series.iter().map(|values| estimate(values).unwrap()).collect()
 }
 
-/// Set 6 and the binary mixture with both integrators. A right program fails once in 100 000 sets of seeds.
+/// Set 6 and the binary mixture, each with an integrator. A right program fails once in 100 000 sets of seeds.
 #[test]
 fn temperature_pressure_and_energy_are_those_of_the_cpu() {
     const FALSE_ALARM: f64 = 1e-5;
-    let three = "[4.0, 4.0, 4.0]";
     let cases = [
-        (SET6, three, 6.05, "dt = 0.01"),
-        (SET6, three, 6.05, "dt = 0.02\nintegrator = \"two-stage\""),
-        (BINARY, "[8.0, 8.0]", 10.0, "dt = 0.02"),
+        (SET6, "[4.0, 4.0, 4.0]", 6.05, "dt = 0.01"),
         (BINARY, "[8.0, 8.0]", 10.0, "dt = 0.04\nintegrator = \"two-stage\"\nthermostat_every = 2"),
     ];
     for (model, lengths, density, step) in cases {
-        let stage = format!("[[stage]]\nname = \"run\"\nsteps = 1920\n{step}\n");
+        let stage = format!("[[stage]]\nname = \"run\"\nsteps = 1200\n{step}\n");
         let scene = scene_of(model, lengths, density, &stage).unwrap();
         // Two seeds are two samples of one ensemble.
         let cpu = means(&scene);
@@ -162,12 +160,12 @@ fn refused(text: &str) -> String {
 fn what_a_gpu_does_not_do_is_named_with_its_line() {
     let base = "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 2\n";
     for (rest, line, what) in [
-        ("device = \"gpu:99\"\n", "line 6", "no device gpu:99"),
-        ("device = \"gpu\"\nintegrator = \"aboba\"\n", "line 7", "not on a GPU: integrator = \"aboba\""),
-        ("device = \"gpu\"\nprecision = \"double\"\n", "line 7", "not on a GPU: double precision"),
+        ("device = \"gpu:99\"\n", "s.toml:6:", "no device gpu:99"),
+        ("device = \"gpu\"\nintegrator = \"aboba\"\n", "s.toml:7:", "not on a GPU: integrator = \"aboba\""),
+        ("device = \"gpu\"\nprecision = \"double\"\n", "s.toml:7:", "not on a GPU: double precision"),
         (
             "integrator = \"two-stage\"\nthermostat_step = \"pairwise\"\ndevice = \"gpu\"\n",
-            "line 6",
+            "s.toml:6:",
             "thermostat_step = \"pairwise\"",
         ),
     ] {
