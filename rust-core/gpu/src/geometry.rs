@@ -61,7 +61,10 @@ impl Geometry {
     /// Columns that turn differences of coordinates into vectors.
     pub fn edges(&self) -> [[f32; 4]; 3] {
         [0, 1, 2].map(|k| {
-            let [x, y, z] = self.domain.edge(k).map(|e| if k < self.dimensions { (e / self.units(k)) as f32 } else { 0.0 });
+            let [x, y, z] = self
+                .domain
+                .edge(k)
+                .map(|e| if k < self.dimensions { (e / self.units(k)) as f32 } else { 0.0 });
             [x, y, z, 0.0]
         })
     }

@@ -88,7 +88,6 @@ var<immediate> I: Step;
 override TOTALS: bool = false;
 
 const FLAG_DEFERRED = 1u;
-const FLAG_FIRST = 2u;
 const FLAG_NOISE = 4u;
 
 fn index_of(group: vec3<u32>, groups: vec3<u32>, lane: u32) -> u32 {
