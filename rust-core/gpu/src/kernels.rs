@@ -40,6 +40,7 @@ pub struct Kernels {
     layout: wgpu::PipelineLayout,
     pub groups_layout: wgpu::BindGroupLayout,
     pipelines: HashMap<(&'static str, bool), wgpu::ComputePipeline>,
+    is_tilted: bool,
     clock: Option<Clock>,
 }
 
@@ -57,7 +58,7 @@ struct Clock {
 const STAMPS: u32 = 2048;
 
 impl Kernels {
-    pub fn new(device: &Device, shader: Shader) -> Result<Kernels, GpuError> {
+    pub fn new(device: &Device, shader: Shader, is_tilted: bool) -> Result<Kernels, GpuError> {
         let entries: Vec<_> = (0..21)
             .map(|binding| wgpu::BindGroupLayoutEntry {
                 binding,
@@ -83,7 +84,23 @@ impl Kernels {
             immediate_size: size_of::<Arguments>() as u32,
         });
         let module = module(device, &shader)?;
-        Ok(Kernels { shader, module, layout, groups_layout, pipelines: HashMap::new(), clock: None })
+        Ok(Kernels {
+            shader,
+            module,
+            layout,
+            groups_layout,
+            pipelines: HashMap::new(),
+            is_tilted,
+            clock: None,
+        })
+    }
+
+    /// Takes another box, and compiles anew if it is tilted and the other was not, or the reverse.
+    pub fn set_tilted(&mut self, is_tilted: bool) {
+        if is_tilted != self.is_tilted {
+            self.pipelines.clear();
+        }
+        self.is_tilted = is_tilted;
     }
 
     pub fn shader(&self) -> &Shader {
@@ -105,10 +122,8 @@ impl Kernels {
             return Ok(());
         }
         let scope = device.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let constants: &[(&str, f64)] = match run.kernel {
-            "densities" | "forces" => &[("TOTALS", if run.totals { 1.0 } else { 0.0 })],
-            _ => &[],
-        };
+        let flag = |on: bool| if on { 1.0 } else { 0.0 };
+        let constants = &[("TOTALS", flag(run.totals)), ("TILTED", flag(self.is_tilted))];
         let pipeline = device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(run.kernel),
             layout: Some(&self.layout),

@@ -159,7 +159,7 @@ impl GpuSimulation {
         check(&settings, fluid)?;
         let geometry = Geometry::new(&settings, fluid.dimensions, fluid.cutoff())?;
         Ok(GpuSimulation {
-            kernels: Kernels::new(device, Shader::new(fluid)?)?,
+            kernels: Kernels::new(device, Shader::new(fluid)?, geometry.is_tilted)?,
             device: device.clone(),
             fluid: fluid.clone(),
             settings,
@@ -474,6 +474,7 @@ impl GpuSimulation {
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), GpuError> {
         check(&settings, &self.fluid)?;
         let geometry = Geometry::new(&settings, self.fluid.dimensions, self.fluid.cutoff())?;
+        self.kernels.set_tilted(geometry.is_tilted);
         let mut particles = Particles::default();
         self.download(&mut particles)?;
         (self.settings, self.geometry, self.arrays) = (settings, geometry, None);

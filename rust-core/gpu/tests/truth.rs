@@ -14,7 +14,7 @@ use psidpd_gpu::{Device, GpuError, GpuSimulation, Particles, Rule};
 
 const DT: f64 = 0.01;
 
-/// Errors of forces relative to the largest, of virials relative to the sum of all forces, and of the energy.
+/// Errors of forces relative to the largest, and of virials and the energy.
 struct Errors {
     conservative: f64,
     all: f64,
@@ -43,16 +43,17 @@ fn errors(device: &Device, fluid: &Fluid, domain: &PeriodicBox, particles: &Part
     gpu.prepare(DT, Rule::VelocityVerlet, true).unwrap();
     gpu.download(&mut found).unwrap();
     let with_heat = gpu.totals().unwrap();
-    let sum: f64 = truth.forces.iter().map(|f| f.iter().map(|f| f.abs()).sum::<f64>()).sum();
-    let virial = (0..6).flat_map(|k| {
-        [(totals.virial[k] - truth.virial[k]) / sum, (with_heat.thermostat_virial[k] - of_heat[k]) / sum]
-    });
+    // Virials of 10⁻⁶ kT per particle are errors of the pressure of 10⁻⁶ of that of an ideal gas.
+    let error = |found: [f64; 6], exact: [f64; 6]| {
+        let scale = exact.iter().fold(x.len() as f64, |m, w| m.max(w.abs()));
+        (0..6).map(|k| (found[k] - exact[k]).abs() / scale).fold(0.0, f64::max)
+    };
     Errors {
         conservative,
         all: difference((&found, &found.force), (particles, &all)) / largest(&all),
         // Energies that cancel are known to 10⁻⁶ kT per particle.
         energy: (totals.excess + totals.pair - truth.energy).abs() / truth.energy.abs().max(x.len() as f64),
-        virial: virial.fold(0.0, |m, e| m.max(e.abs())),
+        virial: error(totals.virial, truth.virial).max(error(with_heat.thermostat_virial, of_heat)),
     }
 }
 
@@ -95,7 +96,7 @@ fn every_shipped_model_has_the_forces_of_the_reference() {
             e.virial
         );
         println!("{line}");
-        let good = e.conservative <= 2e-5 && e.all <= 2e-5 && e.energy <= 1e-6 && e.virial <= 2e-6;
+        let good = e.conservative <= 2e-5 && e.all <= 2e-5 && e.energy <= 1e-6 && e.virial <= 5e-6;
         if !good {
             wrong.push(line);
         }
@@ -136,7 +137,7 @@ fn random_models_have_the_forces_of_the_reference() {
         for (worst, e) in worst.iter_mut().zip([e.conservative, e.all, e.energy, e.virial]) {
             *worst = worst.max(e);
         }
-        if !(e.conservative <= 2e-5 && e.energy <= 1e-6 && e.virial <= 2e-6) {
+        if !(e.conservative <= 2e-5 && e.energy <= 1e-6 && e.virial <= 5e-6) {
             wrong.push(format!("{seed}: {:.1e} {:.1e} {:.1e}\n{text}", e.conservative, e.energy, e.virial));
         }
     }
