@@ -29,7 +29,8 @@ pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
 
 fn adapters() -> Result<Vec<(DeviceInfo, Adapter)>, GpuError> {
     let backends = Backends::VULKAN | Backends::METAL;
-    let instance = Instance::new(InstanceDescriptor { backends, ..InstanceDescriptor::new_without_display_handle() });
+    let instance =
+        Instance::new(InstanceDescriptor { backends, ..InstanceDescriptor::new_without_display_handle() });
     let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
     let rank = |adapter: &Adapter| match adapter.get_info().device_type {
         DeviceType::DiscreteGpu => 0,
@@ -102,8 +103,8 @@ impl Device {
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| failed(error.to_string()))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|error| failed(error.to_string()))?;
         let has_timestamps = required_features.contains(Features::TIMESTAMP_QUERY);
         Ok(Device { info, device, queue, limits: Arc::new(limits), has_timestamps })
     }

@@ -12,21 +12,22 @@ pub struct Geometry {
     domain: PeriodicBox,
     dimensions: usize,
     walls: [bool; 3],
+    pub is_tilted: bool,
 }
 
 impl Geometry {
     pub fn new(settings: &Settings, dimensions: usize, cutoff: f64) -> Result<Geometry, GpuError> {
         let domain = settings.domain.clone();
         let walls = [0, 1, 2].map(|k| k < dimensions && !domain.periodic()[k]);
-        let tilted = (0..3).any(|k| (0..3).any(|c| c != k && domain.edge(k)[c] != 0.0));
+        let is_tilted = (0..3).any(|k| (0..3).any(|c| c != k && domain.edge(k)[c] != 0.0));
         let refuse = |what: &str| Err(GpuError::Unsupported(Unsupported { what: what.to_owned() }));
-        if tilted && walls.contains(&true) {
+        if is_tilted && walls.contains(&true) {
             return refuse("walls in a tilted box");
         }
         if (0..dimensions).any(|k| !walls[k] && domain.height(k) < 2.0 * cutoff * (1.0 - 1e-12)) {
             return refuse("a box narrower than twice the cutoff along a period");
         }
-        Ok(Geometry { domain, dimensions, walls })
+        Ok(Geometry { domain, dimensions, walls, is_tilted })
     }
 
     /// Number of units along an edge.
@@ -61,7 +62,10 @@ impl Geometry {
     /// Columns that turn differences of coordinates into vectors.
     pub fn edges(&self) -> [[f32; 4]; 3] {
         [0, 1, 2].map(|k| {
-            let [x, y, z] = self.domain.edge(k).map(|e| if k < self.dimensions { (e / self.units(k)) as f32 } else { 0.0 });
+            let [x, y, z] = self
+                .domain
+                .edge(k)
+                .map(|e| if k < self.dimensions { (e / self.units(k)) as f32 } else { 0.0 });
             [x, y, z, 0.0]
         })
     }

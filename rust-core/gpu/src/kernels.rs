@@ -40,6 +40,7 @@ pub struct Kernels {
     layout: wgpu::PipelineLayout,
     pub groups_layout: wgpu::BindGroupLayout,
     pipelines: HashMap<(&'static str, bool), wgpu::ComputePipeline>,
+    is_tilted: bool,
     clock: Option<Clock>,
 }
 
@@ -57,7 +58,7 @@ struct Clock {
 const STAMPS: u32 = 2048;
 
 impl Kernels {
-    pub fn new(device: &Device, shader: Shader) -> Result<Kernels, GpuError> {
+    pub fn new(device: &Device, shader: Shader, is_tilted: bool) -> Result<Kernels, GpuError> {
         let entries: Vec<_> = (0..21)
             .map(|binding| wgpu::BindGroupLayoutEntry {
                 binding,
@@ -83,7 +84,23 @@ impl Kernels {
             immediate_size: size_of::<Arguments>() as u32,
         });
         let module = module(device, &shader)?;
-        Ok(Kernels { shader, module, layout, groups_layout, pipelines: HashMap::new(), clock: None })
+        Ok(Kernels {
+            shader,
+            module,
+            layout,
+            groups_layout,
+            pipelines: HashMap::new(),
+            is_tilted,
+            clock: None,
+        })
+    }
+
+    /// Takes another box, and compiles anew if it is tilted and the other was not, or the reverse.
+    pub fn set_tilted(&mut self, is_tilted: bool) {
+        if is_tilted != self.is_tilted {
+            self.pipelines.clear();
+        }
+        self.is_tilted = is_tilted;
     }
 
     pub fn shader(&self) -> &Shader {
@@ -105,10 +122,8 @@ impl Kernels {
             return Ok(());
         }
         let scope = device.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let constants: &[(&str, f64)] = match run.kernel {
-            "densities" | "forces" => &[("TOTALS", if run.totals { 1.0 } else { 0.0 })],
-            _ => &[],
-        };
+        let flag = |on: bool| if on { 1.0 } else { 0.0 };
+        let constants = &[("TOTALS", flag(run.totals)), ("TILTED", flag(self.is_tilted))];
         let pipeline = device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(run.kernel),
             layout: Some(&self.layout),
@@ -128,7 +143,12 @@ impl Kernels {
     }
 
     /// Sends runs to the device, one after the other.
-    pub fn submit(&mut self, device: &Device, groups: &[wgpu::BindGroup; 2], runs: &[Run]) -> Result<(), GpuError> {
+    pub fn submit(
+        &mut self,
+        device: &Device,
+        groups: &[wgpu::BindGroup; 2],
+        runs: &[Run],
+    ) -> Result<(), GpuError> {
         for run in runs {
             self.compile(device, run)?;
         }
@@ -172,7 +192,8 @@ impl Kernels {
         runs: &[Run],
         timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
     ) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+        let mut pass =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
         for run in runs {
             let Some(pipeline) = self.pipelines.get(&(run.kernel, run.totals)) else { continue };
             pass.set_pipeline(pipeline);
@@ -206,7 +227,11 @@ impl Kernels {
     pub fn timings(&self) -> Vec<Timing> {
         let times = self.clock.iter().flat_map(|clock| &clock.times);
         let mut all: Vec<Timing> = times
-            .map(|(kernel, (runs, seconds))| Timing { kernel: (*kernel).to_owned(), runs: *runs, seconds: *seconds })
+            .map(|(kernel, (runs, seconds))| Timing {
+                kernel: (*kernel).to_owned(),
+                runs: *runs,
+                seconds: *seconds,
+            })
             .collect();
         all.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
         all
@@ -220,10 +245,15 @@ pub fn groups_of(count: usize) -> u32 {
 
 fn module(device: &Device, shader: &Shader) -> Result<wgpu::ShaderModule, GpuError> {
     let scope = device.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+    let descriptor = wgpu::ShaderModuleDescriptor {
         label: Some("psidpd"),
         source: wgpu::ShaderSource::Wgsl(shader.text.as_str().into()),
-    });
+    };
+    // Without counters in every loop, which would add to the cost of each candidate of a pair.
+    let checks =
+        wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
+    // SAFETY: all loops end: they count up to a constant, to a number of particles, cells or rows of a table, or halve.
+    let module = unsafe { device.device.create_shader_module_trusted(descriptor, checks) };
     match pollster::block_on(scope.pop()) {
         Some(error) => Err(device.failed(error)),
         None => Ok(module),
@@ -231,7 +261,11 @@ fn module(device: &Device, shader: &Shader) -> Result<wgpu::ShaderModule, GpuErr
 }
 
 /// Copies a part of a buffer to the host.
-pub fn read<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<T>, GpuError> {
+pub fn read<T: bytemuck::Pod>(
+    device: &Device,
+    buffer: &wgpu::Buffer,
+    bytes: u64,
+) -> Result<Vec<T>, GpuError> {
     let staging = device.device.create_buffer(&wgpu::BufferDescriptor {
         label: None,
         size: bytes,
@@ -244,7 +278,11 @@ pub fn read<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer, bytes: u64
     read_mapped(device, &staging, bytes)
 }
 
-fn read_mapped<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<T>, GpuError> {
+fn read_mapped<T: bytemuck::Pod>(
+    device: &Device,
+    buffer: &wgpu::Buffer,
+    bytes: u64,
+) -> Result<Vec<T>, GpuError> {
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.slice(..bytes).map_async(wgpu::MapMode::Read, move |result| {
         // The receiver lives until the end of this function.

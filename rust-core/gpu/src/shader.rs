@@ -67,7 +67,9 @@ impl Shader {
             let _ = writeln!(text, "const {name} = {value}u;");
         }
         for kernels in [include_str!("wgsl/forces.wgsl"), include_str!("wgsl/heat.wgsl")] {
-            let mut kernels = kernels.replace("@ADD_WEIGHTS", &add_weights).replace("@MANY_BODY", "many_body(i, j, species, of_other, r)");
+            let mut kernels = kernels
+                .replace("@ADD_WEIGHTS", &add_weights)
+                .replace("@MANY_BODY", "many_body(i, j, species, of_other, r)");
             for (name, range) in ranges {
                 let square = writer.number(range * range);
                 kernels = kernels.replace(&format!("@NEIGHBOURS({name})"), &LOOP.replace("@RANGE2", &square));
@@ -84,7 +86,12 @@ impl Shader {
             tables.push(0.0);
         }
         let _ = writeln!(text, "const CONSTANTS = {}u;", constants.len() / 4);
-        for part in [include_str!("wgsl/common.wgsl"), include_str!("wgsl/kernels.wgsl"), &body, include_str!("wgsl/motion.wgsl")] {
+        for part in [
+            include_str!("wgsl/common.wgsl"),
+            include_str!("wgsl/kernels.wgsl"),
+            &body,
+            include_str!("wgsl/motion.wgsl"),
+        ] {
             text += part;
         }
         Ok(Shader { text, constants, tables, variables })
@@ -145,7 +152,11 @@ impl Numbers {
     fn finish(self) -> Result<Vec<f32>, Unsupported> {
         let single = |value: f64| {
             let out_of_range = value.is_finite() && (value != 0.0) != (value as f32).is_normal();
-            if out_of_range { Err(unsupported(format!("the number {value:e} of the model"))) } else { Ok(value as f32) }
+            if out_of_range {
+                Err(unsupported(format!("the number {value:e} of the model")))
+            } else {
+                Ok(value as f32)
+            }
         };
         self.values.into_iter().map(single).collect()
     }
@@ -168,7 +179,10 @@ impl Writer<'_> {
     }
 
     /// Statements for each pair of species, of which `of` writes those of one.
-    fn by_pair(&mut self, mut of: impl FnMut(&mut Self, usize, usize) -> Result<String, Unsupported>) -> Result<String, Unsupported> {
+    fn by_pair(
+        &mut self,
+        mut of: impl FnMut(&mut Self, usize, usize) -> Result<String, Unsupported>,
+    ) -> Result<String, Unsupported> {
         let count = self.count();
         if count == 1 {
             return of(self, 0, 0);
@@ -193,7 +207,9 @@ impl Writer<'_> {
                 2.0 => "t * t".into(),
                 other => format!("m_pow(t, {})", this.number(other)),
             };
-            Ok(format!("    let t = 1.0 - r * {inverse};\n    if (t > 0.0) {{ return {root} * ({power}); }}\n"))
+            Ok(format!(
+                "    let t = 1.0 - r * {inverse};\n    if (t > 0.0) {{ return {root} * ({power}); }}\n"
+            ))
         };
         let body = self.by_pair(of).unwrap_or_default();
         format!("fn drag_weight(a: u32, b: u32, r: f32) -> f32 {{\n{body}    return 0.0;\n}}\n")
@@ -208,7 +224,8 @@ impl Writer<'_> {
                 let c = term.coefficients[a * count + b] + term.coefficients[b * count + a];
                 if c != 0.0 {
                     let c = this.number(c);
-                    let (value, slope) = (this.weight(&term.kernel, "value"), this.weight(&term.force_kernel, "slope"));
+                    let (value, slope) =
+                        (this.weight(&term.kernel, "value"), this.weight(&term.force_kernel, "slope"));
                     let _ = writeln!(text, "    let l{k} = {c} * vec2({value}, {slope});\n    out += l{k};");
                 }
             }
@@ -221,7 +238,9 @@ impl Writer<'_> {
             Ok(text)
         };
         let body = self.by_pair(of)?;
-        Ok(format!("fn pair_terms(a: u32, b: u32, r: f32) -> vec2<f32> {{\n    var out = vec2(0.0);\n{body}    return out;\n}}\n"))
+        Ok(format!(
+            "fn pair_terms(a: u32, b: u32, r: f32) -> vec2<f32> {{\n    var out = vec2(0.0);\n{body}    return out;\n}}\n"
+        ))
     }
 
     /// Statements that add φ and φ′ of one potential to `out`.
@@ -229,7 +248,8 @@ impl Writer<'_> {
         match potential {
             PairPotential::Soft(soft) => {
                 let (a, range) = (soft.strength(), PairForm::range(soft));
-                let (inverse, half, minus) = (self.number(1.0 / range), self.number(0.5 * a * range), self.number(-a));
+                let (inverse, half, minus) =
+                    (self.number(1.0 / range), self.number(0.5 * a * range), self.number(-a));
                 format!("    let t = 1.0 - r * {inverse};\n    out += vec2({half} * t * t, {minus} * t);\n")
             }
             PairPotential::Spline(spline) => {
@@ -284,10 +304,12 @@ impl Writer<'_> {
     /// The sum of `(s_i + s_j) w′` over the densities with a pass.
     fn many_body(&mut self) -> String {
         let count = self.count();
-        let mut text = "fn many_body(i: u32, j: u32, a: u32, b: u32, r: f32) -> f32 {\n    var sum = 0.0;\n".to_owned();
+        let mut text =
+            "fn many_body(i: u32, j: u32, a: u32, b: u32, r: f32) -> f32 {\n    var sum = 0.0;\n".to_owned();
         for (p, d) in self.plan.density_passes().iter().enumerate() {
             let kernel = self.fluid.densities[*d].force_kernel;
-            let (slope, range, first) = (self.weight(&kernel, "slope"), self.number(kernel.range()), p * count);
+            let (slope, range, first) =
+                (self.weight(&kernel, "slope"), self.number(kernel.range()), p * count);
             let _ = writeln!(
                 text,
                 "    if (r < {range}) {{ sum += (slopes[i * V + {first}u + b] + slopes[j * V + {first}u + a]) * {slope}; }}"
@@ -324,10 +346,15 @@ impl Writer<'_> {
         let mut text = String::new();
         for (k, v) in variables.iter().enumerate() {
             let density = &fluid.densities[v / count];
-            let own = if density.includes_self && v % count == alpha { density.kernel.value(0.0) } else { 0.0 };
+            let own =
+                if density.includes_self && v % count == alpha { density.kernel.value(0.0) } else { 0.0 };
             let own = self.number(own);
-            let (value, slope) = self.polynomial(&density.correction[alpha * count + v % count], &format!("u{k}"));
-            let _ = writeln!(text, "    let u{k} = n[{k}] + {own};\n    let c{k} = {value};\n    let g{k} = {slope};");
+            let (value, slope) =
+                self.polynomial(&density.correction[alpha * count + v % count], &format!("u{k}"));
+            let _ = writeln!(
+                text,
+                "    let u{k} = n[{k}] + {own};\n    let c{k} = {value};\n    let g{k} = {slope};"
+            );
         }
         match &fluid.excess[alpha] {
             ExcessFreeEnergy::Formula(psi) => {
@@ -349,7 +376,11 @@ impl Writer<'_> {
         }
         let horner = |this: &mut Self, coefficients: Vec<f64>| {
             let first = this.number(*coefficients.last().unwrap_or(&0.0));
-            coefficients.iter().rev().skip(1).fold(first, |sum, c| format!("({sum} * {x} + {})", this.number(*c)))
+            coefficients
+                .iter()
+                .rev()
+                .skip(1)
+                .fold(first, |sum, c| format!("({sum} * {x} + {})", this.number(*c)))
         };
         let slope = polynomial.0.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c).collect();
         (horner(self, polynomial.0.clone()), horner(self, slope))
@@ -418,7 +449,8 @@ impl Writer<'_> {
         }
         let inside = self.program(psi, &slopes, variables, "b");
         let outside = self.program(&psi_outside, &outside, variables, "b");
-        let _ = writeln!(text, "    if (!out.below && !out.above) {{\n{inside}    }} else {{\n{outside}    }}");
+        let _ =
+            writeln!(text, "    if (!out.below && !out.above) {{\n{inside}    }} else {{\n{outside}    }}");
         Ok(text)
     }
 

@@ -140,7 +140,12 @@ impl Runs<'_> {
         }
         let (a, key) = noise.unwrap_or_default();
         let flags = if noise.is_some() { NOISE } else { 0 };
-        self.push("forces", totals, self.groups, Arguments { numbers: [a, 0.0, 0.0, 0.0], key, flags, ..Default::default() });
+        self.push(
+            "forces",
+            totals,
+            self.groups,
+            Arguments { numbers: [a, 0.0, 0.0, 0.0], key, flags, ..Default::default() },
+        );
     }
 }
 
@@ -154,7 +159,7 @@ impl GpuSimulation {
         check(&settings, fluid)?;
         let geometry = Geometry::new(&settings, fluid.dimensions, fluid.cutoff())?;
         Ok(GpuSimulation {
-            kernels: Kernels::new(device, Shader::new(fluid)?)?,
+            kernels: Kernels::new(device, Shader::new(fluid)?, geometry.is_tilted)?,
             device: device.clone(),
             fluid: fluid.clone(),
             settings,
@@ -186,7 +191,11 @@ impl GpuSimulation {
         let mut velocities = Vec::with_capacity(count);
         let mut boxes = Vec::with_capacity(count);
         for k in 0..count {
-            if species[k] < 0 || species[k] as usize >= self.fluid.species.len() || tag[k] <= 0 || marks[k] >> 16 != 0 {
+            if species[k] < 0
+                || species[k] as usize >= self.fluid.species.len()
+                || tag[k] <= 0
+                || marks[k] >> 16 != 0
+            {
                 return Err(GpuError::Host("a species, a tag or a mark is out of range"));
             }
             let Some((s, away)) = self.geometry.coordinates(x[k]) else {
@@ -256,7 +265,8 @@ impl GpuSimulation {
         }
         let last = self.number + steps;
         while self.number < last {
-            let to = last.min(self.number + STEPS_UNSEEN.min((u64::from(u32::MAX) / 4 / self.count as u64).max(1)));
+            let to = last
+                .min(self.number + STEPS_UNSEEN.min((u64::from(u32::MAX) / 4 / self.count as u64).max(1)));
             self.advance_unseen(to, dt, rule, totals.then_some(last))?;
         }
         Ok(())
@@ -426,7 +436,10 @@ impl GpuSimulation {
         refill(marks, velocities.iter().map(|v| bits(v) >> 16));
         refill(image, boxes.iter().map(|[x, y, z, _]| [*x, *y, *z]));
         let moves = |v: &[f32; 4]| bits(v) >> 16 & FROZEN == 0;
-        refill(force, forces.iter().zip(&velocities).map(|(f, v)| if moves(v) { vector(*f) } else { [0.0; 3] }));
+        refill(
+            force,
+            forces.iter().zip(&velocities).map(|(f, v)| if moves(v) { vector(*f) } else { [0.0; 3] }),
+        );
         Ok(())
     }
 
@@ -461,6 +474,7 @@ impl GpuSimulation {
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), GpuError> {
         check(&settings, &self.fluid)?;
         let geometry = Geometry::new(&settings, self.fluid.dimensions, self.fluid.cutoff())?;
+        self.kernels.set_tilted(geometry.is_tilted);
         let mut particles = Particles::default();
         self.download(&mut particles)?;
         (self.settings, self.geometry, self.arrays) = (settings, geometry, None);
@@ -525,7 +539,13 @@ impl GpuSimulation {
             return Ok(());
         }
         let count = self.count as u64;
-        let cells = self.geometry.cells(self.fluid.cutoff(), self.count).iter().map(|n| u64::from(*n)).product::<u64>() + 1;
+        let cells = self
+            .geometry
+            .cells(self.fluid.cutoff(), self.count)
+            .iter()
+            .map(|n| u64::from(*n))
+            .product::<u64>()
+            + 1;
         let scans = cells.div_ceil(u64::from(SCAN));
         let shader = self.kernels.shader();
         let vectors = 16 * count;
@@ -566,7 +586,9 @@ impl GpuSimulation {
                 _ => self.device.device.create_buffer(&wgpu::BufferDescriptor {
                     label: None,
                     size: *size,
-                    usage: Usage::COPY_DST | Usage::COPY_SRC | if k < 2 { Usage::UNIFORM } else { Usage::STORAGE },
+                    usage: Usage::COPY_DST
+                        | Usage::COPY_SRC
+                        | if k < 2 { Usage::UNIFORM } else { Usage::STORAGE },
                     mapped_at_creation: false,
                 }),
             })
@@ -582,7 +604,10 @@ impl GpuSimulation {
                         5..8 if side == 1 => binding - 3,
                         other => other,
                     };
-                    wgpu::BindGroupEntry { binding: binding as u32, resource: buffers[swapped].as_entire_binding() }
+                    wgpu::BindGroupEntry {
+                        binding: binding as u32,
+                        resource: buffers[swapped].as_entire_binding(),
+                    }
                 })
                 .collect();
             self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -599,8 +624,16 @@ impl GpuSimulation {
     fn write_constants(&self) {
         let Some(arrays) = &self.arrays else { return };
         let shader = self.kernels.shader();
-        self.device.queue.write_buffer(&arrays.buffers[CONSTANTS], 0, bytemuck::cast_slice(&shader.constants));
-        self.device.queue.write_buffer(&arrays.buffers[CONSTANTS + 15], 0, bytemuck::cast_slice(&shader.tables));
+        self.device.queue.write_buffer(
+            &arrays.buffers[CONSTANTS],
+            0,
+            bytemuck::cast_slice(&shader.constants),
+        );
+        self.device.queue.write_buffer(
+            &arrays.buffers[CONSTANTS + 15],
+            0,
+            bytemuck::cast_slice(&shader.tables),
+        );
     }
 
     fn write_params(&self) {
@@ -634,8 +667,14 @@ impl GpuSimulation {
         let scans = self.arrays.as_ref().map_or(0, |arrays| arrays.scans);
         let passes = self.kernels.shader().variables > 0;
         let groups = groups_of(self.count);
-        let mut runs =
-            Runs { list: Vec::new(), side: &mut self.side, sequence: &mut self.sequence, groups, scans, passes };
+        let mut runs = Runs {
+            list: Vec::new(),
+            side: &mut self.side,
+            sequence: &mut self.sequence,
+            groups,
+            scans,
+            passes,
+        };
         work(&mut runs);
         (runs.list, groups)
     }

@@ -92,7 +92,8 @@ fn hermite(curve: &Curve, from: f64, to: f64) -> [f64; ROW] {
     let a = to_y - y - s - 0.5 * k;
     let b = to_s - s - k;
     let c = to_k - k;
-    let coefficients = [y, s, 0.5 * k, 10.0 * a - 4.0 * b + 0.5 * c, -15.0 * a + 7.0 * b - c, 6.0 * a - 3.0 * b + 0.5 * c];
+    let coefficients =
+        [y, s, 0.5 * k, 10.0 * a - 4.0 * b + 0.5 * c, -15.0 * a + 7.0 * b - c, 6.0 * a - 3.0 * b + 0.5 * c];
     let mut row = [from, 1.0 / h, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     row[2..].copy_from_slice(&coefficients);
     row

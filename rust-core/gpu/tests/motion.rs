@@ -10,7 +10,9 @@ use cpu::Cpu;
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::{Fluid, Model};
-use psidpd_gpu::{BodyForce, FROZEN, GpuError, GpuSimulation, Particles, Rule, Settings, Stop, body_force_mark};
+use psidpd_gpu::{
+    BodyForce, FROZEN, GpuError, GpuSimulation, Particles, Rule, Settings, Stop, body_force_mark,
+};
 
 const VERLET: Rule = Rule::VelocityVerlet;
 const TWO_STAGE: Rule = Rule::TwoStage { lambda: 0.21, every: 1 };
@@ -43,7 +45,9 @@ fn follows(fluid: &Fluid, settings: &Settings, particles: &Particles, dt: f64, r
     gpu.advance(30, dt, rule, true).unwrap();
     let (found, totals) = (state(&mut gpu), gpu.totals().unwrap());
     let unwrapped = |p: &Particles| -> Vec<[f64; 3]> {
-        let away = |k: usize, c: usize| (0..3).map(|e| settings.domain.edge(e)[c] * f64::from(p.image[k][e])).sum::<f64>();
+        let away = |k: usize, c: usize| {
+            (0..3).map(|e| settings.domain.edge(e)[c] * f64::from(p.image[k][e])).sum::<f64>()
+        };
         (0..p.x.len()).map(|k| std::array::from_fn(|c| p.x[k][c] + away(k, c))).collect()
     };
     let x = difference((&found, &unwrapped(&found)), (&cpu.particles, &unwrapped(&cpu.particles)));
@@ -55,9 +59,13 @@ fn follows(fluid: &Fluid, settings: &Settings, particles: &Particles, dt: f64, r
     let heat = error(totals.thermostat_virial, cpu.tally.thermostat_virial);
     println!(
         "{} particles, {rule:?}: x {x:.1e}, v {v:.1e}, energy {energy:.1e}, virial {virial:.1e}, of drag and noise {heat:.1e}, iterations {:?}",
-        particles.x.len(), gpu.effort()
+        particles.x.len(),
+        gpu.effort()
     );
-    assert!(x <= 1e-4 && v <= 1e-3 && energy <= 1e-4 && virial <= 1e-3 && heat <= 1e-2, "{x} {v} {energy} {virial} {heat}");
+    assert!(
+        x <= 1e-4 && v <= 1e-3 && energy <= 1e-4 && virial <= 1e-3 && heat <= 1e-2,
+        "{x} {v} {energy} {virial} {heat}"
+    );
     assert_eq!(gpu.step_number(), 50);
     if rule != VERLET {
         let iterations = cpu.iterations();
@@ -174,7 +182,11 @@ fn updates_go_on_until_they_are_accurate() {
     let v = difference((&found, &found.v), (&cpu.particles, &cpu.particles.v));
     println!("{iterations} iterations, {} on the cpu, v {v:.1e}", cpu.iterations());
     assert_eq!((updates, inaccurate), (5, 0));
-    assert!(iterations > 40 && iterations.abs_diff(cpu.iterations()) <= 5 && v < 1e-3, "{iterations} {} {v}", cpu.iterations());
+    assert!(
+        iterations > 40 && iterations.abs_diff(cpu.iterations()) <= 5 && v < 1e-3,
+        "{iterations} {} {v}",
+        cpu.iterations()
+    );
 }
 
 #[test]
@@ -206,7 +218,8 @@ fn a_failing_step_is_named() {
 #[test]
 fn what_is_not_there_is_refused_by_name() {
     let fluid = model("warren2003-set6.toml").at(1.0).unwrap();
-    let refusal = |domain: &PeriodicBox| match GpuSimulation::new(&device(), &fluid, settings(&fluid, domain)) {
+    let refusal = |domain: &PeriodicBox| match GpuSimulation::new(&device(), &fluid, settings(&fluid, domain))
+    {
         Err(GpuError::Unsupported(unsupported)) => unsupported.what,
         other => panic!("{other:?}"),
     };
@@ -216,6 +229,54 @@ fn what_is_not_there_is_refused_by_name() {
     assert_eq!(refusal(&leaning), "walls in a tilted box");
     let text = "title = \"s\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[excess_free_energy]\nA = \"1e50*n^2\"\n";
     let large = Model::parse("s.toml", text).unwrap().at(1.0).unwrap();
-    let refused = GpuSimulation::new(&device(), &large, settings(&large, &cube(6.0))).unwrap_err().to_string();
+    let refused =
+        GpuSimulation::new(&device(), &large, settings(&large, &cube(6.0))).unwrap_err().to_string();
     assert!(refused.starts_with("the number 1e50 of the model: not available on a gpu"), "{refused}");
+}
+
+/// A temperature that is set is that of a simulation that begins with it, and of the thermostat.
+#[test]
+fn temperatures_and_settings_change() {
+    let model = Model::parse(
+        "t.toml",
+        "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"lucy\"\nrange = 1.0\n[excess_free_energy]\n\
+         A = \"n*(2 - kT)*(1 + 0.1*kT*n)\"\n[[thermostat]]\nbetween = [\"A\", \"A\"]\ngamma = 4.5\nrange = 1.0\n",
+    )
+    .unwrap();
+    let domain = cube(5.0);
+    let [cold, hot, linear] = [0.7, 1.3, 2.0].map(|kt| model.at(kt).unwrap());
+    let particles = particles(&mut Random(9), &cold, &domain, 5.0);
+    let of = |fluid: &Fluid| {
+        let mut gpu =
+            start(fluid, Settings { seed: 6, ..settings(fluid, &domain) }, &particles, 0.01, VERLET);
+        (gpu.prepare(0.01, VERLET, true), gpu.totals().unwrap(), state(&mut gpu))
+    };
+    let mut gpu = start(&cold, settings(&cold, &domain), &particles, 0.01, VERLET);
+    gpu.set_settings(Settings { seed: 6, ..settings(&cold, &domain) }).unwrap();
+    // At kT = 2 the formula is another: 0.
+    for fluid in [&hot, &linear, &cold] {
+        gpu.set_fluid(fluid).unwrap();
+        let found = (gpu.prepare(0.01, VERLET, true), gpu.totals().unwrap(), state(&mut gpu));
+        assert!(found == of(fluid), "{}", fluid.kt);
+    }
+}
+
+#[test]
+fn memory_and_times_are_known() {
+    let fluid = model("warren2003-set6.toml").at(1.0).unwrap();
+    let particles = particles(&mut Random(10), &fluid, &cube(12.0), 6.05);
+    let mut gpu = start(&fluid, settings(&fluid, &cube(12.0)), &particles, 0.01, VERLET);
+    let per_particle = |gpu: &GpuSimulation| gpu.memory_bytes() as f64 / gpu.len() as f64;
+    let verlet = per_particle(&gpu);
+    gpu.advance(1, 0.01, TWO_STAGE, false).unwrap();
+    println!("bytes per particle: {verlet:.1}, with the implicit thermostat {:.1}", per_particle(&gpu));
+    assert!(verlet < 140.0 && per_particle(&gpu) < 200.0);
+    gpu.measure_time(true).unwrap();
+    gpu.advance(5, 0.01, VERLET, false).unwrap();
+    let times = gpu.timings();
+    for time in &times {
+        println!("{}: {} runs, {:.1e} s", time.kernel, time.runs, time.seconds);
+    }
+    let forces = times.iter().find(|time| time.kernel == "forces").unwrap();
+    assert!(forces.runs == 5 && forces.seconds > 0.0 && times.len() == 8, "{times:?}");
 }

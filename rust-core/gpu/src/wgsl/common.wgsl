@@ -86,9 +86,10 @@ struct Status {
 var<immediate> I: Step;
 
 override TOTALS: bool = false;
+// Whether the box has edges that are not along the axes.
+override TILTED: bool = true;
 
 const FLAG_DEFERRED = 1u;
-const FLAG_FIRST = 2u;
 const FLAG_NOISE = 4u;
 
 fn index_of(group: vec3<u32>, groups: vec3<u32>, lane: u32) -> u32 {
@@ -161,6 +162,7 @@ fn ranges(at: u32) -> vec4<u32> {
 // The vector from b to a, nearest image. Exchange of a and b changes its sign and no bit else.
 fn separation(a: vec4<u32>, b: vec4<u32>) -> vec3<f32> {
     let e = bitcast<vec3<i32>>(a.xyz - b.xyz);
+    if (!TILTED) { return vec3(P.edge[0].x, P.edge[1].y, P.edge[2].z) * vec3<f32>(e); }
     return P.edge[0].xyz * f32(e.x) + P.edge[1].xyz * f32(e.y) + P.edge[2].xyz * f32(e.z);
 }
 

@@ -9,9 +9,11 @@ fn kick_drift(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     var v = vel[i];
     var s = pos[i];
     var boxes = box_of[i];
-    let kick = (I.a * inverse_mass(v)) * force[i].xyz;
-    var u = v.xyz + kick;
-    if ((I.flags & FLAG_DEFERRED) != 0u) { u += kick; }
+    // The same operation as in `kick`, so that a deferred kick has its bits.
+    let by_force = vec3(I.a * inverse_mass(v));
+    let f = force[i].xyz;
+    var u = fma(by_force, f, v.xyz);
+    if ((I.flags & FLAG_DEFERRED) != 0u) { u = fma(by_force, f, u); }
     if (!all_finite(u)) {
         atomicMin(&status.velocity, s.w);
         fail();
@@ -69,7 +71,7 @@ fn kick(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     let i = index_of(group, groups, lane);
     if (halted() || i >= P.count) { return; }
     let v = vel[i];
-    let u = v.xyz + (I.a * inverse_mass(v)) * force[i].xyz;
+    let u = fma(vec3(I.a * inverse_mass(v)), force[i].xyz, v.xyz);
     if (!all_finite(u)) {
         atomicMin(&status.velocity, pos[i].w);
         fail();

@@ -20,9 +20,18 @@ impl Cpu {
     pub fn new(fluid: &Fluid, settings: Settings, particles: &Particles, number: u64) -> Cpu {
         let of_engine = engine::Settings { precision: Precision::Mixed, ..Default::default() };
         let engine = Engine::new(fluid, of_engine).unwrap();
-        let thermostat = PairThermostat::new(engine.plan(), fluid.kt, &of_engine).filter(|_| settings.thermostat);
+        let thermostat =
+            PairThermostat::new(engine.plan(), fluid.kt, &of_engine).filter(|_| settings.thermostat);
         let particles = Particles { force: vec![[0.0; 3]; particles.x.len()], ..particles.clone() };
-        Cpu { settings, particles, engine, thermostat, tally: Tally::default(), number, dimensions: fluid.dimensions }
+        Cpu {
+            settings,
+            particles,
+            engine,
+            thermostat,
+            tally: Tally::default(),
+            number,
+            dimensions: fluid.dimensions,
+        }
     }
 
     pub fn forces(&mut self, dt: f64, drag: bool) {

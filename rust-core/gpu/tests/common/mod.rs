@@ -35,9 +35,12 @@ impl Random {
 pub fn particles(random: &mut Random, fluid: &Fluid, domain: &PeriodicBox, density: f64) -> Particles {
     let dimensions = fluid.dimensions;
     let spacing = density.powf(-1.0 / dimensions as f64);
-    let along = [0, 1, 2].map(|k| if k < dimensions { (domain.height(k) / spacing).round().max(1.0) as usize } else { 1 });
+    let along = [0, 1, 2]
+        .map(|k| if k < dimensions { (domain.height(k) / spacing).round().max(1.0) as usize } else { 1 });
     let mut particles = Particles::default();
-    for (a, b, c) in (0..along[0]).flat_map(|a| (0..along[1]).flat_map(move |b| (0..along[2]).map(move |c| (a, b, c)))) {
+    for (a, b, c) in
+        (0..along[0]).flat_map(|a| (0..along[1]).flat_map(move |b| (0..along[2]).map(move |c| (a, b, c))))
+    {
         let mut s = [0.0; 3];
         for (k, at) in [a, b, c].into_iter().enumerate().filter(|(k, _)| *k < dimensions) {
             s[k] = (at as f64 + 0.5 + random.within(-0.3, 0.3)) / along[k] as f64;
@@ -84,5 +87,7 @@ pub fn by_tag(particles: &Particles) -> Vec<usize> {
 /// The largest difference of vectors by tag.
 pub fn difference(a: (&Particles, &[[f64; 3]]), b: (&Particles, &[[f64; 3]])) -> f64 {
     let pairs = by_tag(a.0).into_iter().zip(by_tag(b.0));
-    pairs.flat_map(|(i, j)| (0..3).map(move |c| (a.1[i][c] - b.1[j][c]).abs())).fold(0.0, |m, d| if d > m || d.is_nan() { d } else { m })
+    pairs
+        .flat_map(|(i, j)| (0..3).map(move |c| (a.1[i][c] - b.1[j][c]).abs()))
+        .fold(0.0, |m, d| if d > m || d.is_nan() { d } else { m })
 }
