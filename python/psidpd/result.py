@@ -27,6 +27,7 @@ def run(
     base: AnyPath | None = None,
     threads: int = 1,
     precision: Literal["mixed", "double"] | None = None,
+    device: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
     report: bool = False,
@@ -38,6 +39,8 @@ def run(
     out : the folder for all files; left out, a temporary one that lives as long as the Result.
     threads : how many share the work. What a run writes does not depend on it.
     precision : "mixed" or "double"; as the scene says if left out, or else mixed.
+    device : "cpu", "gpu" or "gpu:N"; as the scene says if left out, or else the CPU. GPUs need a package that was built for
+        them: docs/gpu.md.
     resume : go on from the last checkpoint in `out`. A run that is finished is read.
     overwrite : start over in a folder with another run.
     report : make report.html too.
@@ -57,7 +60,7 @@ def run(
             raise InputError("to resume a run, say where it is: out=…")
         temporary = tempfile.TemporaryDirectory(prefix="psidpd-")
     folder = Path(out if temporary is None else temporary.name)
-    _psidpd.run_scene(*opened(scene, base), folder, threads, precision, begin, report)
+    _psidpd.run_scene(*opened(scene, base), folder, threads, precision, device, begin, report)
     return Result(folder, temporary)
 
 

@@ -25,6 +25,7 @@ class Simulation:
     base : the folder from which paths in a text or a dictionary start, else the present one.
     threads : how many share the work. Numbers do not depend on it.
     precision : "mixed" or "double"; as the scene says if left out, or else mixed.
+    device : "cpu", "gpu" or "gpu:N"; as the scene says if left out, or else the CPU.
 
     The trajectory is that of `psidpd.run`, to the last bit. Output and observables of the scene are left out.
 
@@ -38,8 +39,9 @@ class Simulation:
         base: AnyPath | None = None,
         threads: int = 1,
         precision: Literal["mixed", "double"] | None = None,
+        device: str | None = None,
     ) -> None:
-        self._steps = _psidpd.Steps(*opened(scene, base), threads, precision)
+        self._steps = _psidpd.Steps(*opened(scene, base), threads, precision, device)
 
     def __repr__(self) -> str:
         return f"<psidpd.Simulation of {len(self.types)} particles after step {self.step}>"

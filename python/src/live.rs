@@ -1,6 +1,6 @@
 //! A run that Python steps.
 
-use crate::engine::{settings, thread_count};
+use crate::engine::thread_count;
 use crate::errors::{RunStoppedError, exception, wrong};
 use crate::runs::{LOOK, read_scene};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -76,11 +76,9 @@ impl Steps {
         base: PathBuf,
         threads: usize,
         precision: Option<&str>,
+        device: Option<&str>,
     ) -> PyResult<Steps> {
-        let mut scene = read_scene(path, text, &base)?;
-        if let Some(name) = precision {
-            scene.precision = Some(settings(name, 1)?.precision);
-        }
+        let scene = read_scene(path, text, &base, precision, device)?;
         let threads = thread_count(threads)?;
         let live = py.detach(|| Live::new(scene, threads)).map_err(exception)?;
         let tags = live.simulation().tags();

@@ -21,13 +21,26 @@ const INTERRUPT: usize = 2;
 /// The time between checks for Ctrl-C. Python reports the signal only when asked.
 pub const LOOK: Duration = Duration::from_millis(50);
 
-/// The scene of a file, or of a text whose paths start from a folder.
-pub fn read_scene(path: Option<PathBuf>, text: Option<&str>, base: &Path) -> PyResult<Scene> {
-    match (path, text) {
+/// The scene of a file, or of a text whose paths start from a folder; with another precision or device, if they are given.
+pub fn read_scene(
+    path: Option<PathBuf>,
+    text: Option<&str>,
+    base: &Path,
+    precision: Option<&str>,
+    device: Option<&str>,
+) -> PyResult<Scene> {
+    let mut scene = match (path, text) {
         (Some(path), _) => Scene::open(&path),
         (None, text) => Scene::parse("scene", text.unwrap_or_default(), base),
     }
-    .map_err(exception)
+    .map_err(exception)?;
+    if let Some(name) = precision {
+        scene.precision = Some(settings(name, 1)?.precision);
+    }
+    if let Some(name) = device {
+        scene.device = name.parse().map_err(|message: String| wrong(message))?;
+    }
+    Ok(scene)
 }
 
 /// Runs a scene into the folder `out`: what `psidpd.run` does. The scene is the file `path`, or `text`, whose paths start
@@ -35,7 +48,7 @@ pub fn read_scene(path: Option<PathBuf>, text: Option<&str>, base: &Path) -> PyR
 ///
 /// Ctrl-C ends it after the present step, with a checkpoint, and raises KeyboardInterrupt.
 #[pyfunction]
-#[pyo3(signature = (path, text, base, out, threads, precision, begin, report))]
+#[pyo3(signature = (path, text, base, out, threads, precision, device, begin, report))]
 #[allow(clippy::too_many_arguments, reason = "the Python function has defaults and keywords for them")]
 pub fn run_scene(
     py: Python,
@@ -45,13 +58,11 @@ pub fn run_scene(
     out: PathBuf,
     threads: usize,
     precision: Option<&str>,
+    device: Option<&str>,
     begin: &str,
     report: bool,
 ) -> PyResult<()> {
-    let mut scene = read_scene(path, text, &base)?;
-    if let Some(name) = precision {
-        scene.precision = Some(settings(name, 1)?.precision);
-    }
+    let scene = read_scene(path, text, &base, precision, device)?;
     let threads = thread_count(threads)?;
     let begin = match begin {
         "new" => Begin::New,

@@ -82,6 +82,16 @@ def test_errors_are_those_of_the_command_line(tmp_path):
         psidpd.run(text, out=tmp_path / "out", resume=True, overwrite=True)
 
 
+def test_a_gpu_is_refused_by_name_in_a_package_without_them(tmp_path):
+    with pytest.raises(psidpd.InputError, match="PSIDPD_WITH_GPU=1"):
+        psidpd.run(scene(2), out=tmp_path / "out", device="gpu")
+    with pytest.raises(psidpd.InputError, match="PSIDPD_WITH_GPU=1"):
+        psidpd.Simulation(scene(2).replace("steps", 'device = "gpu:1"\nsteps'))
+    with pytest.raises(psidpd.InputError, match="cpu, gpu, gpu:N"):
+        psidpd.run(scene(2), device="cuda")
+    psidpd.run(scene(2), out=tmp_path / "out", device="cpu")
+
+
 def test_advice_is_for_python(tmp_path):
     psidpd.run(scene(2), out=tmp_path / "out")
     with pytest.raises(psidpd.InputError, match="overwrite=True") as raised:

@@ -50,7 +50,7 @@ pub use images::Images;
 pub use local_energy::{LocalEnergy, NoEnergy};
 pub use particles::{Particles, Step};
 pub use path::{Path, Reason};
-pub use plan::Plan;
+pub use plan::{LinearTerm, Plan};
 pub use psidpd_passes::cells::excluded::Mark;
 pub use psidpd_passes::domain::{DomainError, PeriodicBox};
 pub use psidpd_passes::noise;

@@ -36,8 +36,11 @@ pub struct Plan {
 /// A density that acts as a pair potential.
 #[derive(Debug, Clone)]
 pub struct LinearTerm {
+    /// Index of the density.
     pub density: usize,
+    /// Its weight function.
     pub kernel: Kernel,
+    /// The kernel whose slope is the force law.
     pub force_kernel: Kernel,
     /// Coefficients `c_αβ`, row-major.
     pub coefficients: Vec<f64>,
@@ -155,6 +158,16 @@ impl Plan {
         &self.passes
     }
 
+    /// The densities that act as pair potentials.
+    pub fn linear_terms(&self) -> &[LinearTerm] {
+        &self.linear
+    }
+
+    /// The formula `psi` of species `alpha` as a function of the densities with a pass alone.
+    pub fn of_passes_only(&self, fluid: &Fluid, alpha: usize, psi: &Formula) -> Formula {
+        without_linear(fluid, alpha, &self.passes, psi.clone())
+    }
+
     /// Storage of pairs for the second pass, if there is one.
     pub fn pair_storage(&self) -> Option<PairStorage> {
         let longest = self.passes.iter().map(|d| self.densities[*d].force_kernel.range()).reduce(f64::max)?;
@@ -253,24 +266,29 @@ fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Option<Formula>>], d: usize)
 /// terms, which have become pair terms, vanish.
 fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, TooLarge> {
     let count = fluid.species.len();
-    let mut psi = match &fluid.excess[alpha] {
-        ExcessFreeEnergy::Formula(psi) => psi.clone(),
-        // The curve's density has a pass, and the curve depends on no other.
-        ExcessFreeEnergy::Curve(curve) => return Ok(ExcessPlan::of_curve(fluid, curve.clone(), passes)),
-        // Every density that the slopes depend on has a pass.
-        ExcessFreeEnergy::Slopes(law) => return Ok(ExcessPlan::of_slopes(law, &variables(count, passes))),
-    };
-    for (d, density) in fluid.densities.iter().enumerate() {
-        if passes.contains(&d) {
-            continue;
+    match &fluid.excess[alpha] {
+        ExcessFreeEnergy::Formula(psi) => {
+            let psi = without_linear(fluid, alpha, passes, psi.clone());
+            ExcessPlan::of_formula(fluid, psi, &variables(count, passes))
         }
+        // The curve's density has a pass, and the curve depends on no other.
+        ExcessFreeEnergy::Curve(curve) => Ok(ExcessPlan::of_curve(fluid, curve.clone(), passes)),
+        // Every density that the slopes depend on has a pass.
+        ExcessFreeEnergy::Slopes(law) => Ok(ExcessPlan::of_slopes(law, &variables(count, passes))),
+    }
+}
+
+/// A formula of species `alpha` at n = 0 of the densities without a pass.
+fn without_linear(fluid: &Fluid, alpha: usize, passes: &[usize], mut psi: Formula) -> Formula {
+    let count = fluid.species.len();
+    for (d, density) in fluid.densities.iter().enumerate().filter(|(d, _)| !passes.contains(d)) {
         for beta in 0..count {
             let own = if density.includes_self && alpha == beta { density.kernel.value(0.0) } else { 0.0 };
             let at_zero = density.correction[alpha * count + beta].at(own).0;
             psi = psi.substitute(d * count + beta, at_zero);
         }
     }
-    ExcessPlan::of_formula(fluid, psi, &variables(count, passes))
+    psi
 }
 
 /// The variables of the densities with a pass.

@@ -4,6 +4,7 @@
 extern crate self as psidpd_dynamics;
 
 pub mod checkpoint;
+pub mod device;
 pub mod integrator;
 #[cfg(test)]
 mod observed;

@@ -25,6 +25,9 @@ pub struct About {
     /// The precision of the pair forces; empty in files that do not say it.
     #[serde(default)]
     pub precision: String,
+    /// The processor of the steps, `cpu` or `gpu:N`; empty in files that do not say it.
+    #[serde(default)]
+    pub device: String,
     pub box_origin: [f64; 3],
     /// The three edge vectors of the box. In two dimensions the third has length 1.
     pub box_edges: [[f64; 3]; 3],

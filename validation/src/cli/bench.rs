@@ -1,6 +1,7 @@
 use super::run::thread_count;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
+use psidpd_dynamics::device::Device;
 use psidpd_experiments::bench::{Asked, Options, contender::FEW_ABOVE, memory, page, run as measure};
 use psidpd_experiments::fluids::SIZES;
 use psidpd_experiments::start::SEED;
@@ -49,6 +50,9 @@ pub struct Arguments {
     /// `psidpd lammps install` puts in place.
     #[arg(long, value_name = "WHERE")]
     lammps: Option<PathBuf>,
+    /// Time this GPU alone, at these sizes, in place of all codes; --json has the results.
+    #[arg(long, value_name = "gpu|gpu:N")]
+    device: Option<Device>,
     /// Folder for bench.json, report.html and the runs.
     #[arg(long, value_name = "DIR", default_value = "target/bench")]
     out: PathBuf,
@@ -75,6 +79,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let child = memory::child(particles)?;
         say!("{}", serde_json::to_string(&child)?);
         return Ok(Verdict::Good);
+    }
+    if let Some(device) = arguments.device.filter(|device| *device != Device::Cpu) {
+        return time_device(device, arguments, json);
     }
     let full = arguments.full;
     let sizes = if full { &SIZES[..] } else { &SIZES[..2] };
@@ -125,6 +132,32 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         say!("the machine was busy before (load {load:.1}): do not trust these figures\n");
     }
     say!("report: {}", arguments.out.join("report.html").display());
+    write_json(json, &outcome)?;
+    Ok(Verdict::Good)
+}
+
+#[cfg(not(feature = "gpu"))]
+fn time_device(_: Device, _: &Arguments, _: Option<&Path>) -> Result<Verdict, Failure> {
+    use psidpd_dynamics::{device::DeviceError, run::RunError};
+    Err(RunError::from(DeviceError::NotBuilt).into())
+}
+
+#[cfg(feature = "gpu")]
+fn time_device(device: Device, arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    use psidpd_experiments::bench::device::{Options, run};
+    let options = Options {
+        device,
+        sizes: &or_default(&arguments.sizes, &SIZES[..2]),
+        rounds: arguments.rounds.map_or(3, NonZeroUsize::get),
+        seconds: arguments.seconds.unwrap_or(0.3),
+        out: &arguments.out,
+    };
+    let outcome = run(&options, &Progress::new())?;
+    let found = &outcome.device;
+    say!("{}, {} ({}, {}; {})", found.device, found.name, found.interface, found.driver, found.kind);
+    say::table(&outcome.table());
+    say!("nanoseconds per particle and step, by the clock of the device:");
+    say::table(&outcome.kernels());
     write_json(json, &outcome)?;
     Ok(Verdict::Good)
 }

@@ -7,6 +7,7 @@
 mod bench;
 mod calibrate;
 mod check;
+mod devices;
 mod diagnostic;
 mod error;
 mod examples;
@@ -79,6 +80,8 @@ enum Verb {
     New(new::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
+    /// The GPUs that can make the steps of a run.
+    Devices(devices::Arguments),
     /// Run a scene at many values of its keys.
     Sweep(sweep::Arguments),
     /// Make report.html of a run again, from the files in its folder.
@@ -191,6 +194,7 @@ impl Verb {
             // These verbs read no files named by the user.
             Verb::Validate(_)
             | Verb::Bench(_)
+            | Verb::Devices(_)
             | Verb::Hardcases(_)
             | Verb::Reproduce(_)
             | Verb::Model(_)
@@ -223,6 +227,7 @@ fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         Verb::Model(a) => model::run(a, json),
         Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
+        Verb::Devices(a) => devices::run(a, json),
         Verb::Sweep(a) => sweep::run(a, json),
         Verb::Report(a) => report::run(a, json),
         Verb::Snapshot(a) => snapshot::run(a, json),

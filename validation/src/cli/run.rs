@@ -4,6 +4,7 @@ use super::say::{self, whoever_listens as say};
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::document::printable;
 use psidpd_core::engine::{Pool, Precision, at_once};
+use psidpd_dynamics::device::Device;
 use psidpd_dynamics::run::FILES;
 use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::calibration;
@@ -41,6 +42,10 @@ pub struct Arguments {
     /// In what the forces of pairs are computed; as the scene says if left out, or else mixed.
     #[arg(long, value_parser = precision, value_name = "mixed|double")]
     precision: Option<Precision>,
+    /// The processor that computes the steps, of those that `psidpd devices` lists; as the scene says if left out, or
+    /// else the CPU.
+    #[arg(long, value_name = "cpu|gpu|gpu:N")]
+    device: Option<Device>,
     /// Make report.html at the end, also of a run that stopped.
     #[arg(long)]
     report: bool,
@@ -57,6 +62,7 @@ impl Arguments {
             words.push(format!("--threads {}", self.threads));
         }
         words.extend(self.precision.map(|precision| format!("--precision {precision}")));
+        words.extend(self.device.map(|device| format!("--device {device}")));
         for edit in &self.settings.edits {
             words.push(format!("--set {}", quoted(edit.to_string())?));
         }
@@ -103,9 +109,11 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let Arguments { scene: path, out, resume, overwrite, threads, precision, report, settings } = arguments;
+    let Arguments { scene: path, out, resume, overwrite, threads, precision, device, report, settings } =
+        arguments;
     let mut scene = settings.scene(path)?;
     scene.precision = precision.or(scene.precision);
+    scene.device = device.unwrap_or(scene.device);
     if let Some(warning) = calibration::missing(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
     }
@@ -146,10 +154,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 ));
             }
             if let Some(iterations) = timing.sessions.last().and_then(|session| session.thermostat) {
-                say(&format!(
-                    "the thermostat took {:.1} iterations on average, {} at most",
-                    iterations.mean, iterations.most
-                ));
+                let most = iterations.most.map_or(String::new(), |most| format!(", {most} at most"));
+                say(&format!("the thermostat took {:.1} iterations on average{most}", iterations.mean));
                 if iterations.inaccurate > 0 {
                     warn(&format!(
                         "{} updates of the thermostat are inaccurate: drag is too strong for this dt; use a smaller \

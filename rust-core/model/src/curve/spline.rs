@@ -88,6 +88,11 @@ impl Spline {
         [self.knots[0], self.knots[self.knots.len() - 1]]
     }
 
+    /// The knots, and value and first three derivatives at each, of the piece that begins there.
+    pub fn pieces(&self) -> (&[f64], &[[f64; 4]]) {
+        (&self.knots, &self.pieces)
+    }
+
     /// The number of points that the spline passes through.
     pub fn points(&self) -> usize {
         self.knots.len()

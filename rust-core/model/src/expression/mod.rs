@@ -41,6 +41,7 @@ mod parser;
 mod program;
 mod simplify;
 mod suggest;
+mod wgsl;
 
 pub(crate) use suggest::closest;
 
@@ -52,3 +53,4 @@ pub use expansion::Expansion;
 pub use formula::Formula;
 pub use limits::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
 pub use program::Program;
+pub use wgsl::Wgsl;

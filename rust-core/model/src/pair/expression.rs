@@ -26,6 +26,11 @@ impl ExpressionPair {
         let slope = phi.derivative(0)?;
         Ok(ExpressionPair { program: Program::new(&[phi, &slope]), energy: Program::new(&[phi]), range })
     }
+
+    /// Computes `φ` and `φ'` from the one variable `r`.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
 }
 
 /// The form `expression` in the model file.

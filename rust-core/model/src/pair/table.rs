@@ -20,6 +20,11 @@ impl TablePair {
     pub fn new(spline: Arc<Spline>, range: f64) -> TablePair {
         TablePair { spline, range }
     }
+
+    /// The spline through the rows.
+    pub fn spline(&self) -> &Spline {
+        &self.spline
+    }
 }
 
 /// The form `table` in the model file.

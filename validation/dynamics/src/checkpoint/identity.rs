@@ -9,7 +9,7 @@ use std::path::Path;
 /// The values of all keys of a scene and of its model. Comments, the order of keys and number formats do not count.
 ///
 /// A key that names a file has the content of the file as its value. Titles and the interval of checkpoints
-/// are left out: they change nothing in a trajectory.
+/// are left out: they change nothing in a trajectory. The device is left out because a run may continue on another.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Identity {
     scene: BTreeMap<String, String>,
@@ -23,7 +23,8 @@ impl Identity {
     /// The identity of a scene: `scene` is its text, and its paths start from `folder`.
     pub fn of(scene: &str, folder: &Path, precision: Precision, model: &Model) -> Identity {
         let model = model.source();
-        let mut of_scene = keys(scene, folder, &["title", "model", "output.checkpoint", "precision"]);
+        let mut of_scene =
+            keys(scene, folder, &["title", "model", "output.checkpoint", "precision", "device"]);
         // The precision in use can come from the file, the command line or the default.
         of_scene.insert("precision".into(), format!("{:?}", precision.to_string()));
         let beside_model = Path::new(model.name()).parent().unwrap_or(Path::new(""));

@@ -42,6 +42,7 @@ pub fn about(scene: &Scene) -> About {
         kt: scene.kt,
         seed: scene.seed,
         precision: scene.precision().to_string(),
+        device: scene.device.to_string(),
         box_origin: scene.domain.origin(),
         box_edges: [0, 1, 2].map(|k| scene.domain.edge(k)),
         box_periodic: [x, y, z && scene.model.dimensions() == 3],

@@ -1,4 +1,5 @@
 use crate::checkpoint::{Caller, CheckpointError};
+use crate::device::DeviceError;
 use crate::particles::StateError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
@@ -82,6 +83,8 @@ pub enum RunError {
     #[error("the run would replace {}, which its scene starts from", path.display())]
     OwnInput { path: PathBuf },
     #[error(transparent)]
+    Device(#[from] DeviceError),
+    #[error(transparent)]
     Memory(#[from] MemoryError),
     #[error("another run is writing to {}", folder.display())]
     Busy { folder: PathBuf },
@@ -145,6 +148,7 @@ impl RunError {
             RunError::OwnInput { .. } => "choose another folder, or start from a copy of the file".into(),
             RunError::Busy { .. } => "wait for its end, or choose another folder".into(),
             RunError::Checkpoint(error) => error.help(caller),
+            RunError::Device(error) => return error.help().map(str::to_owned),
             _ => return None,
         })
     }

@@ -30,6 +30,7 @@ impl Live {
         let precision = scene.precision();
         simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;
         simulation.set_reordering(true);
+        scene.put_on_device(&mut simulation)?;
         let mut live = Live { scene, simulation, stage: 0, done: 0, begin: 0.0 };
         live.enter()?;
         Ok(live)
@@ -38,7 +39,8 @@ impl Live {
     fn enter(&mut self) -> Result<(), RunError> {
         let stage = &self.scene.stages[self.stage];
         self.scene.enter(stage, &mut self.simulation)?;
-        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)
+        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
+        self.simulation.fetch()
     }
 
     pub fn scene(&self) -> &Scene {
@@ -84,6 +86,9 @@ impl Live {
             if last || self.done == self.stage().steps {
                 self.simulation.end_step()?;
                 self.simulation.refresh(want)?;
+            }
+            if last {
+                self.simulation.fetch()?;
             }
             if last {
                 break;

@@ -46,7 +46,7 @@ pub enum Start {
         /// The version of the program that wrote the checkpoint, if it differs from this program: later steps
         /// can differ in rounding.
         program: Option<String>,
-        /// The instruction set that the run used before, if it differs: later steps can differ in rounding.
+        /// The instruction set or the GPU that the run used before, if it differs: later steps can differ in rounding.
         instructions: Option<String>,
         /// The fault of the newest checkpoint, if the run continues from the previous one.
         fallback: Option<CheckpointError>,
@@ -110,7 +110,7 @@ impl<'a> Runner<'a> {
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
-            instructions: simulation.settings().instructions.to_string(),
+            instructions: simulation.arithmetic(),
             identity,
             finished: false,
             step: 0,
@@ -138,7 +138,7 @@ impl<'a> Runner<'a> {
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
         }
-        let instructions = simulation.settings().instructions.to_string();
+        let instructions = simulation.arithmetic();
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
         simulation.set_max_move(good.max_move);
         if fallback.is_some() {
@@ -239,6 +239,7 @@ fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
     let mut simulation = scene.simulation(state)?;
     simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
     simulation.set_reordering(true);
+    scene.put_on_device(&mut simulation)?;
     Ok(simulation)
 }
 

@@ -18,6 +18,22 @@ impl Scene {
         Ok(simulation)
     }
 
+    /// Puts a simulation of this scene on the scene's device.
+    ///
+    /// # Errors
+    /// There is no such device, or it does not compute what the scene asks for.
+    pub(super) fn put_on_device(&self, simulation: &mut Simulation) -> Result<(), RunError> {
+        let refused = match simulation.use_device(self.device) {
+            Err(RunError::Device(error)) => Some(self.located(error, |_| None)),
+            outcome => outcome.map(|()| self.refused_by_device())?,
+        };
+        match refused {
+            None => Ok(()),
+            Some((_, Some(located))) => Err(located.into()),
+            Some((error, None)) => Err(error.into()),
+        }
+    }
+
     /// Whether the length of trial moves is still tuned before step `done` of stage `index`. It is tuned in the
     /// first Monte Carlo stage, including all levels of a ramp; if that is the only one, in its first quarter.
     pub(super) fn settles(&self, index: usize, done: u64) -> bool {

@@ -6,7 +6,10 @@ use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
 use std::path::Path;
 
+mod device;
 mod force_gradient;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod integrators;
 mod monte_carlo;
 mod order;

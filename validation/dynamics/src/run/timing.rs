@@ -14,7 +14,7 @@ pub struct Timing {
 }
 
 /// An uninterrupted part of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// The step after which the session began.
     pub from_step: u64,
@@ -24,6 +24,9 @@ pub struct Session {
     pub wall_seconds: f64,
     /// Particles times steps over the wall time.
     pub particle_steps_per_second: f64,
+    /// The GPU that made the steps, with its driver; left out for the CPU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     /// Iterations of an implicit thermostat; left out without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thermostat: Option<Iterations>,
@@ -34,7 +37,9 @@ pub struct Session {
 pub struct Iterations {
     /// Mean of all updates.
     pub mean: f64,
-    pub most: usize,
+    /// `None` from a GPU, which does not count them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most: Option<usize>,
     /// Updates that ended before they were accurate.
     pub inaccurate: u64,
 }
@@ -42,7 +47,7 @@ pub struct Iterations {
 impl Iterations {
     pub(super) fn of(effort: Effort) -> Option<Iterations> {
         let Effort { most, inaccurate, .. } = effort;
-        effort.mean().map(|mean| Iterations { mean, most, inaccurate })
+        effort.mean().map(|mean| Iterations { mean, most: (most > 0).then_some(most), inaccurate })
     }
 }
 
@@ -65,7 +70,7 @@ impl Clock {
     }
 
     /// All sessions, this one up to `step`.
-    pub fn until(&self, step: u64, particles: usize, effort: Effort) -> Timing {
+    pub fn until(&self, step: u64, particles: usize, effort: Effort, device: Option<String>) -> Timing {
         let wall_seconds = self.since.elapsed().as_secs_f64();
         let made = step.saturating_sub(self.from_step) as f64 * particles as f64;
         let mut timing = self.earlier.clone();
@@ -75,6 +80,7 @@ impl Clock {
             wall_seconds,
             // The clock may not have advanced, and JSON has no infinity.
             particle_steps_per_second: made / wall_seconds.max(1e-9),
+            device,
             thermostat: Iterations::of(effort),
         });
         timing

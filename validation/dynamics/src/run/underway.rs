@@ -124,6 +124,7 @@ impl<'a> Run<'a> {
         self.watch = Watch::default();
         self.scene.enter(stage, &mut self.simulation)?;
         self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
+        self.simulation.fetch()?;
         self.present.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
@@ -132,8 +133,7 @@ impl<'a> Run<'a> {
                 self.checkpoint()?;
             }
         }
-        self.keep_state();
-        Ok(())
+        self.keep_state()
     }
 
     fn step(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
@@ -151,12 +151,16 @@ impl<'a> Run<'a> {
         let watched = Watch::is_due(stage, self.present.position.done + 1);
         if watched {
             self.simulation.end_step()?;
+            self.simulation.fetch()?;
             self.watch.sample(&mut self.simulation, stage, self.present.position.done + 1)?;
         }
         let sampled = self.observers.may_sample(number, &stage.name);
         if is_last || totals || sampled || self.writes(number) {
             self.simulation.end_step()?;
             self.simulation.refresh(want)?;
+            if is_last || sampled || self.writes(number) {
+                self.simulation.fetch()?;
+            }
         }
         self.present.position.done += 1;
         self.present.position.time =
@@ -220,8 +224,9 @@ impl<'a> Run<'a> {
                 }
             }
         }
-        if totals {
-            self.keep_state();
+        // Totals alone do not bring the particles from a device.
+        if totals && self.simulation.is_here() {
+            self.keep_state()?;
         }
         let deviations = match self.present.position.done == stage.steps {
             true => self.watch.deviations(stage),
@@ -233,7 +238,8 @@ impl<'a> Run<'a> {
     }
 
     /// Keeps the present state as the last good one. The output of this step must be written already.
-    fn keep_state(&mut self) {
+    fn keep_state(&mut self) -> Result<(), RunError> {
+        self.simulation.fetch()?;
         let good = &mut self.checkpoints.good;
         let Present { position, sums, last } = self.present;
         (good.position, good.sums, good.last) = (position, sums, last);
@@ -247,11 +253,12 @@ impl<'a> Run<'a> {
         if let Some(output) = &mut self.output {
             good.files = output.written();
         }
+        Ok(())
     }
 
     fn checkpoint(&mut self) -> Result<(), RunError> {
         self.simulation.end_step()?;
-        self.keep_state();
+        self.keep_state()?;
         self.store_good()
     }
 
@@ -266,7 +273,7 @@ impl<'a> Run<'a> {
     }
 
     fn timing_until(&self, step: u64) -> Timing {
-        self.clock.until(step, self.simulation.len(), self.simulation.effort())
+        self.clock.until(step, self.simulation.len(), self.simulation.effort(), self.simulation.device_name())
     }
 
     /// Saves the last good state of a failed run.
@@ -301,7 +308,7 @@ impl<'a> Run<'a> {
     }
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
-        self.keep_state();
+        self.keep_state()?;
         let path = self.folder.path().join("final.data");
         write_data(
             &path,

@@ -13,6 +13,7 @@
 mod arrangement;
 mod body_force;
 mod composition;
+mod device;
 mod domain;
 mod edits;
 mod fill;
@@ -40,6 +41,7 @@ pub use stage::Stage;
 pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
+use crate::device::Device;
 use crate::particles::{BodyForce, State, Tags};
 use psidpd_core::document::keys::{of_another_kind, read_known};
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
@@ -60,6 +62,8 @@ pub struct Scene {
     pub seed: u64,
     /// Precision of the pair forces, if the scene gives it.
     pub precision: Option<Precision>,
+    /// The processor that computes a run.
+    pub device: Device,
     pub domain: PeriodicBox,
     /// Mass of each species, in the order of the model.
     pub mass: Vec<f64>,
@@ -124,6 +128,7 @@ impl Scene {
         let kt = root.require("kT")?.positive()?;
         let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
+        let device = root.get("device").map_or(Ok(Device::Cpu), |value| device::read(&value))?;
         let (initial, domain) = initial::read(&root, &model, base)?;
         let stages = stage::read(&root, kt)?;
         let body_forces = body_force::read(&root, &model, &initial)?;
@@ -138,6 +143,7 @@ impl Scene {
             kt,
             seed,
             precision: precision.transpose()?.map(|p| p.value),
+            device,
             mass: masses::read(&root, model.species(), &initial)?,
             frozen: initial.frozen(),
             body_forces,

@@ -7,6 +7,8 @@
 mod clock;
 pub mod contender;
 pub mod deck;
+#[cfg(feature = "gpu")]
+pub mod device;
 pub mod length;
 pub mod memory;
 pub mod native;

@@ -22,6 +22,9 @@ pub fn facts(
         if !a.precision.is_empty() {
             fact("precision", a.precision.clone());
         }
+        if a.device.starts_with("gpu") {
+            fact("device", a.device.clone());
+        }
     }
     let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
     let particles = number("particles").or_else(|| Some(state?.configuration.x.len() as f64));

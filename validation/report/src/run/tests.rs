@@ -24,6 +24,7 @@ pub fn about() -> About {
         kt: 1.0,
         seed: 1,
         precision: "mixed".into(),
+        device: "cpu".into(),
         box_origin: [0.0; 3],
         box_edges: [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 6.0]],
         box_periodic: [true; 3],

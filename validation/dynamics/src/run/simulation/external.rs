@@ -26,6 +26,17 @@ impl External {
         &self.frozen
     }
 
+    #[cfg(feature = "gpu")]
+    pub fn body_forces(&self) -> &[BodyForce] {
+        &self.body_forces
+    }
+
+    /// Sets the force on the frozen particles, if another processor has computed it.
+    #[cfg(feature = "gpu")]
+    pub fn set_support_force(&mut self, force: [f64; 3]) {
+        self.support_force = force;
+    }
+
     /// Finds the frozen particles by their tags, because reordering moves them, and sets their velocities to zero.
     pub fn find_frozen(&mut self, particles: &mut Particles) {
         self.frozen.clear();

@@ -61,6 +61,12 @@ impl Forces {
         Ok(())
     }
 
+    /// Sets the totals of the present step, if another processor has computed them.
+    #[cfg(feature = "gpu")]
+    pub fn set_tally(&mut self, tally: Tally) {
+        self.tally = tally;
+    }
+
     /// Sets the totals of the last evaluation to infinity.
     pub fn set_infinite(&mut self) {
         self.tally = Tally { excess: f64::INFINITY, virial: [f64::INFINITY; 6], ..Tally::default() };
@@ -124,7 +130,7 @@ impl Forces {
         self.engine.use_pair_sums_only(self.pair_sums_only);
     }
 
-    fn out_of_bounds(&self) -> [u64; 2] {
+    pub fn out_of_bounds(&self) -> [u64; 2] {
         let now = self.engine.statistics().out_of_bounds;
         std::array::from_fn(|k| self.earlier_out_of_bounds[k] + now[k])
     }
@@ -164,6 +170,9 @@ impl Simulation {
 
     /// Describes for people how steps that need forces only are evaluated.
     pub fn evaluation(&self) -> String {
+        if let Some(name) = self.device_name() {
+            return format!("{name}, in single precision, with positions exact to 2^-32 of the box");
+        }
         let Forces { engine, all_densities, .. } = &self.forces;
         let want = Want { densities: *all_densities, ..Want::FORCES };
         engine.path_for(Surroundings::Box(self.domain()), want).describe(engine.settings())
@@ -188,6 +197,10 @@ impl Simulation {
 
     /// Number of evaluations of ψ at a density below and above its bounds.
     pub fn out_of_bounds(&self) -> [u64; 2] {
+        #[cfg(feature = "gpu")]
+        if let Some(counts) = self.out_of_bounds_on_gpu() {
+            return counts;
+        }
         self.forces.out_of_bounds()
     }
 

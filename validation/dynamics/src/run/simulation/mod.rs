@@ -4,9 +4,12 @@
 //! the `forces` between them, the `thermostat` where it is not part of these forces, and the `motion`. An
 //! integrator composes a step of the operators in `motion` and `thermostat`.
 
+mod device;
 mod displaced;
 mod external;
 mod forces;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod monte_carlo;
 mod motion;
 mod particles;
@@ -38,7 +41,7 @@ use thermostat::Thermostat;
 ///
 /// Pair noise is keyed by the number of the step whose forces contain it: the forces before the first step
 /// have number 0, and step `n` ends with forces of number `n`, as in LAMMPS.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Simulation {
     particles: Particles,
     external: External,
@@ -52,6 +55,9 @@ pub struct Simulation {
     stale: bool,
     /// The transport of momentum in the present step; `None` without recording.
     record: Option<Box<Record>>,
+    /// The GPU that makes the steps; `None` for the CPU.
+    #[cfg(feature = "gpu")]
+    gpu: Option<Box<gpu::Gpu>>,
 }
 
 impl Simulation {
@@ -77,6 +83,8 @@ impl Simulation {
             number: 0,
             stale: false,
             record: None,
+            #[cfg(feature = "gpu")]
+            gpu: None,
         })
     }
 
@@ -121,6 +129,8 @@ impl Simulation {
         self.motion.forget_kick();
         self.number = number;
         self.stale = false;
+        #[cfg(feature = "gpu")]
+        self.forget_gpu(out_of_bounds);
     }
 
     /// Computes the forces of the present step at the present velocities, thermostat included. A run or a
@@ -134,6 +144,10 @@ impl Simulation {
         self.end_step()?;
         self.thermostat.begin_step();
         self.stale = false;
+        #[cfg(feature = "gpu")]
+        if self.gpu.is_some() {
+            return self.prepare_on_gpu(integrator, dt, want);
+        }
         if !integrator.has_time() {
             return self.forces_or_infinite(want);
         }
@@ -160,6 +174,7 @@ impl Simulation {
     pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         self.begin_step(dt, integrator, want)?;
         self.end_step()?;
+        self.fetch()?;
         if want == Want::FORCES { Ok(()) } else { self.refresh(want) }
     }
 
@@ -168,7 +183,8 @@ impl Simulation {
         for _ in 0..steps {
             self.begin_step(dt, integrator, Want::FORCES)?;
         }
-        self.end_step()
+        self.end_step()?;
+        self.fetch()
     }
 
     /// Makes a step except for its last kick, which the next step can include with the same bits. Until then,
@@ -180,6 +196,10 @@ impl Simulation {
         if !self.thermostat.fits(integrator.properties().drag_in_forces) {
             // The present forces belong to another integrator.
             self.prepare_for(integrator, dt, Want::FORCES)?;
+        }
+        #[cfg(feature = "gpu")]
+        if self.gpu.is_some() {
+            return self.step_on_gpu(dt, integrator, want);
         }
         self.number += 1;
         self.thermostat.begin_step();
@@ -200,8 +220,10 @@ impl Simulation {
     /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing.
     ///
     /// # Errors
-    /// A velocity is not finite.
+    /// A velocity is not finite. On a GPU also the errors of steps before.
     pub(super) fn end_step(&mut self) -> Result<(), RunError> {
+        #[cfg(feature = "gpu")]
+        self.make_collected(false)?;
         self.make_deferred_kick()
     }
 

@@ -40,11 +40,16 @@ impl Particles {
 
     /// Replaces the particles, without wrapping; the box stays.
     pub fn replace(&mut self, state: &State, forces: &[[f64; 3]]) {
-        self.state.copy_particles(state);
+        self.replace_with(|present| present.copy_particles(state), forces);
+    }
+
+    /// Calls `replace` with the particles to replace them; the box stays.
+    pub fn replace_with(&mut self, replace: impl FnOnce(&mut State), forces: &[[f64; 3]]) {
+        replace(&mut self.state);
         self.force.clear();
         self.force.extend_from_slice(forces);
         // A failed start has left no forces.
-        self.force.resize(state.len(), [0.0; 3]);
+        self.force.resize(self.state.len(), [0.0; 3]);
         self.moves += 1;
         self.flux.take();
     }
@@ -104,6 +109,12 @@ impl Particles {
             (tag[k], species[k]) = (of_tag, of_species);
         }
         true
+    }
+
+    /// Sets `Σ m v v` of the present step, if another processor has computed it.
+    #[cfg(feature = "gpu")]
+    pub fn set_momentum_flux(&mut self, flux: [f64; 6]) {
+        self.flux = OnceLock::from(flux);
     }
 
     /// `Σ m v v`, in the order xx, yy, zz, xy, xz, yz.

@@ -62,6 +62,17 @@ impl Thermostat {
         !self.on || self.in_forces.is_none_or(|there| there == drag_in_forces)
     }
 
+    #[cfg(feature = "gpu")]
+    pub fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// Says whether drag and noise are among the present forces.
+    #[cfg(feature = "gpu")]
+    pub fn set_in_forces(&mut self, there: bool) {
+        self.in_forces = Some(there);
+    }
+
     /// Forgets what is known of forces.
     pub fn forget_forces(&mut self) {
         self.in_forces = None;
@@ -256,6 +267,10 @@ impl Simulation {
 
     /// Iterations of the thermostat since the start of this session.
     pub fn effort(&self) -> Effort {
+        #[cfg(feature = "gpu")]
+        if let Some(effort) = self.effort_on_gpu() {
+            return effort;
+        }
         self.thermostat.effort()
     }
 

@@ -79,7 +79,7 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-fn assert_same(a: &Path, b: &Path, when: &str) {
+pub fn assert_same(a: &Path, b: &Path, when: &str) {
     let (a, b) = (contents(a), contents(b));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "{when}");
     for (name, bytes) in &a {
@@ -88,7 +88,7 @@ fn assert_same(a: &Path, b: &Path, when: &str) {
 }
 
 /// Runs to step `at`, requests a stop there, and returns the outcome.
-fn until(scene: &Scene, out: &Path, begin: Begin, at: u64) -> Result<Outcome, RunError> {
+pub fn until(scene: &Scene, out: &Path, begin: Begin, at: u64) -> Result<Outcome, RunError> {
     let stop = AtomicUsize::new(0);
     Runner::begin(scene, out, begin)?.run(&stop, &mut |p| {
         if p.step == at {
@@ -102,7 +102,7 @@ fn interrupted(scene: &Scene, out: &Path, begin: Begin, at: u64) {
     assert_eq!(outcome, Outcome::Interrupted { stop: 15, step: at, steps: STEPS });
 }
 
-fn finished(scene: &Scene, out: &Path, begin: Begin) -> Summary {
+pub fn finished(scene: &Scene, out: &Path, begin: Begin) -> Summary {
     match until(scene, out, begin, u64::MAX).unwrap() {
         Outcome::Finished { summary, .. } => *summary,
         other => panic!("{other:?}"),

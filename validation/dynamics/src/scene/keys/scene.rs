@@ -84,6 +84,11 @@ pub const TOP: Table = Table {
              overrides it. A deck for LAMMPS uses this key if it is given; otherwise its pair styles compute in \
              double precision.",
             "precision = \"double\""),
+        key("device", Text, OPTIONAL,
+            "The processor that computes the steps of `psidpd run`: `cpu` if left out; `gpu` is the first GPU, `gpu:N` \
+             that with the number N in the list of `psidpd devices`. The option `--device` overrides it. A run on a GPU \
+             needs a program that was built for it: see `docs/gpu.md`, which also states what a GPU does not compute.",
+            "device = \"gpu\""),
         LAMBDA,
         GRADIENT,
         THERMOSTAT_STEP,

@@ -1,0 +1,188 @@
+// The implicit midpoint rule over all pairs, by conjugate gradients as on the CPU. With a = √(½Δt) a pair has the vector
+// g = a √γ w_R ê; b is √kT.
+
+// The residual √kT Σ ξ g − K v, and the first direction.
+@compute @workgroup_size(LANES)
+fn heat_start(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    var square = 0.0;
+    if (!halted() && i < P.count) {
+        let own = pos[i];
+        let v = vel[i];
+        let species = species_of(v);
+        var sum = vec3(0.0);
+        @NEIGHBOURS(DRAG_RANGE2)
+            let other = vel[j];
+            let g = drag_vector(species, species_of(other), d, r2);
+            sum += g * (I.b * normal_noise(own.w, at.w) - dot(g, v.xyz - other.xyz));
+        @END
+        let first = inverse_mass(v) * sum;
+        residual[i] = vec4(sum, 0.0);
+        solution[i] = vec4(0.0);
+        direction[i] = vec4(first, 0.0);
+        square = dot(first, sum);
+        if (i == 0u) {
+            status.state = 0u;
+            status.iterations = 0u;
+        }
+    }
+    store_sum(block_of(group, groups), 27u, square, lane);
+}
+
+fn drag_vector(a: u32, b: u32, d: vec3<f32>, r2: f32) -> vec3<f32> {
+    let r = sqrt(r2);
+    return d * select(0.0, I.a * drag_weight(a, b, r) / r, r2 > 0.0);
+}
+
+// The image (M + K) p of the direction.
+@compute @workgroup_size(LANES)
+fn heat_image(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    var curvature = 0.0;
+    var square = 0.0;
+    if (!halted() && status.state == 0u && i < P.count) {
+        let own = pos[i];
+        let v = vel[i];
+        let species = species_of(v);
+        let p = direction[i].xyz;
+        var sum = vec3(0.0);
+        @NEIGHBOURS(DRAG_RANGE2)
+            let g = drag_vector(species, species_of(vel[j]), d, r2);
+            sum += g * dot(g, p - direction[j].xyz);
+        @END
+        if (!is_frozen(v)) {
+            sum += mass_of(v) * p;
+            curvature = dot(p, sum);
+            square = inverse_mass(v) * dot(sum, sum);
+        }
+        image[i] = vec4(sum, 0.0);
+    }
+    store_sum(block_of(group, groups), 28u, curvature, lane);
+    store_sum(block_of(group, groups), 29u, square, lane);
+}
+
+// Sums three entries of all blocks in a fixed order.
+fn sum_of_blocks(entry: u32, lane: u32) -> vec3<f32> {
+    var own = vec3(0.0);
+    for (var block = lane; block < P.blocks; block += LANES) {
+        let at = block * ENTRIES + entry;
+        own += vec3(group_sums[at], group_sums[at + 1u], group_sums[at + 2u]);
+    }
+    return vec3(sum_of_group(own.x, lane), sum_of_group(own.y, lane), sum_of_group(own.z, lane));
+}
+
+// Decides how far to go along the direction. c is the tolerance, d the least relative residual.
+@compute @workgroup_size(LANES)
+fn heat_decide(@builtin(local_invocation_index) lane: u32) {
+    // r·M⁻¹r of the first residual, p·Ap and Ap·M⁻¹Ap.
+    let found = sum_of_blocks(27u, lane);
+    if (lane != 0u || halted()) { return; }
+    if (status.state != 0u) {
+        status.state = 2u;
+        return;
+    }
+    if (status.iterations == 0u) {
+        status.drag = max(sqrt(found.z / found.x) - 1.0, 1.0);
+        let relative = max(I.c / status.drag, I.d);
+        status.now = found.x;
+        status.enough = relative * relative * found.x;
+    }
+    status.iterations += 1u;
+    status.alpha = 0.0;
+    if (found.y > 0.0) { status.alpha = status.now / found.y; }
+}
+
+// Moves along the direction.
+@compute @workgroup_size(LANES)
+fn heat_advance(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    var square = 0.0;
+    if (!halted() && status.state == 0u && i < P.count) {
+        let rest = residual[i].xyz - status.alpha * image[i].xyz;
+        solution[i] += status.alpha * direction[i];
+        residual[i] = vec4(rest, 0.0);
+        square = inverse_mass(vel[i]) * dot(rest, rest);
+    }
+    store_sum(block_of(group, groups), 30u, square, lane);
+}
+
+// Decides whether to go on. The norm is that of the residual itself: in single precision the recurrence of the CPU,
+// α² Ap·M⁻¹Ap − r·M⁻¹r, loses its digits under strong drag.
+@compute @workgroup_size(LANES)
+fn heat_judge(@builtin(local_invocation_index) lane: u32) {
+    let next = sum_of_blocks(30u, lane).x;
+    if (lane != 0u || halted() || status.state != 0u) { return; }
+    status.beta = next / status.now;
+    status.rest = select(0.0, 1.0, status.drag < 10.0);
+    status.now = next;
+    if (is_finite(next) && next > status.enough && status.iterations < 500u) { return; }
+    status.state = 1u;
+    status.updates += 1u;
+    status.total_iterations += status.iterations;
+    if (!is_finite(next) || next > status.enough || I.c < I.d * status.drag) { status.inaccurate += 1u; }
+}
+
+// Computes the next direction. After the last iteration it is the whole change to the midpoint, and the solution has the
+// residual added.
+@compute @workgroup_size(LANES)
+fn heat_turn(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || status.state == 2u || i >= P.count) { return; }
+    let inverse = inverse_mass(vel[i]);
+    if (status.state == 0u) {
+        direction[i] = status.beta * direction[i] + inverse * residual[i];
+    } else {
+        let at = solution[i];
+        direction[i] = at;
+        solution[i] = at + (status.rest * inverse) * residual[i];
+    }
+}
+
+// The virial of the impulses over Δt: drag at the midpoint, and noise. c is 2/Δt.
+@compute @workgroup_size(LANES)
+fn heat_virial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    var virial: array<f32, 6>;
+    if (!halted() && i < P.count) {
+        let own = pos[i];
+        let v = vel[i];
+        let middle = v.xyz + direction[i].xyz;
+        let species = species_of(v);
+        @NEIGHBOURS(DRAG_RANGE2)
+            let other = vel[j];
+            let g = drag_vector(species, species_of(other), d, r2);
+            let along = I.b * normal_noise(own.w, at.w) - dot(g, middle - other.xyz - direction[j].xyz);
+            let size = sqrt(dot(g, g));
+            if (size > 0.0) { add_virial(&virial, g / size, 0.5 * I.c * sqrt(r2) * size * along); }
+        @END
+    }
+    for (var k = 0u; k < 6u; k++) { store_sum(block_of(group, groups), 8u + k, virial[k], lane); }
+}
+
+// v += 2 δ. Fails if conjugate gradients need more iterations.
+@compute @workgroup_size(LANES)
+fn heat_apply(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    if (status.state == 0u) {
+        if (i == 0u) {
+            atomicStore(&status.unfinished, 1u);
+            fail();
+        }
+        return;
+    }
+    let v = vel[i];
+    // A frozen particle has no direction.
+    let u = v.xyz + 2.0 * solution[i].xyz;
+    if (!all_finite(u)) {
+        atomicMin(&status.velocity, pos[i].w);
+        fail();
+    }
+    vel[i] = vec4(u, v.w);
+}

@@ -1,0 +1,198 @@
+// Kick and drift, and the sort by cells that follows.
+
+// v += a F/m (twice if the last kick of the step before was deferred); x += b v. Counts the particles of each cell.
+@compute @workgroup_size(LANES)
+fn kick_drift(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    var v = vel[i];
+    var s = pos[i];
+    var boxes = box_of[i];
+    // The same operation as in `kick`, so that a deferred kick has its bits.
+    let by_force = vec3(I.a * inverse_mass(v));
+    let f = force[i].xyz;
+    var u = fma(by_force, f, v.xyz);
+    if ((I.flags & FLAG_DEFERRED) != 0u) { u = fma(by_force, f, u); }
+    if (!all_finite(u)) {
+        atomicMin(&status.velocity, s.w);
+        fail();
+        return;
+    }
+    let way = I.b * u;
+    for (var k = 0u; k < D; k++) {
+        let move_by = dot(P.row[k].xyz, way);
+        if (!(abs(move_by) < 2147483000.0)) {
+            atomicMin(&status.runaway, s.w);
+            fail();
+            return;
+        }
+        let by = i32(round(move_by));
+        let to = s[k] + bitcast<u32>(by);
+        if (P.walls[k] != 0u) {
+            // Coordinates between walls have 31 bits.
+            if ((to & 0x80000000u) != 0u) {
+                u[k] = -u[k];
+                let mirrored = 0u - to;
+                if (mirrored > 0x80000000u) {
+                    atomicMin(&status.runaway, s.w);
+                    fail();
+                    return;
+                }
+                s[k] = min(mirrored, 0x7fffffffu);
+            } else {
+                s[k] = to;
+            }
+        } else {
+            boxes[k] += select(0, 1, by > 0 && to < s[k]) - select(0, 1, by < 0 && to > s[k]);
+            s[k] = to;
+        }
+    }
+    pos[i] = s;
+    vel[i] = vec4(u, v.w);
+    box_of[i] = boxes;
+    let cell = cell_index(cell_of(s));
+    slots[i].x = atomicAdd(&counts[cell], 1u);
+}
+
+// Counts the particles of each cell, where none moves.
+@compute @workgroup_size(LANES)
+fn count_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    slots[i].x = atomicAdd(&counts[cell_index(cell_of(pos[i]))], 1u);
+}
+
+// v += a F/m.
+@compute @workgroup_size(LANES)
+fn kick(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    let v = vel[i];
+    let u = fma(vec3(I.a * inverse_mass(v)), force[i].xyz, v.xyz);
+    if (!all_finite(u)) {
+        atomicMin(&status.velocity, pos[i].w);
+        fail();
+    }
+    vel[i] = vec4(u, v.w);
+}
+
+var<workgroup> shared_counts: array<u32, LANES>;
+
+// Exclusive sum within a workgroup; `shared_counts[LANES − 1]` is the total afterwards.
+fn scan_group(value: u32, lane: u32) -> u32 {
+    workgroupBarrier();
+    shared_counts[lane] = value;
+    for (var by = 1u; by < LANES; by *= 2u) {
+        workgroupBarrier();
+        var below = 0u;
+        if (lane >= by) { below = shared_counts[lane - by]; }
+        workgroupBarrier();
+        shared_counts[lane] += below;
+    }
+    workgroupBarrier();
+    return shared_counts[lane] - value;
+}
+
+// Sums the counts of SCAN cells, and clears them for the next sort.
+@compute @workgroup_size(LANES)
+fn scan_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let block = block_of(group, groups);
+    let begin = block * SCAN + lane * (SCAN / LANES);
+    var local: array<u32, SCAN / LANES>;
+    var total = 0u;
+    // A failed step keeps its order, with which it may go on.
+    let length = select(arrayLength(&counts), 0u, halted());
+    for (var k = 0u; k < SCAN / LANES; k++) {
+        local[k] = total;
+        if (begin + k < length) {
+            total += atomicLoad(&counts[begin + k]);
+            atomicStore(&counts[begin + k], 0u);
+        }
+    }
+    let before = scan_group(total, lane);
+    for (var k = 0u; k < SCAN / LANES; k++) {
+        if (begin + k < length) { starts[begin + k] = before + local[k]; }
+    }
+    if (lane == 0u && block < arrayLength(&sums) && length > 0u) { sums[block] = shared_counts[LANES - 1u]; }
+}
+
+// Sums the sums, with one workgroup.
+@compute @workgroup_size(LANES)
+fn scan_sums(@builtin(local_invocation_index) lane: u32) {
+    let length = arrayLength(&sums);
+    let writes = !halted();
+    var carry = 0u;
+    for (var begin = 0u; begin < length; begin += LANES) {
+        let k = begin + lane;
+        var value = 0u;
+        if (k < length) { value = sums[k]; }
+        let before = scan_group(value, lane);
+        if (k < length && writes) { sums[k] = carry + before; }
+        carry += shared_counts[LANES - 1u];
+    }
+}
+
+// Lists the particles of each cell, in an order that depends on the run.
+@compute @workgroup_size(LANES)
+fn list_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    slots[first_of(cell_index(cell_of(pos[i]))) + slots[i].x].y = i;
+}
+
+// Moves each particle to its place: by cell, and within a cell by tag.
+@compute @workgroup_size(LANES)
+fn sort(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    let own = pos[i];
+    let cell = cell_index(cell_of(own));
+    let begin = first_of(cell);
+    let to = first_of(cell + 1u);
+    var place = begin;
+    for (var k = begin; k < to; k++) {
+        if (pos[slots[k].y].w < own.w) { place += 1u; }
+    }
+    sorted_pos[place] = own;
+    sorted_vel[place] = vel[i];
+    sorted_box[place] = box_of[i];
+}
+
+// Momentum and its flux, the force on frozen particles, and the largest force.
+@compute @workgroup_size(LANES)
+fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    let block = block_of(group, groups);
+    var v = vec3(0.0);
+    var m = 0.0;
+    var f = vec3(0.0);
+    var support = vec3(0.0);
+    if (i < P.count) {
+        v = vel[i].xyz;
+        m = mass_of(vel[i]);
+        f = force[i].xyz;
+        if (is_frozen(vel[i])) {
+            support = f;
+            f = vec3(0.0);
+        }
+    }
+    store_sum(block, 14u, m * v.x * v.x, lane);
+    store_sum(block, 15u, m * v.y * v.y, lane);
+    store_sum(block, 16u, m * v.z * v.z, lane);
+    store_sum(block, 17u, m * v.x * v.y, lane);
+    store_sum(block, 18u, m * v.x * v.z, lane);
+    store_sum(block, 19u, m * v.y * v.z, lane);
+    for (var k = 0u; k < 3u; k++) {
+        store_sum(block, 20u + k, m * v[k], lane);
+        store_sum(block, 23u + k, support[k], lane);
+    }
+    let largest = largest_of_group(max(abs(f.x), max(abs(f.y), abs(f.z))), lane);
+    if (lane == 0u) { group_sums[block * ENTRIES + 26u] = largest; }
+}

@@ -1,0 +1,52 @@
+//! The processor that makes the steps.
+
+use super::{RunError, Simulation};
+use crate::device::Device;
+
+impl Simulation {
+    /// Sets the processor of later steps; a new simulation is on the CPU.
+    ///
+    /// # Errors
+    /// There is no such device, or it cannot compute this model in this box.
+    pub fn use_device(&mut self, device: Device) -> Result<(), RunError> {
+        match device {
+            Device::Cpu => Ok(()),
+            #[cfg(feature = "gpu")]
+            Device::Gpu(number) => self.use_gpu(number),
+            #[cfg(not(feature = "gpu"))]
+            Device::Gpu(_) => Err(crate::device::DeviceError::NotBuilt.into()),
+        }
+    }
+
+    /// The GPU in words; `None` for the CPU.
+    pub fn device_name(&self) -> Option<String> {
+        #[cfg(feature = "gpu")]
+        return self.gpu_name();
+        #[cfg(not(feature = "gpu"))]
+        None
+    }
+
+    /// The processor and its arithmetic, which rounding depends on.
+    pub(in crate::run) fn arithmetic(&self) -> String {
+        self.device_name().unwrap_or_else(|| self.settings().instructions.to_string())
+    }
+
+    /// Copies the particles of the present step from the device into the arrays of the host. Until then the arrays are
+    /// those of an earlier step; totals, temperature and pressure are always those of the present one.
+    ///
+    /// # Errors
+    /// A step before has failed on the device.
+    pub fn fetch(&mut self) -> Result<(), RunError> {
+        #[cfg(feature = "gpu")]
+        self.fetch_from_gpu()?;
+        Ok(())
+    }
+
+    /// Whether the arrays of the host are those of the present step.
+    pub(in crate::run) fn is_here(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        return self.is_fetched();
+        #[cfg(not(feature = "gpu"))]
+        true
+    }
+}

@@ -1,0 +1,195 @@
+//! Runs on a GPU beside runs on the CPU. They need a Vulkan driver: Mesa's llvmpipe computes on the processor.
+
+use super::resume::{assert_same, finished, until};
+use super::*;
+use crate::checkpoint::{Store, read_state};
+use crate::device::{Device, gpus};
+use psidpd_observe::{difference, estimate};
+use std::num::NonZeroUsize;
+
+const BINARY: &str = include_str!("../../../../models/binary-2d.toml");
+
+/// A frozen floor, gravity, a wall, a ramp, two integrators, bounds that the liquid exceeds, and observables of momentum.
+const MUCH: &str = "title = \"much\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 6.05\ndevice = \"gpu\"\n\
+    [box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+    [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
+    [[part]]\nshape = \"rest\"\nmin_distance = 0.42\n\
+    [[body_force]]\nacceleration = [0.1, 0.0, -0.2]\n\
+    [[stage]]\nname = \"cool\"\nsteps = 6\nkT = [1.5, 1.0]\nlevels = 3\nintegrator = \"two-stage\"\ndt = 0.02\n\
+    [[stage]]\nname = \"alone\"\nsteps = 5\ndt = 0.005\nbody_forces = false\n\
+    [[stage]]\nname = \"run\"\nsteps = 9\n\
+    [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n\
+    [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\npressure = true\ntemperature = true\n";
+
+fn much() -> Scene {
+    let model = SET6.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 4.5]");
+    test_support::scene(&model, MUCH).unwrap()
+}
+
+fn on(device: Device, scene: &Scene) -> Scene {
+    Scene { device, ..scene.clone() }
+}
+
+const GPU: Device = Device::Gpu(0);
+
+#[test]
+fn two_runs_have_the_same_bits_and_so_has_a_run_that_was_stopped() {
+    let scene = much();
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second, often] = ["first", "second", "often"].map(|name| folder.path().join(name));
+    let summary = finished(&scene, &first, Begin::New);
+    assert_eq!(finished(&scene, &second, Begin::New), summary);
+    assert_same(&first, &second, "again");
+    for step in [0, 3, 6, 9, 11, 17] {
+        until(&scene, &often, Begin::Resume, step).unwrap();
+    }
+    assert_eq!(finished(&scene, &often, Begin::Resume), summary);
+    assert_same(&first, &often, "stopped");
+    let timing = Timing::read(&often);
+    let name = gpus().unwrap().swap_remove(0).name;
+    assert!(
+        timing.sessions.len() > 5
+            && timing.sessions.iter().all(|s| {
+                s.device
+                    .as_ref()
+                    .is_some_and(|device| device.starts_with("gpu:0, ") && device.contains(&name))
+            })
+    );
+    let about = std::fs::read_to_string(first.join("about.json")).unwrap();
+    assert!(about.contains("\"device\": \"gpu:0\""), "{about}");
+}
+
+/// The rows of a run on the CPU, and of one that changes its device at steps of every kind, agree to single precision.
+#[test]
+fn a_checkpoint_goes_on_with_another_device() {
+    let scene = much();
+    let cpu = on(Device::Cpu, &scene);
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, mixed] = ["whole", "mixed"].map(|name| folder.path().join(name));
+    let expected = finished(&cpu, &whole, Begin::New);
+    for (device, step) in [(Device::Cpu, 3), (GPU, 8), (Device::Cpu, 10), (GPU, 15)] {
+        until(&on(device, &scene), &mixed, Begin::Resume, step).unwrap();
+    }
+    let mut runner = Runner::begin(&cpu, &mixed, Begin::Resume).unwrap();
+    match runner.start() {
+        Start::Resumed { step: 15, instructions: Some(other), .. } => assert!(other.starts_with("gpu:0, ")),
+        other => panic!("{other:?}"),
+    }
+    let never = std::sync::atomic::AtomicUsize::new(0);
+    let Outcome::Finished { summary, timing, .. } = runner.run(&never, &mut |_| ()).unwrap() else {
+        panic!()
+    };
+    let devices: Vec<bool> = timing.sessions.iter().map(|s| s.device.is_some()).collect();
+    assert_eq!(devices, [false, true, false, true, false]);
+    // Single precision can put a density on the other side of a bound.
+    assert!(expected.out_of_bounds.iter().sum::<u64>() > 100, "{expected:?}");
+    for (found, expected) in summary.out_of_bounds.into_iter().zip(expected.out_of_bounds) {
+        assert!(found.abs_diff(expected) <= 1 + expected / 1000, "{found} {expected}");
+    }
+    let [(a, _), (b, _)] = [&whole, &mixed].map(|out| {
+        let state = read_state(&Store::new(out).path()).unwrap();
+        let mut order: Vec<usize> = (0..state.len()).collect();
+        order.sort_by_key(|k| state.tag[*k]);
+        let of = |all: &[[f64; 3]]| order.iter().flat_map(|k| all[*k]).collect::<Vec<f64>>();
+        ((of(&state.x), of(&state.v)), state)
+    });
+    for (a, b) in a.0.iter().zip(&b.0).chain(a.1.iter().zip(&b.1)) {
+        assert!((a - b).abs() < 1e-4, "{a} {b}");
+    }
+    let rows = |out: &Path| -> Vec<f64> {
+        let text = std::fs::read_to_string(out.join("thermo.csv")).unwrap();
+        text.lines().skip(1).flat_map(|line| line.split(',')).map(|x| x.parse().unwrap()).collect()
+    };
+    let [rows_a, rows_b] = [&whole, &mixed].map(|out| rows(out));
+    assert_eq!(rows_a.len(), rows_b.len());
+    for (a, b) in rows_a.iter().zip(&rows_b) {
+        assert!((a - b).abs() < 1e-3 * a.abs().max(1.0), "{a} {b}");
+    }
+}
+
+/// Means of a long run, each with its error: kinetic temperature, pressure and potential energy of a particle.
+fn means(scene: &Scene) -> Vec<psidpd_observe::Estimate> {
+    let mut live = Live::new(scene.clone(), NonZeroUsize::MIN).unwrap();
+    let mut series = vec![Vec::new(); 3];
+    for k in 0..150 {
+        live.run(8, || false).unwrap();
+        let now = live.simulation();
+        let pressure = now.scalar_pressure(now.conservative_pressure_tensor());
+        let values = [now.temperature(), pressure, now.potential_energy() / now.len() as f64];
+        // A fifth for the start to settle.
+        if k >= 30 {
+            values.iter().zip(&mut series).for_each(|(value, series)| series.push(*value));
+        }
+    }
+    series.iter().map(|values| estimate(values).unwrap()).collect()
+}
+
+/// Set 6 and the binary mixture, each with an integrator. A right program fails once in 100 000 sets of seeds.
+#[test]
+fn temperature_pressure_and_energy_are_those_of_the_cpu() {
+    const FALSE_ALARM: f64 = 1e-5;
+    let cases = [
+        (SET6, "[4.0, 4.0, 4.0]", 6.05, "dt = 0.01"),
+        (BINARY, "[8.0, 8.0]", 10.0, "dt = 0.04\nintegrator = \"two-stage\"\nthermostat_every = 2"),
+    ];
+    for (model, lengths, density, step) in cases {
+        let stage = format!("[[stage]]\nname = \"run\"\nsteps = 1200\n{step}\n");
+        let scene = scene_of(model, lengths, density, &stage).unwrap();
+        // Two seeds are two samples of one ensemble.
+        let cpu = means(&scene);
+        let gpu = means(&Scene { device: GPU, seed: 8, ..scene });
+        for (name, (a, b)) in ["T", "p", "u"].iter().zip(cpu.iter().zip(&gpu)) {
+            let found = difference(a, b);
+            assert!(!found.exceeds(3 * cases.len(), FALSE_ALARM), "{step}: {name}: {a:?} {b:?}");
+            // Errors so large that nothing could fail would be no test.
+            assert!(found.error < 0.05 * a.mean.abs().max(1.0), "{name}: {found:?}");
+        }
+    }
+}
+
+fn refused(text: &str) -> String {
+    let scene = test_support::scene(SET6, text).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    match Runner::begin(&scene, &folder.path().join("out"), Begin::New) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("accepted: {text}"),
+    }
+}
+
+#[test]
+fn what_a_gpu_does_not_do_is_named_with_its_line() {
+    let base = "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 2\n";
+    for (rest, line, what) in [
+        ("device = \"gpu:99\"\n", "s.toml:6:", "no device gpu:99"),
+        ("device = \"gpu\"\nintegrator = \"aboba\"\n", "s.toml:7:", "not on a GPU: integrator = \"aboba\""),
+        ("device = \"gpu\"\nprecision = \"double\"\n", "s.toml:7:", "not on a GPU: double precision"),
+        (
+            "integrator = \"two-stage\"\nthermostat_step = \"pairwise\"\ndevice = \"gpu\"\n",
+            "s.toml:6:",
+            "thermostat_step = \"pairwise\"",
+        ),
+    ] {
+        let error = refused(&format!("{base}{rest}"));
+        assert!(error.contains(line) && error.contains(what), "{error}");
+    }
+}
+
+#[test]
+fn a_run_that_fails_says_what_the_cpu_says_and_leaves_its_last_good_state() {
+    let text =
+        "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 60\ndt = 0.2\ndevice = \"gpu\"\n";
+    let scene = test_support::scene(SET6, text).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let error = until(&scene, &out, Begin::New, u64::MAX).unwrap_err();
+    let RunError::Stopped { cause, good: 0, .. } = &error else { panic!("{error:?}") };
+    let physical = matches!(
+        **cause,
+        RunError::Velocity { .. }
+            | RunError::Runaway { .. }
+            | RunError::Engine { .. }
+            | RunError::TooHot { .. }
+    );
+    assert!(physical, "{cause:?}");
+    assert!(out.join("last-good.data").is_file());
+}
