@@ -32,7 +32,8 @@ impl FreeEnergies {
     /// ψ of particles with one species each, at their uncorrected densities, density-major.
     pub fn psi(&self, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
         let (count, variables) = (fluid.species.len(), fluid.variables());
-        let mut psi = Psi::default();
+        let room = |per_particle: usize| Vec::with_capacity(species.len() * per_particle);
+        let mut psi = Psi { value: room(1), slopes: room(variables), second: room(variables * variables) };
         let (mut one, mut work) = (free_energy::Psi::default(), free_energy::Work::default());
         let (mut corrected, mut at) = (Vec::new(), Vec::new());
         for (k, alpha) in species.iter().map(|alpha| *alpha as usize).enumerate() {
