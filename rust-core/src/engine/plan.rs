@@ -342,7 +342,9 @@ impl fmt::Display for Plan {
                 write!(f, "; force by the {} kernel: NOT CONSERVATIVE", density.force_kernel.kind().name())?;
             }
             if let Some(bounds) = density.bounds {
-                write!(f, "; psi continued outside [{}, {}]", bounds.low, bounds.high)?;
+                // Twelve digits leave out the rounding of a formula.
+                let [low, high] = [bounds.low, bounds.high].map(|x| format!("{x:.11e}").parse().unwrap_or(x));
+                write!(f, "; psi continued outside [{low}, {high}]")?;
                 if bounds.below == Continuation::Constant {
                     write!(f, ", psi' constant below")?;
                 }

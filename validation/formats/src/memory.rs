@@ -6,7 +6,7 @@ use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
 /// Bytes per particle of a short run at its peak (docs/bench.md).
-pub const PARTICLE: f64 = 430.0;
+pub const PARTICLE: f64 = 480.0;
 
 /// Bytes of a process without particles.
 const PROGRAM: f64 = 2e7;

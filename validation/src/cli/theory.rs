@@ -336,8 +336,10 @@ fn beside(
     let phases = prediction.and_then(|p| p.phases.as_ref().ok());
     let interface = prediction.and_then(|p| p.interface.as_ref().ok());
     let correlated = prediction.and_then(|p| p.correlated.as_ref());
+    // The density of no pressure is found to rounding.
+    let settled = |p: f64| if p.abs() < 1e-9 * pressure.abs() { 0.0 } else { p };
     let rows = [
-        ("pressure", Some(pressure), correlated.map(|c| c.pressure)),
+        ("pressure", Some(pressure), correlated.map(|c| settled(c.pressure))),
         ("liquid", phases.map(|b| b.liquid), prediction.and_then(|p| p.correlated_liquid)),
         ("vapour", phases.map(|b| b.vapour), None),
         ("tension", interface.map(|i| i.tension), None),

@@ -58,8 +58,8 @@ const FACES: f64 = 1.2;
 const WORTH_A_LOOK: u64 = 1000;
 
 /// Bytes per particle of the pairs of a thermostat, and of an evaluation for a configurational temperature.
-const PAIRS: f64 = 270.0;
-const EVALUATION: f64 = 900.0;
+const PAIRS: f64 = 540.0;
+const EVALUATION: f64 = 2300.0;
 
 /// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -188,17 +188,14 @@ impl Configurational {
 }
 
 /// Bytes per particle at the peak of a run of a scene, about those of Warren's liquid (docs/bench.md). The watch lists the
-/// pairs of the thermostat, and for configurational temperatures the pairs of the forces; so does the advice at the end
-/// of a small run.
+/// pairs of the thermostat; where there are few particles, watch or advice evaluate forces with all their pairs too.
 pub fn bytes_per_particle(scene: &Scene) -> f64 {
     let particles: usize = scene.initial.parts().iter().map(|part| part.count).sum();
-    let any = |least: u64| {
-        particles <= MOST || scene.stages.iter().any(|stage| stage.thermostat && stage.steps >= least)
-    };
-    [(LEAST, PAIRS), (WORTH_A_LOOK, EVALUATION)]
-        .iter()
-        .filter(|(least, _)| any(*least))
-        .fold(PARTICLE, |sum, (_, bytes)| sum + bytes)
+    if particles <= MOST {
+        return PARTICLE + PAIRS + EVALUATION;
+    }
+    let watched = scene.stages.iter().any(|stage| stage.thermostat && stage.steps >= LEAST);
+    PARTICLE + if watched { PAIRS } else { 0.0 }
 }
 
 impl Watch {
@@ -325,10 +322,12 @@ fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Esti
     (error.is_finite() && error > 0.0).then_some(found)
 }
 
-/// The sums for a configurational temperature; `None` if the model has none or the blocks are too few for an error.
+/// The sums for a configurational temperature; `None` if the model has none, if the blocks are too few for an error, and with
+/// so many particles that their pairs would fill the memory.
 fn configurational(simulation: &Simulation) -> Option<Configurational> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
-    if simulation.has_body_forces() || configurational::missing(&fluid, simulation.domain()).is_some() {
+    let missing = configurational::missing(&fluid, simulation.domain()).is_some();
+    if simulation.len() > MOST || simulation.has_body_forces() || missing {
         return None;
     }
     let evaluator = Evaluator::new(fluid).ok()?;
