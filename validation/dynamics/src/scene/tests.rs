@@ -355,7 +355,7 @@ fn errors_of_parts_name_line_key_and_cause() {
     let rests = nothing.to_owned() + "density = 1\n[[part]]\nshape = \"rest\"\n[[part]]\nshape = \"rest\"\n";
     assert!(parse(&rests).unwrap_err().to_string().contains("part 1 is the rest already"));
     let full = nothing.to_owned() + "density = 1\n[[part]]\nshape = \"box\"\n[[part]]\nshape = \"rest\"\n";
-    assert!(parse(&full).unwrap_err().to_string().contains("there is no rest"));
+    assert!(parse(&full).unwrap_err().to_string().contains("leave no rest"));
 }
 
 /// Two drops that fly at each other in a bath: species, places and velocities are those of the file.

@@ -152,8 +152,10 @@ fn a_script_can_have_another_style_and_more_output() {
         Script { plugin: false, style: Some(("mdpd", own)), before_last_run: more, final_data: false };
     let changed = script_of(&scene, script).unwrap();
     let gone: Vec<&str> = usual.lines().filter(|line| !changed.lines().any(|l| l == *line)).collect();
-    let [atoms, comment, load, style, pairs, data] = gone[..] else { panic!("{gone:?}") };
-    assert!(comment.starts_with('#') && atoms == "atom_style    atomic" && load.starts_with("plugin  "));
+    let [atoms, newton, comments @ .., load, style, pairs, data] = &gone[..] else { panic!("{gone:?}") };
+    assert!(comments.len() == 4 && comments.iter().all(|line| line.starts_with('#')), "{comments:?}");
+    assert!(*newton == "newton        off" && changed.contains("\nnewton        on\n"));
+    assert!(*atoms == "atom_style    atomic" && load.starts_with("plugin  "));
     assert!(style.starts_with("pair_style    dpd/psi") && pairs.starts_with("pair_coeff"));
     assert!(data.starts_with("write_data"));
     assert!(changed.contains("\natom_style    mdpd\n") && changed.matches(own).count() == 1);
