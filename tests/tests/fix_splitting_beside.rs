@@ -106,7 +106,7 @@ fn fixes_that_are_refused_and_fixes_that_are_not() {
         "ttm 1 1 1 1 1 1 1 1 1 1",
         "langevin 1 1 1 7",
         "press/langevin iso 1 1 1 temp 1 1 7",
-        "nonaffine/displacement integrated fixed 0",
+        "nonaffine/displacement 1 integrated fixed 0",
     ] {
         let name = fix.split(' ').next().unwrap();
         let error = with(&format!("all {fix}")).expect_err(fix);
