@@ -1,5 +1,5 @@
 //! Evaluates forces a given number of times, for counting instructions: the same fluid, particles and steps
-//! in every run, one thread.
+//! in every run.
 //!
 //! ```text
 //! valgrind --tool=callgrind --callgrind-out-file=/dev/null \
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! With a number of sides as fifth word the particles are those of a rank that has ghosts on 2 (along z), 4
-//! or 6 sides; the sixth word is the number of particles, 2000 unless given.
+//! or 6 sides; the sixth word is the number of particles, 2000 unless given; the seventh that of threads.
 //!
 //! The difference between runs of different length is the cost of the additional evaluations. The
 //! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
@@ -15,7 +15,9 @@
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
-use setup::{Cloud, Rank, choose, faces, sweep};
+use psidpd_core::engine::{Settings, Sweep};
+use setup::{Cloud, Rank, choose, faces};
+use std::num::NonZeroUsize;
 use std::process::ExitCode;
 
 const COUNT: usize = 2000;
@@ -26,7 +28,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES [PARTICLES]]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES [PARTICLES [THREADS]]]"
             );
             ExitCode::FAILURE
         }
@@ -37,12 +39,15 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let [fluid, precision, instructions, evaluations, rest @ ..] = arguments else {
         return Err("four arguments are needed".into());
     };
-    let (subject, precision, set) = choose(fluid, precision, instructions)?;
+    let (subject, precision, instructions) = choose(fluid, precision, instructions)?;
     let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
     let fluid = subject.fluid();
-    let mut sweep = sweep(&fluid, precision, set);
     let faces = faces(rest.first())?;
     let count = rest.get(1).map_or(Ok(COUNT), |n| n.parse()).map_err(|_| "PARTICLES is a number")?;
+    let threads = rest.get(2).map_or(Ok(NonZeroUsize::MIN), |n| n.parse());
+    let threads = threads.map_err(|_| "THREADS is a number above 0")?;
+    let mut sweep =
+        Sweep::new(&fluid, Settings { precision, instructions, threads }).map_err(|e| e.to_string())?;
     let force = match faces {
         0 => {
             let mut cloud = Cloud::new(subject, &fluid, count);
