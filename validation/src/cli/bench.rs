@@ -1,7 +1,7 @@
 use super::run::thread_count;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
-use psidpd_experiments::bench::{Options, contender::FEW_ABOVE, memory, page, run as measure};
+use psidpd_experiments::bench::{Options, advice, contender::FEW_ABOVE, memory, page, run as measure};
 use psidpd_experiments::fluids::SIZES;
 use psidpd_report::Progress;
 use std::num::NonZeroUsize;
@@ -107,6 +107,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         ("Where it goes in LAMMPS with the plugin, ns per particle and step:", page::plugin_parts(&outcome)),
     ] {
         say!("{heading}\n");
+        say::table(&table);
+    }
+    if let Some((text, table)) = advice::of(&outcome) {
+        say!("{text}\n");
         say::table(&table);
     }
     let machine = &outcome.machine;

@@ -1,5 +1,6 @@
 //! Results as tables and plots.
 
+use super::advice;
 use super::outcome::{Asked, Machine, Outcome, Run};
 use super::spread::Spread;
 use crate::ExperimentError;
@@ -140,6 +141,13 @@ fn scaling(outcome: &Outcome) -> Table {
     table
 }
 
+fn ranks_or_threads(outcome: &Outcome) -> Vec<Item> {
+    let Some((text, table)) = advice::of(outcome) else {
+        return vec![Item::Prose("Not known without runs on two threads and on two ranks.".into())];
+    };
+    vec![Item::Prose(text), Item::Table(table)]
+}
+
 fn memory(outcome: &Outcome) -> Table {
     let mut table = Table::new(["particles", "bytes per particle", "of these in the engine", "MB"]);
     for m in &outcome.memory {
@@ -229,6 +237,7 @@ pub fn report(outcome: &Outcome) -> Result<String, ExperimentError> {
             ],
         ),
         section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
+        section("Ranks or threads", ranks_or_threads(outcome)),
         section("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
     let missing = match outcome.lammps.missing.join(", ") {
