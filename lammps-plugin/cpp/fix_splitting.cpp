@@ -1,6 +1,7 @@
 #include "fix_splitting.h"
 
 #include "pair_psi.h"
+#include "slices.h"
 
 #include "angle.h"
 #include "atom.h"
@@ -245,24 +246,30 @@ double FixSplitting::compute_scalar()
   return pair ? pair->iterations() : 0.0;
 }
 
+Movers FixSplitting::movers() const
+{
+  const size_t owned = atom->nlocal;
+  Movers movers{};
+  movers.group = groupbit;
+  movers.mask = {atom->mask, owned};
+  movers.kind = {atom->type, owned};
+  if (atom->rmass)
+    movers.mass = {atom->rmass, owned};
+  else
+    movers.mass_of_kind = {atom->mass, static_cast<size_t>(atom->ntypes) + 1};
+  return movers;
+}
+
 void FixSplitting::kick(double h)
 {
-  double **v = atom->v, **f = atom->f;
   const int owned = atom->nlocal;
-  for (int i = 0; i < owned; i++) {
-    if (!(atom->mask[i] & groupbit)) continue;
-    const double over_mass = h * force->ftm2v / (atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]);
-    for (int k = 0; k < 3; k++) v[i][k] += over_mass * f[i][k];
-  }
+  if (owned > 0) pair->engine().kick(h * force->ftm2v, movers(), flat(atom->f, owned), flat_mut(atom->v, owned));
 }
 
 void FixSplitting::drift(double h)
 {
-  double **x = atom->x, **v = atom->v;
   const int owned = atom->nlocal;
-  for (int i = 0; i < owned; i++)
-    if (atom->mask[i] & groupbit)
-      for (int k = 0; k < 3; k++) x[i][k] += h * v[i][k];
+  if (owned > 0) pair->engine().drift(h, movers(), flat(atom->v, owned), flat_mut(atom->x, owned));
 }
 
 // Other fixes that act after atoms have moved, like those that make bonds, act once a step.
@@ -278,12 +285,9 @@ void FixSplitting::act()
   if (step % every != 0) return;
   double impulses[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const double times = static_cast<double>(every);
-  const int owned = atom->nlocal;
-  masses.resize(owned);
-  for (int i = 0; i < owned; i++) {
-    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
-    masses[i] = (atom->mask[i] & groupbit) && !held[i] ? force->mvv2e * mass : HUGE_VAL;
-  }
+  masses.resize(atom->nlocal);
+  if (!masses.empty())
+    pair->engine().find_masses(force->mvv2e, movers(), {held.data(), held.size()}, {masses.data(), masses.size()});
   const uint64_t inaccurate = pair->effort().inaccurate;
   pair->heat(masses, times * update->dt, uniform, vflag_global != 0, impulses);
   if (inaccurate == before.inaccurate && pair->effort().inaccurate > inaccurate && comm->me == 0)

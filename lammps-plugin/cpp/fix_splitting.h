@@ -56,6 +56,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
   // The pair style whose drag and noise this fix applies.
   PairPsi *find_pair();
 
+  // The atoms of this rank, and the group that moves.
+  Movers movers() const;
   // v += h f/m of the atoms of the group.
   void kick(double h);
   // x += h v of the atoms of the group.
@@ -91,7 +93,7 @@ class FixSplitting : public LAMMPS_NS::Fix {
   bool uniform = false;
   PairPsi *pair = nullptr;
   // For each atom whether other fixes set its whole force.
-  std::vector<char> held;
+  std::vector<uint8_t> held;
   // Masses for the thermostat, infinite for atoms that keep their velocities.
   std::vector<double> masses;
   // Iterations of the thermostat before this run.

@@ -1,6 +1,8 @@
 // Forces at displaced positions, for the force-gradient step.
 
 #include "fix_splitting.h"
+#include "pair_psi.h"
+#include "slices.h"
 
 #include "atom.h"
 #include "comm.h"
@@ -59,14 +61,9 @@ double FixSplitting::memory_usage()
 // Displaced atoms never change ranks: LAMMPS would lose them behind a side that is not periodic.
 void FixSplitting::compute_displaced_forces()
 {
-  double **f = atom->f;
-  const int owned = atom->nlocal;
   const double far = gradient * update->dt * update->dt * force->ftm2v;
-  for (int i = 0; i < owned; i++) {
-    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
-    const double over_mass = (atom->mask[i] & groupbit) ? far / mass : 0.0;
-    for (int k = 0; k < 3; k++) shifts[i][k] = over_mass * f[i][k];
-  }
+  const int owned = atom->nlocal;
+  if (owned > 0) pair->engine().find_shifts(far, movers(), flat(atom->f, owned), flat_mut(shifts, owned));
   shift();
   if (are_far()) {
     restore();
@@ -84,17 +81,14 @@ void FixSplitting::compute_displaced_forces()
 
 void FixSplitting::shift()
 {
-  double **x = atom->x;
   const int owned = atom->nlocal;
   home.resize(3 * static_cast<size_t>(owned));
-  for (int i = 0; i < owned; i++)
-    for (int k = 0; k < 3; k++) {
-      home[3 * static_cast<size_t>(i) + k] = x[i][k];
-      x[i][k] += shifts[i][k];
-    }
+  if (home.empty()) return;
+  pair->engine().copy(flat(atom->x, owned), {home.data(), home.size()});
+  pair->engine().shift(flat(shifts, owned), flat_mut(atom->x, owned));
 }
 
 void FixSplitting::restore()
 {
-  if (!home.empty()) std::copy_n(home.begin(), home.size(), &atom->x[0][0]);
+  if (!home.empty()) pair->engine().copy({home.data(), home.size()}, flat_mut(atom->x, atom->nlocal));
 }

@@ -53,6 +53,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Applies drag and noise for a time to the velocities of atoms with these masses (energy over squared velocity), at
   // the positions where forces were last computed; adds the virial. Atoms of infinite mass keep their velocities.
   void heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial);
+  // The engine, which exists after init_style().
+  Style &engine() { return **style; }
   // Iterations of the thermostat in its last update, and of all its updates since the style was set up.
   int iterations() { return style ? static_cast<int>((*style)->iterations()) : 0; }
   Effort effort() { return style ? psidpd::effort(**style) : Effort{}; }

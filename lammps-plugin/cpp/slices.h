@@ -16,6 +16,12 @@ inline rust::Slice<const double> flat(double **rows, int count)
   return {rows[0], 3 * static_cast<std::size_t>(count)};
 }
 
+inline rust::Slice<double> flat_mut(double **rows, int count)
+{
+  if (count == 0) return {};
+  return {rows[0], 3 * static_cast<std::size_t>(count)};
+}
+
 }    // namespace psidpd
 
 #endif

@@ -97,6 +97,17 @@ mod ffi {
         virial: bool,
     }
 
+    /// The atoms of a rank, of which a group moves.
+    struct Movers<'a> {
+        /// The bit of the group in the masks.
+        group: i32,
+        mask: &'a [i32],
+        kind: &'a [i32],
+        mass_of_kind: &'a [f64],
+        /// The mass of each atom, or empty if they have those of their types.
+        mass: &'a [f64],
+    }
+
     /// What the thermostat needs from the other ranks.
     enum Wants {
         /// Nothing: the velocities are final.
@@ -232,6 +243,14 @@ mod ffi {
         ) -> Result<PairValue>;
         fn memory(self: &Style) -> usize;
 
+        // Loops over atoms, which the threads divide.
+        fn kick(self: &Style, h: f64, movers: &Movers, f: &[f64], v: &mut [f64]);
+        fn drift(self: &Style, h: f64, movers: &Movers, v: &[f64], x: &mut [f64]);
+        fn find_shifts(self: &Style, h: f64, movers: &Movers, f: &[f64], shifts: &mut [f64]);
+        fn shift(self: &Style, shifts: &[f64], x: &mut [f64]);
+        fn copy(self: &Style, from: &[f64], to: &mut [f64]);
+        fn find_masses(self: &Style, unit: f64, movers: &Movers, held: &[u8], masses: &mut [f64]);
+
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
         /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
         fn thermostat_pairs(
@@ -257,6 +276,8 @@ mod ffi {
         fn effort(style: &mut Style) -> Effort;
     }
 }
+
+pub use ffi::Movers;
 
 fn thermostat_pairs(
     style: &mut Style,

@@ -2,7 +2,7 @@
 //! loads the entry, in `entry/`, which loads this.
 //!
 //! - [`style`]: one pair style's engine, in safe Rust;
-//! - [`thermostat`]: drag and noise for the fix;
+//! - [`thermostat`]: drag and noise for the fix; `motion`: its loops over atoms;
 //! - [`units`]: one unit of a model in those of LAMMPS; `converted`: conversion of positions,
 //!   velocities and forces;
 //! - [`bridge`]: the interface to C++, by cxx: slices, strings and exceptions, checked at compile time;
@@ -15,6 +15,7 @@
 pub mod bridge;
 mod converted;
 mod error;
+mod motion;
 pub mod style;
 pub mod thermostat;
 pub mod units;

@@ -1,5 +1,5 @@
 //! Evaluates forces a given number of times, for counting instructions: the same fluid, particles and steps
-//! in every run, one thread.
+//! in every run.
 //!
 //! ```text
 //! valgrind --tool=callgrind --callgrind-out-file=/dev/null \
@@ -7,8 +7,9 @@
 //! ```
 //!
 //! With a number of sides as fifth word the particles are those of a rank that has ghosts on 2 (along z), 4
-//! or 6 sides; the sixth word is the number of particles, 2000 unless given. With the fifth word `thermostat` drag
-//! and noise act apart from the forces instead, for the time of six steps, by the midpoint rule.
+//! or 6 sides; the sixth word is the number of particles, 2000 unless given; the seventh that of threads. With the
+//! fifth word `thermostat` drag and noise act apart from the forces instead, for the time of six steps, by the
+//! midpoint rule.
 //!
 //! The difference between runs of different length is the cost of the additional evaluations. The
 //! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
@@ -18,8 +19,9 @@ mod setup;
 
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update};
-use psidpd_core::engine::{Pool, Settings};
-use setup::{Cloud, Rank, choose, faces, sweep};
+use psidpd_core::engine::{Pool, Settings, Sweep};
+use setup::{Cloud, Rank, choose, faces};
+use std::num::NonZeroUsize;
 use std::process::ExitCode;
 
 const COUNT: usize = 2000;
@@ -30,7 +32,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat [PARTICLES]]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat [PARTICLES [THREADS]]]"
             );
             ExitCode::FAILURE
         }
@@ -41,14 +43,16 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let [fluid, precision, instructions, evaluations, rest @ ..] = arguments else {
         return Err("four arguments are needed".into());
     };
-    let (subject, precision, set) = choose(fluid, precision, instructions)?;
+    let (subject, precision, instructions) = choose(fluid, precision, instructions)?;
     let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
     let fluid = subject.fluid();
-    let mut sweep = sweep(&fluid, precision, set);
     let count = rest.get(1).map_or(Ok(COUNT), |n| n.parse()).map_err(|_| "PARTICLES is a number")?;
+    let threads = rest.get(2).map_or(Ok(NonZeroUsize::MIN), |n| n.parse());
+    let threads = threads.map_err(|_| "THREADS is a number above 0")?;
+    let settings = Settings { precision, instructions, threads };
+    let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;
     if rest.first().is_some_and(|word| word == "thermostat") {
         let mut cloud = Cloud::new(subject, &fluid, count);
-        let settings = Settings { precision, instructions: set, ..Settings::default() };
         let mut thermostat =
             PairThermostat::new(sweep.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
         let (pool, dt) = (Pool::new(settings.threads), 6.0 * cloud.dt());

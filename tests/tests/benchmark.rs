@@ -38,6 +38,7 @@ fn a_small_benchmark_has_every_documented_field() {
     let arguments = "bench --all --sizes 500,700 --few-above 600 --rounds 2 --steps 20 --memory 20000 --threads 1,2 --out b --json c.json";
     let output = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(said(&output).contains("What to take in LAMMPS on"), "{}", said(&output));
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let outcome: Value = serde_json::from_str(&read("b/bench.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&read("c.json")).unwrap(), outcome);

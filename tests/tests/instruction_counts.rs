@@ -108,3 +108,49 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
         compiler(),
     );
 }
+
+/// Most threads of the test below, and the work of the busiest one over its share: what the caller's thread does alone, the
+/// motion of the particles included, and units of work that do not divide evenly.
+const THREADS: usize = 16;
+const MOST_WORK: f64 = 1.25;
+
+/// Instructions of each thread in a whole run in the box of edge 20 cut-offs.
+fn of_threads(program: &Path, folder: &Path, evaluations: u32, threads: usize) -> Vec<f64> {
+    let out = folder.join(format!("{evaluations}-{threads}"));
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--separate-threads=yes"])
+        .arg(format!("--callgrind-out-file={}", out.display()))
+        .arg(program)
+        .args(["mdpd", "mixed", "avx2", &evaluations.to_string(), "0", "48400", &threads.to_string()])
+        .output()
+        .expect("valgrind starts");
+    assert!(output.status.success(), "{}", said(&output));
+    let count = |number: usize| {
+        let text =
+            std::fs::read_to_string(format!("{}-{number:02}", out.display())).expect("a thread's counts");
+        let totals = text.lines().find_map(|line| line.strip_prefix("totals:")).expect("their sum");
+        totals.trim().parse().expect("a number")
+    };
+    (1..=threads).map(count).collect()
+}
+
+/// Valgrind runs one thread at a time, on any machine: the counts are what each would do on a core of its own.
+#[test]
+fn threads_have_equal_parts_of_the_work() {
+    let (program, folder) = (engine().instructions, tempfile::tempdir().expect("a folder"));
+    let work = |threads: usize| -> Vec<f64> {
+        let [few, many] = [1, 2].map(|evaluations| of_threads(&program, folder.path(), evaluations, threads));
+        few.iter().zip(many).map(|(few, many)| many - few).collect()
+    };
+    let alone = work(1)[0];
+    let together = work(THREADS);
+    let (all, most) = (together.iter().sum::<f64>(), together.iter().copied().fold(0.0, f64::max));
+    let share = alone / THREADS as f64;
+    println!(
+        "{:.3} of the work of one thread; the busiest has {:.3} of its share",
+        all / alone,
+        most / share
+    );
+    assert!(all < 1.05 * alone, "{all} instructions instead of {alone}");
+    assert!(most < MOST_WORK * share, "the busiest of {THREADS} has {most} instead of {share}");
+}

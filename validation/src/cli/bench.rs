@@ -2,7 +2,7 @@ use super::run::thread_count;
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_dynamics::device::Device;
-use psidpd_experiments::bench::{Asked, Options, contender::FEW_ABOVE, memory, page, run as measure};
+use psidpd_experiments::bench::{Asked, Options, advice, contender::FEW_ABOVE, memory, page, run as measure};
 use psidpd_experiments::fluids::SIZES;
 use psidpd_experiments::start::SEED;
 use psidpd_report::Progress;
@@ -118,6 +118,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         ("Where it goes in LAMMPS with the plugin, ns per particle and step:", page::plugin_parts(&outcome)),
     ] {
         say!("{heading}\n");
+        say::table(&table);
+    }
+    if let Some((text, table)) = advice::of(&outcome) {
+        say!("{text}\n");
         say::table(&table);
     }
     let machine = &outcome.machine;

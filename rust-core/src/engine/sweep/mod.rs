@@ -253,7 +253,7 @@ impl Sweep {
     ) -> Result<(), EngineError> {
         self.run(around, particles, v, step, want, force, true)?;
         let mut since = Instant::now();
-        with!(&self.workspace, m => m.slopes_to_host(&mut self.slopes));
+        with!(&self.workspace, m => m.slopes_to_host(&self.pool, &mut self.slopes));
         lap(&mut since, &mut self.times.excess);
         self.ready = true;
         Ok(())
@@ -322,7 +322,7 @@ impl Sweep {
     /// Copies the slopes of owned particles after [`Sweep::evaluate`], with room for `all`, for the
     /// energies and forces of single pairs.
     pub fn fetch_slopes(&mut self, all: usize) {
-        with!(&self.workspace, m => m.slopes_to_host(&mut self.slopes));
+        with!(&self.workspace, m => m.slopes_to_host(&self.pool, &mut self.slopes));
         self.slopes.resize(self.slope_width() * all, 0.0);
     }
 

@@ -210,7 +210,7 @@ impl PairLists {
 
     /// Fills the arrays in the order of cells.
     fn fill(&mut self, pool: &Pool, input: &Input, multispecies: bool) {
-        self.particles.make_room(&self.cells, multispecies);
+        self.particles.make_room(pool, &self.cells, multispecies);
         let (set, cells, threads) = (self.set, &self.cells, pool.threads());
         let shared = &self.particles.share();
         let mut work: Vec<_> = (0..threads).map(|t| cells.whole_vectors(t, threads)).collect();

@@ -89,7 +89,7 @@ impl<P: PairPrecision> Workspace<P> {
     ) -> Result<(), EngineError> {
         (self.thermostat, self.totals) = (input.thermostat, input.totals);
         self.order.sort(pool, self.fluid.set, geometry, grid, input)?;
-        self.particles.make_room(&self.order, self.fluid.terms.species > 1);
+        self.particles.make_room(pool, &self.order, self.fluid.terms.species > 1);
         self.excluded.fill(&self.order, input.exclusions);
         let packs = self.fluid.terms.full_cache;
         self.slopes.make_room(&self.order, self.fluid.width(), packs);
@@ -110,32 +110,36 @@ impl<P: PairPrecision> Workspace<P> {
         out: ForceSink,
         times: &mut Times,
     ) -> Result<(), EngineError> {
-        let slabs = self.order.thread_slabs(pool.threads());
-        self.up_to_slopes(pool, plan, input, out, &slabs)?;
-        self.on_slabs(&slabs, |scheduler, slabs| {
-            // SAFETY: `up_to_slopes` has computed the slopes of all particles and copies; no other work runs.
-            pool.each(slabs, |slab| unsafe { scheduler.second_at_ends(slab) });
+        let units = &self.order.thread_slabs(pool.threads())[..];
+        let excess = ExcessInput::new(plan, input);
+        self.fill_start(pool, input, units, excess.is_some());
+        let (has_excess, has_passes) = (excess.is_some(), !self.fluid.terms.passes.is_empty());
+        let input = &PassInput { input, excess, out };
+        self.on_slabs(units, |scheduler, slabs| {
+            type Stage<'a, T> = &'a (dyn Fn(&mut ThreadSlab<T>) + Sync);
+            // SAFETY: `fill_start` has filled the ends of all slabs, and the copies exist; no other work runs.
+            let interior: Stage<P::Scalar> = &|slab| unsafe { scheduler.interior(input, slab) };
+            // SAFETY: the interior of all slabs is done; no other work runs.
+            let excess: Stage<P::Scalar> = &|slab| unsafe { scheduler.excess_at_ends(input, slab) };
+            // SAFETY: the slopes of all particles and copies are complete; no other work runs.
+            let second: Stage<P::Scalar> = &|slab| unsafe { scheduler.second_at_ends(slab) };
             // SAFETY: all passes are done; no other work runs.
-            pool.each(slabs, |slab| unsafe { scheduler.forces_at_ends(out, slab) });
+            let forces: Stage<P::Scalar> = &|slab| unsafe { scheduler.forces_at_ends(out, slab) };
+            // A stage without work would be one more meeting of the threads.
+            let stages = [(true, interior), (has_excess, excess), (has_passes, second), (true, forces)];
+            let stages: Vec<_> =
+                stages.into_iter().filter_map(|(has_work, stage)| has_work.then_some(stage)).collect();
+            pool.in_stages(slabs, &stages);
         });
         self.finish(times)
     }
 
-    /// Fills arrays, and does first passes and ψ of all planes, and the second pass and the forces of the
-    /// planes between the ends of slabs.
-    fn up_to_slopes(
-        &mut self,
-        pool: &Pool,
-        plan: &Plan,
-        input: &Input,
-        out: ForceSink,
-        units: &[Range<usize>],
-    ) -> Result<(), EngineError> {
+    /// Makes room, and fills the particles that threads of other slabs read, and the copies of the first plane.
+    fn fill_start(&mut self, pool: &Pool, input: &Input, units: &[Range<usize>], has_excess: bool) {
         let width = self.fluid.width();
         self.accumulators.lay_out(&self.order, units, width);
         self.results.make_room(&self.order, units.len(), width);
-        let excess = ExcessInput::new(plan, input);
-        if excess.is_none() {
+        if !has_excess {
             self.results.excess.fill(0.0);
         }
         {
@@ -148,18 +152,6 @@ impl<P: PairPrecision> Workspace<P> {
             });
         }
         self.particles.copy_first_plane(&self.order);
-        let input = &PassInput { input, excess, out };
-        self.on_slabs(units, |scheduler, slabs| {
-            // SAFETY: `fill_start` has filled the ends of all slabs, and the copies exist; no other work runs.
-            pool.each(slabs, |slab| unsafe { scheduler.interior(input, slab) });
-            // SAFETY: the interior of all slabs is done; no other work runs.
-            pool.each(slabs, |slab| unsafe { scheduler.excess_at_ends(input, slab) });
-        });
-        self.slopes.copy_first_plane(&self.order);
-        match self.threads.iter_mut().find_map(|state| state.fault.take()) {
-            Some(fault) => Err(fault),
-            None => Ok(()),
-        }
     }
 
     /// Lends all arrays to the threads, to each its slab of units.
@@ -196,10 +188,13 @@ impl<P: PairPrecision> Workspace<P> {
         work(scheduler, &mut slabs);
     }
 
-    /// Adds the times of the caller's thread; fails for a force that is not finite, and names the lowest tag.
+    /// Adds the times of the caller's thread; fails for ψ or a force that is not finite, and names the lowest tag.
     fn finish(&mut self, times: &mut Times) -> Result<(), EngineError> {
         if let Some(state) = self.threads.first_mut() {
             *times += std::mem::take(&mut state.times);
+        }
+        if let Some(fault) = self.threads.iter_mut().find_map(|state| state.fault.take()) {
+            return Err(fault);
         }
         match self.threads.iter_mut().filter_map(|state| state.lost.take()).min() {
             None => Ok(()),

@@ -4,6 +4,7 @@
 //! the machine down for a while slows them all; ratios are taken within a round. [`contender`] says who is timed,
 //! [`deck`] runs LAMMPS and [`native`] the runner.
 
+pub mod advice;
 mod clock;
 pub mod contender;
 pub mod deck;

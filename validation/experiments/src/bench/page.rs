@@ -1,5 +1,6 @@
 //! Results as tables and plots.
 
+use super::advice;
 use super::outcome::{Asked, Benchmark, Machine, Timed};
 use super::spread::Spread;
 use crate::ExperimentError;
@@ -140,6 +141,13 @@ fn scaling(outcome: &Benchmark) -> Table {
     table
 }
 
+fn ranks_or_threads(outcome: &Benchmark) -> Vec<Item> {
+    let Some((text, table)) = advice::of(outcome) else {
+        return vec![Item::Prose("Not known without runs on two threads and on two ranks.".into())];
+    };
+    vec![Item::Prose(text), Item::Table(table)]
+}
+
 fn memory(outcome: &Benchmark) -> Table {
     let mut table = Table::new(["particles", "bytes per particle", "of these in the engine", "MB"]);
     for m in &outcome.memory {
@@ -214,6 +222,7 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
             ],
         ),
         Section::new("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
+        Section::new("Ranks or threads", ranks_or_threads(outcome)),
         Section::new("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
     let missing = match outcome.lammps.missing.join(", ") {

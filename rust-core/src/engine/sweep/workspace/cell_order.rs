@@ -3,12 +3,12 @@
 mod count;
 mod extremes;
 mod fractions;
+mod sorting;
 
 use super::input::{Input, VECTOR_PADDING};
 use super::thread_slab::take;
 use crate::engine::error::EngineError;
-use crate::engine::vectors;
-use count::{Count, CountRange, NO_CELL};
+use count::Count;
 use fractions::Fractions;
 use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
@@ -16,7 +16,9 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::in_range_pairs::J_CODE_BITS;
 use psidpd_threads::SharedSlice;
 use psidpd_threads::{Pool, part};
+use sorting::{SortPart, Sorting};
 use std::ops::Range;
+use std::sync::atomic::AtomicBool;
 
 pub use extremes::extremes;
 pub use fractions::TWO_TO_32;
@@ -42,6 +44,8 @@ pub struct CellOrder {
     cell: Vec<u32>,
     /// Number of particles of each cell: by thread while counting, then the start of each thread's particles.
     counts: Vec<u32>,
+    /// For each thread the number of its particles in each thread's part of the cells.
+    sums: Vec<u32>,
 }
 
 impl CellOrder {
@@ -66,10 +70,11 @@ impl CellOrder {
             all: 0,
             cell: Vec::new(),
             counts: Vec::new(),
+            sums: Vec::new(),
         }
     }
 
-    /// Sorts the particles into the cells of `grid`.
+    /// Sorts the particles into the cells of `grid`: by cell, and within a cell by the host's number.
     pub fn sort(
         &mut self,
         pool: &Pool,
@@ -80,118 +85,69 @@ impl CellOrder {
     ) -> Result<(), EngineError> {
         (self.geometry, self.grid) = (geometry, grid);
         (self.all, self.owned) = (input.particles.x.len(), input.particles.owned);
-        self.cell.resize(self.all, 0);
-        self.fixed32.resize(self.all, [0; 3]);
-        self.counts.resize(pool.threads() * grid.cell_count(), 0);
-        self.count(pool, set, input)?;
-        self.sum_counts(pool);
+        let (all, cells, threads) = (self.all, grid.cell_count(), pool.threads());
+        self.cell.resize(all, 0);
+        self.fixed32.resize(all, [0; 3]);
+        self.counts.resize(threads * cells, 0);
+        self.sums.resize(threads * threads, 0);
+        let per_plane = grid.columns_per_plane * grid.cells_per_column;
+        self.start.resize(cells + 1 + if self.is_periodic() { per_plane } else { 0 }, 0);
+        self.start[0] = 0;
+        self.order.resize(all, 0);
+        let sorting = &Sorting {
+            count: Count {
+                input,
+                geometry: &self.geometry,
+                fractions: Fractions::new(&self.geometry, &self.grid),
+                first_kind: Count::first_kind(input),
+            },
+            threads,
+            cells,
+            counts: SharedSlice::new(&mut self.counts),
+            sums: SharedSlice::new(&mut self.sums),
+            order: SharedSlice::new(&mut self.order),
+            failed: AtomicBool::new(false),
+        };
+        let (mut cell, mut fixed32, mut ends) =
+            (&mut self.cell[..], &mut self.fixed32[..], &mut self.start[1..=cells]);
+        let of_thread = |number: usize| {
+            let particles = part(all, number, threads);
+            SortPart {
+                number,
+                cell: take(&mut cell, particles.len()),
+                fixed32: take(&mut fixed32, particles.len()),
+                particles,
+                ends: take(&mut ends, part(cells, number, threads).len()),
+                done: Ok(()),
+            }
+        };
+        let mut parts: Vec<_> = (0..threads).map(of_thread).collect();
+        pool.in_stages(
+            &mut parts,
+            &[
+                // SAFETY: the stages follow each other, each with every part.
+                &|part| unsafe { sorting.count(set, part) },
+                // SAFETY: as before.
+                &|part| unsafe { sorting.sum(part) },
+                // SAFETY: as before.
+                &|part| unsafe { sorting.write(part) },
+            ],
+        );
+        if let Err(fault) = parts.into_iter().try_for_each(|part| part.done) {
+            self.order.clear();
+            return Err(fault);
+        }
+        let particles = self.start[cells];
+        self.order.truncate(particles as usize);
+        // These are the cells of the copy of the first plane.
+        for cell in cells + 1..self.start.len() {
+            self.start[cell] = particles + self.start[cell - cells];
+        }
         let crowded = |plane| (self.plane(plane).1 + self.next_plane(plane)) >> J_CODE_BITS > 0;
         if (0..grid.planes).any(crowded) {
             return Err(EngineError::Host("two neighbouring planes of cells contain 2^25 particles or more"));
         }
-        self.write_order(pool);
         Ok(())
-    }
-
-    /// Computes the cell of each particle, and for each thread the number of its particles in each cell.
-    fn count(&mut self, pool: &Pool, set: InstructionSet, input: &Input) -> Result<(), EngineError> {
-        let threads = pool.threads();
-        let count = &Count {
-            input,
-            geometry: &self.geometry,
-            fractions: Fractions::new(&self.geometry, &self.grid),
-            first_kind: Count::first_kind(input),
-        };
-        let (mut cell, mut fixed32) = (&mut self.cell[..], &mut self.fixed32[..]);
-        let parts = self.counts.chunks_exact_mut(self.grid.cell_count()).enumerate().map(|(t, counts)| {
-            let particles = part(input.particles.x.len(), t, threads);
-            let (of_thread, rest) = std::mem::take(&mut cell).split_at_mut(particles.len());
-            cell = rest;
-            let (units, rest) = std::mem::take(&mut fixed32).split_at_mut(particles.len());
-            fixed32 = rest;
-            (Some(CountRange { count, particles, cell: of_thread, fixed32: units, counts }), Ok(()))
-        });
-        let mut parts: Vec<_> = parts.collect();
-        pool.each(&mut parts, |(range, done)| {
-            if let Some(range) = range.take() {
-                *done = vectors::run(set, range);
-            }
-        });
-        parts.into_iter().try_for_each(|(_, done)| done)
-    }
-
-    /// Turns counts into the start of each thread's particles of a cell. Each thread does a part of the cells: it
-    /// first counts their particles, and then knows how many there are before its part.
-    fn sum_counts(&mut self, pool: &Pool) {
-        let (cells, threads) = (self.grid.cell_count(), pool.threads());
-        let per_plane = self.grid.columns_per_plane * self.grid.cells_per_column;
-        self.start.resize(cells + 1 + if self.is_periodic() { per_plane } else { 0 }, 0);
-        self.start[0] = 0;
-        let (mut rest, counts) = (&mut self.start[1..=cells], SharedSlice::new(&mut self.counts));
-        let of_part = |t: usize| (part(cells, t, threads), take(&mut rest, part(cells, t, threads).len()), 0);
-        let mut parts: Vec<_> = (0..threads).map(of_part).collect();
-        let of_thread = |t: usize, of_part: &Range<usize>| {
-            // SAFETY: each cell is in the part of one thread, and a thread has as many counts as there are cells.
-            unsafe { counts.slice_mut(cells * t + of_part.start..cells * t + of_part.end) }
-        };
-        pool.each(&mut parts, |(range, ends, sum)| {
-            ends.copy_from_slice(of_thread(0, range));
-            for t in 1..threads {
-                let added = ends.iter_mut().zip(of_thread(t, range));
-                added.for_each(|(end, count)| *end += *count);
-            }
-            *sum = ends.iter().sum();
-        });
-        let mut all = 0;
-        for (_, _, sum) in &mut parts {
-            all += std::mem::replace(sum, all);
-        }
-        // The array first has the number of particles in each cell, then its start, and last its end,
-        // which is the start of the next.
-        pool.each(&mut parts, |(range, ends, next)| {
-            for end in ends.iter_mut() {
-                *next += std::mem::replace(end, *next);
-            }
-            for t in 0..threads {
-                for (end, count) in ends.iter_mut().zip(of_thread(t, range)) {
-                    *end += std::mem::replace(count, *end);
-                }
-            }
-        });
-        self.order.resize(all as usize, 0);
-        // These are the cells of the copy of the first plane.
-        for cell in cells + 1..self.start.len() {
-            self.start[cell] = all + self.start[cell - cells];
-        }
-    }
-
-    /// Writes the order of the particles: by cell, and within a cell by the host's number.
-    fn write_order(&mut self, pool: &Pool) {
-        let (threads, all) = (pool.threads(), self.all);
-        let mut cell = &self.cell[..];
-        let order = SharedSlice::new(&mut self.order);
-        let parts = self.counts.chunks_exact_mut(self.grid.cell_count()).enumerate().map(|(t, counts)| {
-            let particles = part(all, t, threads);
-            let (of_thread, rest) = cell.split_at(particles.len());
-            cell = rest;
-            (particles.start, of_thread, counts)
-        });
-        let mut parts: Vec<_> = parts.collect();
-        pool.each(&mut parts, |(first, cell, counts)| {
-            for (k, to) in (*first..).zip(*cell) {
-                if *to == NO_CELL {
-                    continue;
-                }
-                // SAFETY: `CountRange` gives all other particles a cell of the grid. Each thread has as many places
-                // in a cell as it has counted particles there, beginning where `sum_counts` says, so that no two
-                // particles have the same place, and all places are below the number of particles.
-                unsafe {
-                    let next = counts.get_unchecked_mut(*to as usize);
-                    *order.at(*next as usize) = k as u32;
-                    *next += 1;
-                }
-            }
-        });
     }
 
     /// Number of particles.

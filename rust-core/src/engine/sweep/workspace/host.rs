@@ -4,6 +4,7 @@ use super::Workspace;
 use crate::engine::counts::PassCounts;
 use psidpd_passes::compiled::PairPrecision;
 use psidpd_passes::tally::Tally;
+use psidpd_threads::{Pool, SharedSlice, part};
 
 impl<P: PairPrecision> Workspace<P> {
     /// The host's index of each particle, in the order of cells.
@@ -12,24 +13,30 @@ impl<P: PairPrecision> Workspace<P> {
     }
 
     /// Copies the slopes of owned particles to the order of the host; entries of ghosts are unspecified.
-    pub fn slopes_to_host(&self, out: &mut Vec<f64>) {
-        let (width, slopes) = (self.fluid.width(), self.slopes.rows());
-        out.resize(width * self.order.all, 0.0);
-        if width == 1 {
-            // One slope is by far the most common case, and needs no inner loop.
-            for (k, slope) in self.order.order.iter().zip(slopes) {
-                if let Some(out) = out.get_mut(*k as usize) {
-                    *out = *slope;
+    pub fn slopes_to_host(&self, pool: &Pool, out: &mut Vec<f64>) {
+        let (width, slopes, order) = (self.fluid.width(), self.slopes.rows(), &self.order);
+        out.resize(width * order.all, 0.0);
+        let out = SharedSlice::new(out);
+        pool.run(&|t| {
+            let range = part(order.particles(), t, pool.threads());
+            for (s, k) in range.clone().zip(&order.order[range]) {
+                let k = *k as usize;
+                if k >= order.owned {
+                    continue;
+                }
+                // SAFETY: each particle occurs once in the order, and so in the part of one thread; owned particles have
+                // rows in `out`.
+                unsafe {
+                    if width == 1 {
+                        // One slope is by far the most common case, and needs no inner loop.
+                        *out.at(k) = slopes[s];
+                    } else {
+                        let row = out.slice_mut(width * k..width * (k + 1));
+                        row.copy_from_slice(&slopes[width * s..][..width]);
+                    }
                 }
             }
-            return;
-        }
-        for (s, k) in self.order.order.iter().enumerate() {
-            let k = *k as usize;
-            if k < self.order.owned {
-                out[width * k..][..width].copy_from_slice(&slopes[width * s..][..width]);
-            }
-        }
+        });
     }
 
     /// Energies and virials of the last evaluation, summed in the order of planes.

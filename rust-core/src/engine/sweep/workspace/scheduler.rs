@@ -240,7 +240,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         };
     }
 
-    /// Evaluates ψ and its slopes of a unit.
+    /// Evaluates ψ and its slopes of a unit; those of the first plane also for its copy after the last.
     ///
     /// # Safety
     /// The unit is filled, and the first pass is done over all units that reach it; no other thread accesses the
@@ -281,6 +281,10 @@ impl<P: PairPrecision> Scheduler<'_, P> {
             }
             // SAFETY: the caller promises that no other thread accesses the slopes of these particles.
             unsafe { self.slopes.pack(particles, slopes) };
+        }
+        if unit.plane == 0 && self.order.is_periodic() {
+            // SAFETY: as before, for these particles and their copies, which no other unit has.
+            unsafe { self.slopes.copy(of_unit, self.order.particles()) };
         }
     }
 

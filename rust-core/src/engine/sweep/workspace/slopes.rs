@@ -39,15 +39,6 @@ impl<T: Scalar> SlopeArrays<T> {
             .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
     }
 
-    /// Copies the slopes of the first plane after the last particle.
-    pub fn copy_first_plane(&mut self, order: &CellOrder) {
-        let (width, n, copies) = (self.width, order.particles(), order.copies());
-        self.rows.copy_within(..width * copies, width * n);
-        for of_eight in self.packed.chunks_exact_mut(self.stride) {
-            of_eight.copy_within(..SLOPES_PER_BLOCK * copies, SLOPES_PER_BLOCK * n);
-        }
-    }
-
     /// The slopes, a row for each particle.
     pub fn rows(&self) -> &[f64] {
         &self.rows
@@ -79,6 +70,26 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     pub unsafe fn rows_mut(self, particles: Range<usize>) -> &'a mut [f64] {
         // SAFETY: the caller promises that no other thread accesses the rows of these particles.
         unsafe { self.slopes.values.slice_mut(self.width * particles.start..self.width * particles.end) }
+    }
+
+    /// Copies the slopes of particles to particles that are `distance` places after them.
+    ///
+    /// # Safety
+    /// No other thread accesses the slopes of either meanwhile.
+    pub unsafe fn copy(self, particles: Range<usize>, distance: usize) {
+        let Slopes { values, packed, stride } = self.slopes;
+        let rows = |range: &Range<usize>| self.width * range.start..self.width * range.end;
+        let to = particles.start + distance..particles.end + distance;
+        // SAFETY: the caller promises that no other thread accesses these slopes; the ranges do not overlap.
+        unsafe {
+            values.slice_mut(rows(&to)).copy_from_slice(values.slice(rows(&particles)));
+            for first in (0..packed.len()).step_by(stride) {
+                let eights = |range: &Range<usize>| {
+                    first + SLOPES_PER_BLOCK * range.start..first + SLOPES_PER_BLOCK * range.end
+                };
+                packed.slice_mut(eights(&to)).copy_from_slice(packed.slice(eights(&particles)));
+            }
+        }
     }
 
     /// Packs the slopes of particles, if packed rows are wanted.

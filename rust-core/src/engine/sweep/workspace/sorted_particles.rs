@@ -4,10 +4,12 @@ mod fill;
 
 use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
+use super::thread_slab::take;
 use psidpd_passes::cells::ghosts::{Ghosts, OwnedOfColumn};
 use psidpd_passes::ground::arithmetic::PackedParticle;
 use psidpd_passes::ground::fixed_point::FixedPoint16;
-use psidpd_threads::SharedSlice;
+use psidpd_threads::{Pool, SharedSlice, part};
+use std::ops::Range;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
 #[derive(Clone, Default)]
@@ -37,7 +39,7 @@ pub struct SharedParticles<'a, R> {
 
 impl<R: PackedParticle> SortedParticles<R> {
     /// Makes room for all particles of an order and the copies of the first plane, and finds ghosts.
-    pub fn make_room(&mut self, order: &CellOrder, multispecies: bool) {
+    pub fn make_room(&mut self, pool: &Pool, order: &CellOrder, multispecies: bool) {
         let total = order.particles() + order.copies();
         let with_ghosts = order.owned < order.all;
         self.fixed16_scale = FixedPoint16::new(&order.geometry, &order.grid);
@@ -51,34 +53,63 @@ impl<R: PackedParticle> SortedParticles<R> {
         self.packed.resize(total + VECTOR_PADDING, R::default());
         self.species.resize(if multispecies { total.max(1) } else { 0 }, 0);
         self.ghost.resize(if with_ghosts { (total + VECTOR_PADDING).next_multiple_of(8) } else { 0 }, false);
-        self.find_owned(order);
+        self.find_owned(pool, order);
     }
 
     /// If there are ghosts, finds their flags, and the owned particles of each column, including the copies.
-    fn find_owned(&mut self, order: &CellOrder) {
+    fn find_owned(&mut self, pool: &Pool, order: &CellOrder) {
         self.owned_of_column.clear();
         self.owned_bits.clear();
         if self.ghost.is_empty() {
             return;
         }
-        for (ghost, k) in self.ghost.iter_mut().zip(&order.order) {
-            *ghost = *k as usize >= order.owned;
-        }
-        self.ghost.copy_within(..order.copies(), order.particles());
-        self.owned_bits.extend(self.ghost.as_chunks::<8>().0.iter().map(bits_of_owned));
-        self.owned_bits.resize(self.owned_bits.len() + VECTOR_PADDING, 0);
+        /// Groups of eight particles and their bits, the first column of some, and these.
+        type Part<'a> = (Range<usize>, &'a mut [u8], usize, &'a mut [OwnedOfColumn]);
         let cells_per_column = order.grid.cells_per_column;
-        for column in 0..(order.start.len() - 1) / cells_per_column {
-            let [first, end] =
-                [column, column + 1].map(|column| order.start[column * cells_per_column] as usize);
-            let ghosts = &self.ghost[first..end];
-            let mut owned = OwnedOfColumn { range: [0; 2], with_ghosts: ghosts.contains(&true) };
-            if let Some(a) = ghosts.iter().position(|g| !*g) {
-                let b = ghosts.iter().rposition(|g| !*g).unwrap_or(a);
-                owned.range = [first + a, first + b + 1].map(|at| at as u32);
+        self.owned_of_column.resize((order.start.len() - 1) / cells_per_column, OwnedOfColumn::default());
+        self.owned_bits.resize(self.ghost.len() / 8 + VECTOR_PADDING, 0);
+        let (eights, columns) = (self.ghost.len() / 8, self.owned_of_column.len());
+        let ghost = SharedSlice::new(&mut self.ghost);
+        let (mut bits, mut of_column) = (&mut self.owned_bits[..eights], &mut self.owned_of_column[..]);
+        let of_thread = |t: usize| {
+            let (eights, columns) = (part(eights, t, pool.threads()), part(columns, t, pool.threads()));
+            let (bits, of_column) = (take(&mut bits, eights.len()), take(&mut of_column, columns.len()));
+            (eights, bits, columns.start, of_column)
+        };
+        let mut parts: Vec<_> = (0..pool.threads()).map(of_thread).collect();
+        let (all, copies) = (order.particles(), order.copies());
+        let find_flags = |(eights, bits, ..): &mut Part| {
+            // SAFETY: the ranges of different threads are disjoint.
+            let flags = unsafe { ghost.slice_mut(8 * eights.start..8 * eights.end) };
+            let first = all.min(8 * eights.start);
+            let (own, beyond) = flags.split_at_mut(all.min(8 * eights.end) - first);
+            for (flag, k) in own.iter_mut().zip(&order.order[first..]) {
+                *flag = *k as usize >= order.owned;
             }
-            self.owned_of_column.push(owned);
-        }
+            // Copies of the first particles follow the last one, then padding.
+            let copied = (8 * eights.start).max(all) - all;
+            for (flag, k) in beyond.iter_mut().zip(&order.order[copied.min(all)..]) {
+                *flag = *k as usize >= order.owned;
+            }
+            for (bits, eight) in bits.iter_mut().zip(flags.as_chunks::<8>().0) {
+                *bits = bits_of_owned(eight);
+            }
+        };
+        let find_columns = |(_, _, first, of_column): &mut Part| {
+            // SAFETY: no thread writes flags in this stage.
+            let ghost = unsafe { ghost.slice(0..all + copies) };
+            for (column, owned) in (*first..).zip(of_column.iter_mut()) {
+                let [start, end] =
+                    [column, column + 1].map(|column| order.start[column * cells_per_column] as usize);
+                let ghosts = &ghost[start..end];
+                owned.with_ghosts = ghosts.contains(&true);
+                if let Some(a) = ghosts.iter().position(|g| !*g) {
+                    let b = ghosts.iter().rposition(|g| !*g).unwrap_or(a);
+                    owned.range = [start + a, start + b + 1].map(|at| at as u32);
+                }
+            }
+        };
+        pool.in_stages(&mut parts, &[&find_flags, &find_columns]);
     }
 
     /// Copies the first plane after the last, one period further.

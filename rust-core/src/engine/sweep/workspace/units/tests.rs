@@ -71,9 +71,8 @@ fn units_of_a_set_add_to_different_particles() {
 #[test]
 fn units_feed_sixteen_threads_at_edge_20_and_sixty_four_at_edge_40() {
     println!("edge  threads  mean columns of a thread / most columns");
-    for (edge, threads) in
-        [(20, 1), (20, 2), (20, 4), (20, 8), (20, 16), (40, 1), (40, 2), (40, 4), (40, 8), (40, 16), (40, 64)]
-    {
+    let all = [1, 2, 4, 8, 16, 32, 64];
+    for (edge, feeds, threads) in [(20, 16), (40, 64)].iter().flat_map(|(e, f)| all.map(|t| (*e, *f, t))) {
         let order = one_in_each_column(edge, edge, true);
         let slabs = order.thread_slabs(threads);
         assert_eq!(slabs.len(), threads);
@@ -82,6 +81,6 @@ fn units_feed_sixteen_threads_at_edge_20_and_sixty_four_at_edge_40() {
         let most = particles.iter().map(Range::len).max().unwrap();
         let balance = (edge * edge) as f64 / (threads * most) as f64;
         println!("{edge:4}  {threads:7}  {balance:.2}");
-        assert!(balance >= 0.9, "edge {edge}, {threads} threads: {balance:.2}");
+        assert!(threads > feeds || balance >= 0.9, "edge {edge}, {threads} threads: {balance:.2}");
     }
 }
