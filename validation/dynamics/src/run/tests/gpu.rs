@@ -22,7 +22,7 @@ const MUCH: &str = "title = \"much\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\nde
     [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\npressure = true\ntemperature = true\n";
 
 fn much() -> Scene {
-    let model = SET6.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 4.5]");
+    let model = SET6.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 3.0]");
     test_support::scene(&model, MUCH).unwrap()
 }
 
