@@ -38,7 +38,7 @@ pub fn read_scene(
         scene.precision = Some(settings(name, 1)?.precision);
     }
     if let Some(name) = device {
-        scene.device = name.parse().map_err(|message: String| wrong(message))?;
+        scene.device = name.parse().map_err(wrong)?;
     }
     Ok(scene)
 }

@@ -150,4 +150,15 @@ mod tests {
             assert!(error.contains("cpu, gpu, gpu:N"), "{error}");
         }
     }
+
+    /// llvmpipe will do.
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn a_gpu_is_found() {
+        let found = gpus().unwrap_or_else(|error| panic!("{error}: {}", error.help().unwrap_or_default()));
+        for (number, gpu) in found.iter().enumerate() {
+            assert_eq!(gpu.device.parse(), Ok(Device::Gpu(number)));
+            println!("{}: {} ({}, {}, {})", gpu.device, gpu.name, gpu.kind, gpu.interface, gpu.driver);
+        }
+    }
 }

@@ -327,5 +327,6 @@ fn largest_of_group(value: f32, lane: u32) -> f32 {
 
 fn store_sum(block: u32, entry: u32, value: f32, lane: u32) {
     let sum = sum_of_group(value, lane);
-    if (lane == 0u) { group_sums[block * ENTRIES + entry] = sum; }
+    // The last row of groups may be longer than needed.
+    if (lane == 0u && block < P.blocks) { group_sums[block * ENTRIES + entry] = sum; }
 }

@@ -194,5 +194,5 @@ fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
         store_sum(block, 23u + k, support[k], lane);
     }
     let largest = largest_of_group(max(abs(f.x), max(abs(f.y), abs(f.z))), lane);
-    if (lane == 0u) { group_sums[block * ENTRIES + 26u] = largest; }
+    if (lane == 0u && block < P.blocks) { group_sums[block * ENTRIES + 26u] = largest; }
 }
