@@ -29,7 +29,7 @@ pub struct SharedSlopes<'a, T> {
 }
 
 impl<T: Scalar> SlopeArrays<T> {
-    /// Makes room for all particles of an order, and for packed rows if they are wanted.
+    /// Makes room for all particles of an order, and for packed rows if they are requested.
     pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
         let total = order.particles() + order.copies();
         self.width = width;
@@ -81,7 +81,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
         unsafe { self.slopes.values.slice_mut(self.width * particles.start..self.width * particles.end) }
     }
 
-    /// Packs the slopes of particles, if packed rows are wanted.
+    /// Packs the slopes of particles, if packed rows are requested.
     ///
     /// # Safety
     /// No other thread accesses their slopes meanwhile.
