@@ -14,7 +14,7 @@ class Psidpd(Calculator):
 
     Numbers are in the reduced units of the model, whatever ASE calls them: lengths in r_c, energies in the unit of kT.
     `species` names the model's species for each chemical symbol; left out, symbols are the names of species themselves,
-    or all particles are the only species. ASE has symbols of elements, and "X" for what is none.
+    or all particles are the only species. ASE has symbols of elements, and "X" for all others.
 
     There is no drag and no noise here: give an integrator of ASE its own thermostat, or use `psidpd.run`.
     """

@@ -1,9 +1,10 @@
-"""Reads the files of a run with MDAnalysis and ASE, and writes what they see as JSON.
+"""Reads the files of a run with MDAnalysis, ASE, gsd and PyVista, and writes what they see as JSON.
 
-read_back.py FOLDER BINS RANGE: dump.lammpstrj, trajectory.xyz and final.data in FOLDER; pairs of all
-particles are counted in BINS bins of distance up to RANGE.
+read_back.py FOLDER BINS RANGE: dump.lammpstrj, trajectory.xyz, trajectory.gsd, vtk and final.data in FOLDER; pairs
+of all particles are counted in BINS bins of distance up to RANGE.
 """
 
+import glob
 import json
 import sys
 import warnings
@@ -12,8 +13,10 @@ import ase
 import ase.geometry.rdf
 import ase.io
 import ase.units
+import gsd.hoomd
 import MDAnalysis
 import numpy
+import pyvista
 from MDAnalysis.analysis.rdf import InterRDF
 
 # MDAnalysis warns of what files of point particles do not have: elements, bonds, residues.
@@ -56,6 +59,35 @@ def by_ase(atoms):
     return frame
 
 
+def by_gsd(frame):
+    particles, configuration = frame.particles, frame.configuration
+    frame.validate()
+    return {
+        "step": int(configuration.step),
+        "time": float(frame.log["time"][0]),
+        "dimensions": int(configuration.dimensions),
+        "box": configuration.box.tolist(),
+        "types": particles.types,
+        "typeid": particles.typeid.tolist(),
+        "mass": particles.mass.tolist(),
+        "x": particles.position.tolist(),
+        "v": particles.velocity.tolist(),
+    }
+
+
+def by_pyvista(path):
+    data = pyvista.read(path)
+    seen = {
+        "step": int(data.field_data["Step"][0]),
+        "time": float(data.field_data["TimeValue"][0]),
+        "names": list(data.field_data["SpeciesNames"]),
+        "arrays": {name: data.point_data[name].tolist() for name in data.point_data},
+    }
+    if isinstance(data, pyvista.PolyData):
+        return seen | {"x": data.points.tolist(), "vertices": data.verts.tolist()}
+    return seen | {"origin": list(data.origin), "spacing": list(data.spacing), "size": list(data.dimensions)}
+
+
 def mda_dump():
     return MDAnalysis.Universe(dump, topology_format="LAMMPSDUMP", format="LAMMPSDUMP", convert_units=False)
 
@@ -78,8 +110,14 @@ json.dump(
         "ase_dump": [by_ase(a) for a in ase.io.read(dump, index=":", format="lammps-dump-text")],
         "ase_xyz": [by_ase(a) for a in ase.io.read(xyz, index=":", format="extxyz")],
         "ase_data": [by_ase(ase.io.read(data, format="lammps-data", style="atomic", units="metal"))],
+        "gsd": [by_gsd(frame) for frame in gsd.hoomd.open(f"{folder}/trajectory.gsd")],
+        "mda_gsd": mda(MDAnalysis.Universe(f"{folder}/trajectory.gsd"), velocities=False),
+        "vtp": [by_pyvista(path) for path in sorted(glob.glob(f"{folder}/vtk/*.vtp"))],
+        "vti": [by_pyvista(path) for path in sorted(glob.glob(f"{folder}/vtk/*.vti"))],
         "mda_pairs": rdf.results.count.tolist(),
         "ase_g": numpy.asarray(g).tolist(),
     },
     sys.stdout,
+    # Numbers of numpy.
+    default=lambda number: number.item(),
 )

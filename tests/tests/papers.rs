@@ -3,7 +3,7 @@
 use psidpd_tests::{json, psidpd, said};
 use serde_json::Value;
 
-const TARGET: &str = "# What is wanted.\ntitle = \"target\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
+const TARGET: &str = "# The target.\ntitle = \"target\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
                       [excess_free_energy.F]\npressure = \"rho*kT + 0.9*rho^2.6\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 
 #[test]
@@ -48,10 +48,7 @@ fn a_target_pressure_is_met_after_calibration_and_missed_before() {
         assert!((residual["pressure"]["value"].as_f64().unwrap() / wanted - 1.0).abs() < 0.03, "{residual}");
     }
     let text = std::fs::read_to_string(here.join("calibrated.toml")).unwrap();
-    assert!(
-        text.starts_with("# What is wanted.\n") && text.contains("psidpd calibrate target.toml"),
-        "{text}"
-    );
+    assert!(text.starts_with("# The target.\n") && text.contains("psidpd calibrate target.toml"), "{text}");
     assert_eq!(text.lines().filter(|line| !TARGET.contains(line)).count(), 4, "{text}");
     let found = json(here, &["check", "calibrated.toml", "--density", "4.5"], 0);
     assert!(ids(&found).is_empty(), "{found}");

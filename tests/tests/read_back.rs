@@ -1,13 +1,14 @@
-//! Other programs read the files of a run: MDAnalysis, ASE and LAMMPS find the same particles, the same g(r)
-//! and the same energies.
+//! Other programs read the files of a run: MDAnalysis, ASE, gsd, PyVista and LAMMPS find the same particles, the same
+//! g(r), the same density and the same energies.
 //!
 //! Tolerances: ASE keeps doubles and converts the coordinates of a dump to fractions of the box and back,
 //! hence 10⁻¹² for a dump and no difference for copied values. MDAnalysis keeps single precision: 10⁻⁶ for
-//! numbers below 8, and pairs that close to the edge of a bin may count in the next one. LAMMPS sums the same
-//! doubles in another order: 10⁻¹¹ of the largest term.
+//! numbers below 8, and pairs that close to the edge of a bin may count in the next one. GSD has single precision too.
+//! LAMMPS sums the same doubles in another order: 10⁻¹¹ of the largest term.
 
 use psidpd::formats::{DataFile, dump};
 use psidpd_core::maximum::largest;
+use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_tests::{lammps, psidpd, python, said};
 use serde_json::Value;
 use std::path::Path;
@@ -66,6 +67,8 @@ dt    = 0.01
 thermo = 20
 dump   = 20
 xyz    = 20
+gsd    = 20
+vtk    = 20
 
 # Of the last frame alone.
 [observe.rdf]
@@ -117,7 +120,7 @@ struct Expected {
 const BOX: [f64; 3] = [5.0, 4.5, 6.0];
 
 #[test]
-fn mdanalysis_and_ase_see_the_same_particles() {
+fn other_programs_see_the_same_particles() {
     let folder = tempfile::tempdir().unwrap();
     run_scene(folder.path());
     let out = folder.path().join("out");
@@ -152,7 +155,7 @@ fn mdanalysis_and_ase_see_the_same_particles() {
     let names: Vec<&str> = expected[0].types.iter().map(|t| if *t == 1.0 { "A" } else { "B_" }).collect();
     assert!(names.contains(&"A") && names.contains(&"B_"));
 
-    for source in ["mda_dump", "mda_xyz", "ase_dump", "ase_xyz"] {
+    for source in ["mda_dump", "mda_xyz", "ase_dump", "ase_xyz", "gsd", "mda_gsd", "vtp", "vti"] {
         assert_eq!(seen[source].as_array().map(Vec::len), Some(3), "{source}");
     }
     for (k, e) in expected.iter().enumerate() {
@@ -187,6 +190,41 @@ fn mdanalysis_and_ase_see_the_same_particles() {
         assert_eq!(frame["info"]["Step"], e.step);
         let time = frame["info"]["Time"].as_f64().unwrap();
         assert!((time - e.time).abs() < 1e-12, "{time}");
+
+        // HOOMD-blue's box is centred at the origin.
+        let centred: Vec<[f64; 3]> =
+            e.x.iter().map(|x| std::array::from_fn(|k| x[k] - 0.5 * BOX[k])).collect();
+        let kinds: Vec<f64> = e.types.iter().map(|t| t - 1.0).collect();
+        let frame = &seen["gsd"][k];
+        assert_near(&at("gsd x"), &vectors(&frame["x"]), &centred, 1e-6);
+        assert_near(&at("gsd v"), &vectors(&frame["v"]), &e.v, 1e-6);
+        assert_eq!(
+            (&frame["step"], frame["dimensions"].as_i64()),
+            (&serde_json::json!(e.step as u64), Some(3))
+        );
+        assert!((frame["time"].as_f64().unwrap() - e.time).abs() < 1e-12);
+        assert_eq!(numbers(&frame["box"]), [BOX[0], BOX[1], BOX[2], 0.0, 0.0, 0.0]);
+        assert_eq!((words(&frame["types"]), numbers(&frame["typeid"])), (vec!["A", "B"], kinds.clone()));
+        assert_eq!(numbers(&frame["mass"]), e.types, "A has mass 1, B 2");
+        let frame = &seen["mda_gsd"][k];
+        assert_near(&at("mda_gsd x"), &vectors(&frame["x"]), &centred, 1e-6);
+        assert_eq!(numbers(&frame["box"]), [BOX[0], BOX[1], BOX[2], 90.0, 90.0, 90.0]);
+
+        for source in ["vtp", "vti"] {
+            let frame = &seen[source][k];
+            assert_eq!(frame["step"], e.step as u64, "{}", at(source));
+            assert!((frame["time"].as_f64().unwrap() - e.time).abs() < 1e-12);
+            assert_eq!(words(&frame["names"]), ["A", "B"]);
+        }
+        let frame = &seen["vtp"][k];
+        assert_near(&at("vtp x"), &vectors(&frame["x"]), &e.x, 0.0);
+        assert_near(&at("vtp v"), &vectors(&frame["arrays"]["velocity"]), &e.v, 0.0);
+        assert_eq!(numbers(&frame["arrays"]["species"]), kinds);
+        assert_eq!(numbers(&frame["arrays"]["id"]), ids);
+        // A vertex is its number of points, 1, and the point.
+        let vertices: Vec<f64> = (0..count).flat_map(|k| [1.0, k as f64]).collect();
+        assert_eq!(numbers(&frame["vertices"]), vertices);
+        assert_density(&at("vti"), &seen["vti"][k], &e.x, &kinds);
     }
     let last = &expected[2];
     let mut data = DataFile::read(&out.join("final.data")).unwrap();
@@ -231,6 +269,45 @@ fn mdanalysis_and_ase_see_the_same_particles() {
         let shell = 4.0 / 3.0 * std::f64::consts::PI * (outer.powi(3) - inner.powi(3));
         let direct = 2.0 * pairs / (count as f64 * density * shell);
         assert!((g - direct).abs() < 1e-9, "bin {k}: {g} against {direct}");
+    }
+}
+
+/// The grid has the densities of the model's kernel, from their definition: at every seventh point, of all and of each species.
+fn assert_density(what: &str, frame: &Value, x: &[[f64; 3]], kinds: &[f64]) {
+    let (origin, spacing, size) =
+        (numbers(&frame["origin"]), numbers(&frame["spacing"]), numbers(&frame["size"]));
+    assert_eq!(origin, [0.0; 3]);
+    for k in 0..3 {
+        // A third of the range, or less; from face to face.
+        assert!(spacing[k] <= 0.4 && (spacing[k] * (size[k] - 1.0) - BOX[k]).abs() < 1e-12, "{what}");
+    }
+    let kernel = Kernel::new(KernelKind::Quadratic, 1.2, 3);
+    let fields = ["density", "density_A", "density_B"].map(|name| numbers(&frame["arrays"][name]));
+    assert_eq!(fields[0].len() as f64, size.iter().product::<f64>());
+    for at in (0..fields[0].len()).step_by(7) {
+        let number = [
+            at % size[0] as usize,
+            at / size[0] as usize % size[1] as usize,
+            at / (size[0] * size[1]) as usize,
+        ];
+        let mut sums = [0.0; 3];
+        for (x, kind) in x.iter().zip(kinds) {
+            // The box is wider than twice the range, so that one image counts.
+            let square = |k: usize| {
+                let d = x[k] - number[k] as f64 * spacing[k];
+                (d - BOX[k] * (d / BOX[k]).round()).powi(2)
+            };
+            let w = kernel.value((square(0) + square(1) + square(2)).sqrt());
+            sums[0] += w;
+            sums[1 + *kind as usize] += w;
+        }
+        for (field, sum) in fields.iter().zip(sums) {
+            assert!(
+                (field[at] - sum).abs() <= 1e-6 * sum.max(1.0),
+                "{what} at {number:?}: {} {sum}",
+                field[at]
+            );
+        }
     }
 }
 

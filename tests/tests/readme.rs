@@ -62,4 +62,9 @@ fn the_native_scene_runs() {
     for file in ["thermo.csv", "dump.lammpstrj", "final.data", "summary.json"] {
         assert!(folder.path().join("slab").join(file).is_file(), "{file} is missing");
     }
+    // The slab is at its temperature from the first row of its last stage.
+    let summary = std::fs::read_to_string(folder.path().join("slab/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let temperature = summary["means"]["temperature"].as_f64().unwrap();
+    assert!((temperature - 1.0).abs() < 0.015, "{temperature}");
 }

@@ -306,3 +306,21 @@ fn check_judges_every_part_and_says_what_is_wrong() {
     let digits = number.trim_start_matches(['0', '.']).trim_end_matches('0').replace('.', "");
     assert!(warning.starts_with("WARNING") && digits.len() <= 2, "{warning}");
 }
+
+/// The pressure axis ends near the loop of the coexisting phases, though the pressure of a denser liquid is a hundred times higher.
+#[test]
+fn the_loop_fills_the_plot_of_pressures() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "title = \"m\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.0, 19.0]\n\
+                [excess_free_energy]\nF = \"-kT*ln(1 - 0.05*n) - 0.3*n\"\n";
+    std::fs::write(folder.path().join("m.toml"), text).unwrap();
+    let found = json(folder.path(), &["theory", "m.toml", "--kT", "0.9", "--report", "t.html"], 0);
+    assert!(found["binodal"]["liquid"].as_f64().is_some_and(|rho| rho > 16.0), "{found}");
+    let page = std::fs::read_to_string(folder.path().join("t.html")).unwrap();
+    let plot = page.split("<svg").skip(1).find(|svg| svg.contains("Pressure")).expect("a plot of pressures");
+    let plot = plot.split("</svg>").next().unwrap();
+    let labels: Vec<f64> =
+        plot.split('>').filter_map(|text| text.split('<').next()?.trim().parse().ok()).collect();
+    let highest = labels.iter().copied().fold(f64::NAN, f64::max);
+    assert!(highest > 1.0 && highest < 100.0, "{labels:?}");
+}

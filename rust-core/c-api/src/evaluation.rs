@@ -94,7 +94,7 @@ impl Request {
 }
 
 /// All forces on particles in a box of their own, without ghosts: adds them to `force`, `3 * particles.all` numbers, and
-/// puts in `*tally` the sums that are wanted. `tally` may be NULL.
+/// puts in `*tally` the requested sums. `tally` may be NULL.
 ///
 /// Positions may be outside the box: along periodic edges they stand for an image.
 ///
@@ -206,7 +206,7 @@ pub unsafe extern "C" fn psidpd_engine_first_of_pairs(
 }
 
 /// Second half of an evaluation: adds to `force`, `3 * particles.all` numbers, the forces on the particles, and puts in
-/// `*tally` the sums that are wanted. The request is that of the first half. `tally` may be NULL.
+/// `*tally` the requested sums. The request is that of the first half. `tally` may be NULL.
 ///
 /// # Errors
 /// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_first or psidpd_engine_first_of_pairs right before; otherwise as

@@ -1,8 +1,8 @@
-//! File formats: LAMMPS's data files, dumps and tables, extended XYZ, and the description in the folder of a run.
+//! File formats: LAMMPS's data files, dumps and tables, extended XYZ, GSD, VTK, and the description in the folder of a run.
 //!
 //! This crate does not depend on how a run is made. A writer is a function of one [`Frame`] and has no memory between
-//! frames, so a file that was cut at the end of a frame can be continued. A [`Configuration`] is a frame that was read
-//! from a file in any format that psidpd writes.
+//! frames, so a file that was cut at the end of a frame can be continued; a [`GsdFile`] keeps its number of frames. A
+//! [`Configuration`] is a frame that was read from a LAMMPS data file, a LAMMPS dump or an extended XYZ file.
 
 pub mod about;
 mod configuration;
@@ -11,10 +11,12 @@ pub mod dump;
 mod error;
 pub mod files;
 mod frame;
+mod gsd;
 pub mod memory;
 mod open;
 pub mod setfl;
 pub mod text;
+mod vtk;
 mod xyz;
 
 pub use about::{About, AboutDensity, AboutStage, Expected, THERMO};
@@ -23,5 +25,7 @@ pub use data::DataFile;
 pub use error::FormatError;
 pub use files::WriteError;
 pub use frame::Frame;
+pub use gsd::GsdFile;
 pub use open::Which;
+pub use vtk::{Grid, write_vti, write_vtp};
 pub use xyz::{read_xyz, write_xyz};

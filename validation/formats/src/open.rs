@@ -244,6 +244,10 @@ mod tests {
             read.time = None;
             assert_eq!(read, direct, "{name}");
         }
+        // Walls that the title of a data file names stay open: nothing is mirrored there.
+        data.with_boundary([true, false, true]).write(&path("walls.data")).unwrap();
+        let walls = Configuration::open(&path("walls.data"), Which::Last).unwrap();
+        assert_eq!(walls.domain.periodic(), [true, false, true]);
         assert_eq!(Configuration::open(&path("a.dump"), Which::Number(0)).unwrap().step, Some(0));
         for name in ["a.data", "a.xyz", "a.dump"] {
             let error = Configuration::open(&path(name), Which::Number(2)).unwrap_err().to_string();

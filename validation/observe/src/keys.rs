@@ -112,7 +112,7 @@ error of a single sample.
 autoregressions of all orders, weighted by the corrected information criterion of Akaike (Burg's recursion), so
 that series which swing, as pressures do, have no larger errors than they should; averaged over blocks of 1 to 16 samples, so that slow
 modes with a small share of the variance are seen. A quotient of means R = ⟨a⟩/⟨b⟩ has the
-error of the mean of (a − R b)/⟨b⟩. What is fitted to a mean profile has a jackknife error: the means are moved towards those of each of
+error of the mean of (a − R b)/⟨b⟩. Parameters of fits to a mean profile have jackknife errors: the means are moved towards those of each of
 20 to 40 stretches of the run, by about their own deviation, and what that changes is a series like any other. Long
 series are kept as 256 to 511 block means (hanging drops 32 to 63, viscosities 64 to 127), so memory does not grow with the run; at the end the last block, if
 it is not complete, is left out. With fewer than 8 samples the error is the plain standard error.

@@ -1,4 +1,4 @@
-//! Pictures of particles and of fields as pixels, and snapshots and films of a run.
+//! Pictures of particles and of fields as pixels, snapshots and films of a run, and its density on a grid.
 //!
 //! The viewpoint is at infinity, so that lengths in a picture are lengths in the box. [`View`] is the direction of view;
 //! [`projection::Projection`] maps points of the box to pixels.
@@ -6,6 +6,7 @@
 mod animation;
 pub mod colour;
 mod field;
+mod grid;
 mod image;
 mod lettering;
 mod particles;
@@ -14,6 +15,7 @@ pub mod snapshot;
 
 pub use animation::{animate, animation_url};
 pub use field::{Field, FieldOptions, paint_field};
+pub use grid::{VTK, density_grid, remove_vtk, write_vtk};
 pub use image::{Image, data_url};
 pub use particles::{ParticleOptions, draw_coloured, draw_particles};
 pub use projection::View;

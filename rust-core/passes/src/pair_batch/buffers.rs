@@ -27,7 +27,7 @@ pub struct BatchBuffers<T> {
     pub kernel_weights: Vec<Vec<T>>,
     /// Conservative forces along `ê` of all terms but the first soft one; then, for the full pair cache, all forces over `r`.
     pub conservative: Vec<T>,
-    /// Pair weight, 1 or ½ with a ghost, if energies or virials are wanted; zero beyond the last pair.
+    /// Pair weight, 1 or ½ with a ghost, if energies or virials are requested; zero beyond the last pair.
     pub pair_weight: Vec<T>,
     /// Number of pairs within the range of each density.
     pub found: Vec<usize>,

@@ -18,7 +18,7 @@ use std::mem::MaybeUninit;
 #[derive(Debug, Default)]
 pub struct FullPairCache<T> {
     /// Separation `r_i − r_j` ([`SEPARATION`]); force without density terms, over `r` ([`FORCE`]); `−w′(r)/r` of each
-    /// density ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are wanted.
+    /// density ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are requested.
     pub fields: Vec<Vec<CacheVector<T>>>,
     /// Index of the j-particle, shifted by `OFFSET_BITS`.
     pub j_offsets: Vec<CacheVector<u32>>,

@@ -15,7 +15,7 @@ use psidpd_model::kernel::{Shape, ShapeVisitor};
 pub struct InRangePairs<T> {
     /// For each density and pair a quad: `−w′ ê`, and a code of both particles.
     pub weight_gradients: Vec<QuadList<T>>,
-    /// If virials are wanted, a second quad: `r_i − r_j`, and the pair weight.
+    /// If virials are requested, a second quad: `r_i − r_j`, and the pair weight.
     pub separations: Vec<QuadList<T>>,
     /// First i-particle of each batch, and the number of its i-particles.
     pub batches: Vec<[u32; 2]>,

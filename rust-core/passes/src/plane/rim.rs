@@ -23,7 +23,7 @@ pub struct RimPair<T> {
 #[derive(Debug, Clone)]
 pub struct Rim<T> {
     pub pairs: [Vec<RimPair<T>>; 2],
-    /// The vector from the second particle of each pair to the first, if virials are wanted.
+    /// The vector from the second particle of each pair to the first, if virials are requested.
     pub separations: [Vec<[T; 4]>; 2],
     /// The first particle of the next plane.
     next: u32,

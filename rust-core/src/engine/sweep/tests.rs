@@ -316,7 +316,7 @@ fn every_model_by_every_path_has_the_forces_of_the_plain_engine() {
                 let off = tally_difference(&tally, &totals);
                 assert!(off < tolerance(precision), "{what}: totals {off:.1e} {tally:?} {totals:?}");
                 let (again, none) = swept(&mut sweep, &cloud, Want::FORCES);
-                assert_eq!(here, again, "{what}: forces depend on what else is wanted");
+                assert_eq!(here, again, "{what}: forces depend on other requests");
                 assert_eq!(none.pair, 0.0);
                 let (ghosts, totals) = with_ghosts(&mut sweep, &cloud);
                 let off = difference(&force, &ghosts);

@@ -4,23 +4,25 @@ use super::dump::write_frame;
 use super::error::RunError;
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
-use crate::checkpoint::{Store, Thermo, Written};
+use crate::checkpoint::{Checkpoint, Store, Thermo, Written};
 use crate::scene::Scene;
 use psidpd_formats::files::remove_if_there;
-use psidpd_formats::{Frame, write_xyz};
+use psidpd_formats::{Frame, GsdFile, write_xyz};
 use psidpd_observe::{Observation, write_csv, write_json};
-use psidpd_pictures::remove_snapshots;
+use psidpd_pictures::{remove_snapshots, remove_vtk};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, ErrorKind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const DUMP: &str = "dump.lammpstrj";
 
 const XYZ: &str = "trajectory.xyz";
 
+const GSD: &str = "trajectory.gsd";
+
 /// Files of a run that a scene or a user may use as input.
-pub const FILES: [&str; 5] = [ThermoFile::NAME, DUMP, XYZ, "final.data", "last-good.data"];
+pub const FILES: [&str; 6] = [ThermoFile::NAME, DUMP, XYZ, GSD, "final.data", "last-good.data"];
 
 /// Files that are written when a run ends or stops.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
@@ -44,31 +46,41 @@ pub(super) struct Output {
     thermo: Option<ThermoFile>,
     dump: Option<GrowingFile>,
     xyz: Option<GrowingFile>,
+    gsd: Option<(PathBuf, GsdFile)>,
 }
 
 impl Output {
     /// Creates empty files, and a description of the run.
     pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
-        remove(folder, &[ThermoFile::NAME, DUMP, XYZ])?;
+        remove(folder, &[ThermoFile::NAME, DUMP, XYZ, GSD])?;
         remove_tables(folder)?;
         remove(folder, &LAST)?;
         remove_snapshots(folder)?;
+        remove_vtk(folder)?;
         super::about::about(scene).write(folder)?;
         let thermo = (scene.output.thermo > 0).then(|| ThermoFile::create(folder));
         let dump = (scene.output.dump > 0).then(|| GrowingFile::create(folder, DUMP));
         let xyz = (scene.output.xyz > 0).then(|| GrowingFile::create(folder, XYZ));
-        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
+        let steps: u64 = scene.stages.iter().map(|stage| stage.steps).sum();
+        let gsd = open_gsd(scene, folder, |path, every| GsdFile::create(path, 1 + steps / every));
+        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()?, gsd: gsd? })
     }
 
-    /// Opens the files of a resumed run and truncates them to the bytes that were `written` at its checkpoint.
-    pub fn reopen(folder: &Path, written: &BTreeMap<String, Written>) -> Result<Output, RunError> {
+    /// Opens the files of a resumed run and truncates them to what was written at its checkpoint.
+    pub fn reopen(scene: &Scene, folder: &Path, checkpoint: &Checkpoint) -> Result<Output, RunError> {
         remove_tables(folder)?;
         remove(folder, &LAST)?;
-        let written = |name: &str| written.get(name).copied();
+        let written = |name: &str| checkpoint.files.get(name).copied();
         let thermo = written(ThermoFile::NAME).map(|written| ThermoFile::reopen(folder, written));
         let dump = written(DUMP).map(|written| GrowingFile::reopen(folder, DUMP, written));
         let xyz = written(XYZ).map(|written| GrowingFile::reopen(folder, XYZ, written));
-        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
+        let Checkpoint { step, position, .. } = *checkpoint;
+        // Frames begin with the initial state, once its forces are known.
+        let begun = step > 0 || position.entered;
+        let gsd = open_gsd(scene, folder, |path, every| {
+            GsdFile::reopen(path, if begun { 1 + step / every } else { 0 })
+        });
+        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()?, gsd: gsd? })
     }
 
     /// Writes a row of totals if one is due, and returns whether it was.
@@ -93,19 +105,44 @@ impl Output {
         }
     }
 
-    /// The record of each file.
+    pub fn gsd_frame(&mut self, frame: &Frame, masses: &[f64]) -> Result<(), RunError> {
+        match &mut self.gsd {
+            None => Ok(()),
+            Some((path, file)) => file.write(frame, masses).map_err(RunError::output(path)),
+        }
+    }
+
+    /// The record of each file that grows at its end alone.
     pub fn written(&mut self) -> BTreeMap<String, Written> {
         self.files().map(|file| (file.name().to_owned(), file.written())).collect()
     }
 
     /// Syncs all files to the disk.
     pub fn sync(&mut self) -> Result<(), RunError> {
+        if let Some((path, file)) = &self.gsd {
+            file.sync().map_err(RunError::output(path))?;
+        }
         self.files().try_for_each(|file| file.sync())
     }
 
     fn files(&mut self) -> impl Iterator<Item = &mut GrowingFile> {
         self.thermo.as_mut().map(ThermoFile::file).into_iter().chain(&mut self.dump).chain(&mut self.xyz)
     }
+}
+
+/// Opens the GSD file of a scene that has one.
+fn open_gsd(
+    scene: &Scene,
+    folder: &Path,
+    open: impl FnOnce(&Path, u64) -> io::Result<GsdFile>,
+) -> Result<Option<(PathBuf, GsdFile)>, RunError> {
+    let every = scene.output.gsd;
+    if every == 0 {
+        return Ok(None);
+    }
+    let path = folder.join(GSD);
+    let file = open(&path, every).map_err(RunError::output(&path))?;
+    Ok(Some((path, file)))
 }
 
 /// Writes `observables.json` and the tables in `observables/`, if there are any observations, and syncs them to the disk.

@@ -150,7 +150,7 @@ impl<'a> Runner<'a> {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
             let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
             let start = Start::Resumed { step: good.step, program, instructions, fallback };
-            (start, Some(Output::reopen(folder.path(), &good.files)?))
+            (start, Some(Output::reopen(scene, folder.path(), &good)?))
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         let timing = Timing::read(folder.path());

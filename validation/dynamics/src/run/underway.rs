@@ -14,7 +14,7 @@ use crate::particles::write_data;
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
 use psidpd_observe::Observers;
-use psidpd_pictures::write_snapshot;
+use psidpd_pictures::{write_snapshot, write_vtk};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The place of a run in its scene, and the totals of the stage so far.
@@ -184,7 +184,7 @@ impl<'a> Run<'a> {
     /// Whether the particles at the end of a step are written to a file.
     fn writes(&self, step: u64) -> bool {
         let due = &self.scene.output;
-        [due.dump, due.xyz, due.snapshot].into_iter().any(|interval| every(interval, step))
+        [due.dump, due.xyz, due.gsd, due.vtk, due.snapshot].into_iter().any(|interval| every(interval, step))
     }
 
     /// Writes the output due after a step.
@@ -205,9 +205,9 @@ impl<'a> Run<'a> {
                 }
             }
             let due = &self.scene.output;
-            let [dump, xyz, snapshot] =
-                [due.dump, due.xyz, due.snapshot].map(|interval| every(interval, step));
-            if dump || xyz || snapshot {
+            let [dump, xyz, gsd, vtk, snapshot] =
+                [due.dump, due.xyz, due.gsd, due.vtk, due.snapshot].map(|interval| every(interval, step));
+            if dump || xyz || gsd || vtk || snapshot {
                 let sorted = ByTag::of(&self.simulation);
                 let frame = match &sorted {
                     Some(sorted) => sorted.frame(&self.simulation, self.present.position.time),
@@ -218,6 +218,13 @@ impl<'a> Run<'a> {
                 }
                 if xyz {
                     output.xyz_frame(&frame)?;
+                }
+                if gsd {
+                    output.gsd_frame(&frame, &self.scene.mass)?;
+                }
+                if vtk {
+                    let kernel = self.scene.model.at(self.scene.kt)?.densities.first().map(|d| d.kernel);
+                    write_vtk(self.folder.path(), &frame, kernel)?;
                 }
                 if snapshot {
                     write_snapshot(self.folder.path(), &frame)?;

@@ -11,6 +11,10 @@ pub struct Output {
     pub dump: u64,
     /// Steps between frames of `trajectory.xyz`; 0 writes none.
     pub xyz: u64,
+    /// Steps between frames of `trajectory.gsd`; 0 writes none.
+    pub gsd: u64,
+    /// Steps between frames in `vtk/`; 0 writes none.
+    pub vtk: u64,
     /// Steps between pictures in `snapshots/`; 0 writes none.
     pub snapshot: u64,
     /// Steps between checkpoints; 0 writes one at the end of a run only, even of a run that stops early. By
@@ -20,7 +24,7 @@ pub struct Output {
 
 impl Default for Output {
     fn default() -> Output {
-        Output { thermo: 100, dump: 0, xyz: 0, snapshot: 0, checkpoint: None }
+        Output { thermo: 100, dump: 0, xyz: 0, gsd: 0, vtk: 0, snapshot: 0, checkpoint: None }
     }
 }
 
@@ -32,6 +36,8 @@ pub fn read(root: &Section) -> Result<Output, FileError> {
         ("thermo", &mut output.thermo),
         ("dump", &mut output.dump),
         ("xyz", &mut output.xyz),
+        ("gsd", &mut output.gsd),
+        ("vtk", &mut output.vtk),
         ("snapshot", &mut output.snapshot),
     ];
     for (key, interval) in intervals {

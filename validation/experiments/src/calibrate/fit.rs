@@ -75,7 +75,7 @@ pub fn fit_density(points: &[Point], pair: usize, degree: usize) -> Option<Fit> 
     Some(Fit { coefficients, errors })
 }
 
-/// What is needed of a target equation of state to fit `ρ̃` to it, at one density.
+/// The values of a target equation of state that are needed to fit `ρ̃` to it, at one density.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
     pub wanted: f64,

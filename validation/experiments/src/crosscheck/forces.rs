@@ -383,7 +383,7 @@ mod tests {
         }
     }
 
-    /// A term that is 5 % wrong, in the forces or in the virial, is far beyond every limit; so is what is no number.
+    /// A term that is 5 % wrong, in the forces or in the virial, is far beyond every limit; so is NaN.
     #[test]
     fn wrong_terms_and_numbers_that_are_none_show() {
         let filling = Filling::cube(4.0);

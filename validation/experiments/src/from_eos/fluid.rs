@@ -124,7 +124,7 @@ mod tests {
         close(units.length, 1.25303e-9);
         close(units.pressure, 2.09231e6);
         close(units.tension, 2.62176e-3);
-        // The tension that is wanted of the model, in its own unit.
+        // The target tension of the model, in its own unit.
         close(liquid.tension / units.tension, 8.84711);
         // The same in the file.
         let text = model(&substance, &liquid, &units, &options, -40.0, "psidpd").unwrap();

@@ -109,7 +109,7 @@ pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
         Found::Ended { temperatures, momentum, .. } => {
             for [t, error] in temperatures {
                 let near = (t - 1.0).abs() <= part + 4.0 * error;
-                // What is no number is not near, and an error that is none is not small.
+                // NaN is not near, and a missing error is not small.
                 if !near {
                     return Err(format!("a temperature of {t:.3} ± {error:.3} kT"));
                 }

@@ -87,7 +87,7 @@ impl LammpsRuns {
         }
         let mean = sampled.mean(0);
         let calm = mean.value < FAR_OFF * origin.stage.kt;
-        // What is no number is not calm.
+        // NaN is not calm.
         if !calm {
             return Ok(Sampled::Unstable(format!(
                 "the temperature is {:.1} kT",

@@ -299,6 +299,32 @@ mod tests {
         .unwrap()
     }
 
+    /// Of two routes to one tension the one with the smaller error counts and is named, and a width says what it is a width of.
+    #[test]
+    fn the_better_tension_is_named() {
+        let slab = |stress: f64, free_energy: f64| -> [Observable; 2] {
+            let column = |name: &str, error: f64| serde_json::json!({"name": name, "values": [7.0 + error], "errors": [error]});
+            let read = |value| serde_json::from_value(value).unwrap();
+            [
+                read(serde_json::json!({
+                    "name": "surface_tension", "kind": "scalar",
+                    "columns": [column("stress", stress), column("free_energy", free_energy)]
+                })),
+                read(serde_json::json!({
+                    "name": "interface_width", "kind": "scalar", "columns": [column("width", 0.1)]
+                })),
+            ]
+        };
+        for (errors, source, value) in
+            [([0.1, 0.2], "surface_tension.stress", 7.1), ([0.2, 0.1], "surface_tension.free_energy", 7.1)]
+        {
+            let found = gather(None, None, None, &slab(errors[0], errors[1]));
+            let tension = found.get("tension").unwrap();
+            assert_eq!((tension.source.as_str(), tension.value, tension.error), (source, value, Some(0.1)));
+            assert_eq!(found.get("width").unwrap().source, "interface_width.width: 2 d of tanh(z/d)");
+        }
+    }
+
     #[test]
     fn a_drop_that_reaches_its_image_is_noticed() {
         let about = super::super::tests::about();

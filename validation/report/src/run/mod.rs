@@ -19,7 +19,7 @@ pub use headline::{Headline, HeadlineValue, headline};
 pub use series::Table as SeriesTable;
 
 /// The files that a report is made from, with their descriptions.
-const FILES: [(&str, &str); 10] = [
+const FILES: [(&str, &str); 12] = [
     ("about.json", "description of the run: species, stages, units, columns of thermo.csv"),
     ("thermo.csv", "totals every few steps"),
     ("summary.json", "summary of results"),
@@ -29,6 +29,8 @@ const FILES: [(&str, &str); 10] = [
     ("final.data", "the state after the last step: LAMMPS data file"),
     ("dump.lammpstrj", "frames: LAMMPS text dump"),
     ("trajectory.xyz", "frames: extended XYZ"),
+    ("trajectory.gsd", "frames: GSD"),
+    ("vtk", "particles and their density for ParaView"),
     ("snapshots", "pictures of the particles along the run"),
 ];
 

@@ -103,6 +103,9 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
     );
     let (texts, page) = page(folder.path());
     let has = |text: &str| assert!(texts.iter().any(|t| t.contains(text)), "{text} is not in the page");
+    // The observables, which the scene asks for, come before the totals.
+    let place = |heading: &str| texts.iter().position(|t| t == heading).expect(heading);
+    assert!(place("Results") < place("Observables") && place("Observables") < place("Series"));
     for text in [
         "A title",
         "A model",

@@ -29,7 +29,7 @@ pub struct SharedSlopes<'a, T> {
 }
 
 impl<T: Scalar> SlopeArrays<T> {
-    /// Makes room for all particles of an order, and for packed rows if they are wanted.
+    /// Makes room for all particles of an order, and for packed rows if they are requested.
     pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
         let total = order.particles() + order.copies();
         self.width = width;
@@ -92,7 +92,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
         }
     }
 
-    /// Packs the slopes of particles, if packed rows are wanted.
+    /// Packs the slopes of particles, if packed rows are requested.
     ///
     /// # Safety
     /// No other thread accesses their slopes meanwhile.

@@ -30,7 +30,7 @@ const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 
     [[stage]]\nname = \"cool\"\nsteps = 7\nkT = [1.5, 1.0]\nlevels = 3\nintegrator = \"groot-warren\"\n\
     [[stage]]\nname = \"alone\"\nsteps = 5\ndt = 0.005\nbody_forces = false\n\
     [[stage]]\nname = \"run\"\nsteps = 9\n\
-    [output]\nthermo = 2\ndump = 3\nxyz = 4\nsnapshot = 10\ncheckpoint = 4\n\
+    [output]\nthermo = 2\ndump = 3\nxyz = 4\ngsd = 2\nvtk = 7\nsnapshot = 10\ncheckpoint = 4\n\
     [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
     velocity_profile = true\npressure = true\nmsd = { every = 1, length = 4 }\nclusters = { skip = 3 }\n";
 
@@ -52,7 +52,7 @@ const TRIALS: &str = "title = \"trials\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7
     [[stage]]\nname = \"rest\"\nsteps = 7\nintegrator = \"monte-carlo\"\nkT = [1.5, 1.0]\nlevels = 3\n\
     [[stage]]\nname = \"move\"\nsteps = 5\nintegrator = \"two-stage\"\ndt = 0.02\n\
     [[stage]]\nname = \"run\"\nsteps = 9\nintegrator = \"monte-carlo\"\nsweeps = 3\n\
-    [output]\nthermo = 2\ndump = 3\nxyz = 4\nsnapshot = 10\ncheckpoint = 4\n\
+    [output]\nthermo = 2\ndump = 3\nxyz = 4\ngsd = 2\nvtk = 7\nsnapshot = 10\ncheckpoint = 4\n\
     [observe]\nevery = 2\nstages = [\"rest\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
     pressure = true\nsurface_tension = true\n";
 
@@ -127,9 +127,20 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
             "snapshots/particles-0000000020.png",
             "summary.json",
             "thermo.csv",
+            "trajectory.gsd",
             "trajectory.xyz",
+            "vtk/density-0000000000.vti",
+            "vtk/density-0000000007.vti",
+            "vtk/density-0000000014.vti",
+            "vtk/density-0000000021.vti",
+            "vtk/particles-0000000000.vtp",
+            "vtk/particles-0000000007.vtp",
+            "vtk/particles-0000000014.vtp",
+            "vtk/particles-0000000021.vtp",
         ];
-        let observed = |n: &&str| !["observables.json", "trajectory.xyz"].contains(n) && !n.contains('/');
+        let observed = |n: &&str| {
+            !["observables.json", "trajectory.gsd", "trajectory.xyz"].contains(n) && !n.contains('/')
+        };
         let expected: Vec<_> = if scene.observe.requests.is_empty() {
             all.into_iter().filter(observed).collect()
         } else {

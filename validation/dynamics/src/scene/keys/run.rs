@@ -129,6 +129,13 @@ pub const OUTPUT: Table = Table {
         key("xyz", Count, OPTIONAL,
             "Number of steps between frames with every particle as extended XYZ; 0, no frames, if left out.",
             "[output]\nxyz = 500"),
+        key("gsd", Count, OPTIONAL,
+            "Number of steps between frames with every particle in the format of HOOMD-blue; 0, no frames, if left out.",
+            "[output]\ngsd = 500"),
+        key("vtk", Count, OPTIONAL,
+            "Number of steps between files for ParaView with every particle, and with the weighted local density on a \
+             grid; 0, no files, if left out.",
+            "[output]\nvtk = 500"),
         key("snapshot", Count, OPTIONAL,
             "Number of steps between pictures of the particles; 0, no pictures, if left out.", "[output]\nsnapshot = 1000"),
         key("checkpoint", Count, OPTIONAL,

@@ -1,0 +1,283 @@
+//! GSD, the binary trajectories of HOOMD-blue: a header, a list of names, an index and the data, as its specification (version 2.0)
+//! and its schema `hoomd` (1.4) have them.
+//!
+//! The index has room for all frames from the start, so that a file grows by a frame at its end, and a file that was cut in
+//! the middle of a frame is continued. Numbers are those of the schema: single precision. The box is centred at the
+//! origin, so positions are shifted by the middle of the box.
+
+use super::Frame;
+use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+
+/// The names of the chunks. A chunk has the number of its name, and each frame lists them in this order, as readers expect.
+const NAMES: [&str; 10] = [
+    "configuration/step",
+    "configuration/box",
+    "particles/position",
+    "particles/velocity",
+    "log/time",
+    // The others are in the first frame only; readers take them from there.
+    "configuration/dimensions",
+    "particles/N",
+    "particles/types",
+    "particles/typeid",
+    "particles/mass",
+];
+/// The number of chunks of a frame after the first.
+const LATER: u64 = 5;
+
+const MAGIC: u64 = 0x65DF_65DF_65DF_65DF;
+const HEADER: u64 = 256;
+/// Bytes of a name in the list.
+const NAME: u64 = 64;
+const INDEX: u64 = HEADER + NAMES.len() as u64 * NAME;
+/// Bytes of an entry of the index.
+const ENTRY: u64 = 32;
+
+/// A chunk of data: the number of its rows and columns, the type of its numbers with their size, and their bytes.
+struct Chunk {
+    rows: u64,
+    columns: u32,
+    kind: u8,
+    bytes: Vec<u8>,
+}
+
+impl Chunk {
+    fn new<const B: usize>(kind: u8, columns: usize, numbers: impl Iterator<Item = [u8; B]>) -> Chunk {
+        let bytes: Vec<u8> = numbers.flatten().collect();
+        Chunk { rows: (bytes.len() / (B * columns)) as u64, columns: columns as u32, kind, bytes }
+    }
+
+    fn bytes(numbers: impl Iterator<Item = u8>) -> Chunk {
+        Chunk::new(1, 1, numbers.map(|x| [x]))
+    }
+
+    fn integers(numbers: impl Iterator<Item = u32>) -> Chunk {
+        Chunk::new(3, 1, numbers.map(u32::to_le_bytes))
+    }
+
+    fn singles(columns: usize, numbers: impl Iterator<Item = f64>) -> Chunk {
+        Chunk::new(9, columns, numbers.map(|x| (x as f32).to_le_bytes()))
+    }
+}
+
+/// The number of entries of the index after some frames.
+fn entries(frames: u64) -> u64 {
+    match frames {
+        0 => 0,
+        _ => NAMES.len() as u64 + LATER * (frames - 1),
+    }
+}
+
+/// A GSD file that grows by frames. Every frame must have the same particles.
+#[derive(Debug)]
+pub struct GsdFile {
+    file: File,
+    /// The number of frames in the file.
+    frames: u64,
+    /// The most frames that the index has room for.
+    most: u64,
+    /// The end of the data of these frames.
+    end: u64,
+}
+
+impl GsdFile {
+    /// Creates a file without frames and with room for `most` of them.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn create(path: &Path, most: u64) -> io::Result<GsdFile> {
+        let file = File::options().read(true).write(true).create(true).truncate(true).open(path)?;
+        let end = INDEX + ENTRY * entries(most);
+        let mut head = Vec::new();
+        for number in [MAGIC, INDEX, entries(most), HEADER, NAMES.len() as u64] {
+            head.extend(number.to_le_bytes());
+        }
+        // The versions of the schema and of the format.
+        head.extend([(1u32 << 16) | 4, 2u32 << 16].map(u32::to_le_bytes).concat());
+        for text in [concat!("psidpd ", env!("CARGO_PKG_VERSION")), "hoomd"] {
+            head.extend(text.bytes().chain(std::iter::repeat(0)).take(64));
+        }
+        head.resize(HEADER as usize, 0);
+        for name in NAMES {
+            // In this version of the format names follow each other.
+            head.extend(name.bytes().chain([0]));
+        }
+        file.write_all_at(&head, 0)?;
+        file.set_len(end)?;
+        Ok(GsdFile { file, frames: 0, most, end })
+    }
+
+    /// Opens a file to continue it after its first `frames` frames, and removes the others.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, was not written by [`GsdFile`], or has fewer frames.
+    pub fn reopen(path: &Path, frames: u64) -> io::Result<GsdFile> {
+        let wrong = |what: &str| io::Error::new(ErrorKind::InvalidData, what.to_owned());
+        let file = File::options().read(true).write(true).open(path)?;
+        let number = |at: u64| -> io::Result<u64> {
+            let mut bytes = [0; 8];
+            file.read_exact_at(&mut bytes, at)?;
+            Ok(u64::from_le_bytes(bytes))
+        };
+        let length = file.metadata()?.len();
+        let room = number(16)?;
+        let index_end = room.checked_mul(ENTRY).and_then(|size| size.checked_add(INDEX));
+        if number(0)? != MAGIC || number(8)? != INDEX || index_end.is_none_or(|end| end > length) {
+            return Err(wrong("it is not the GSD file of this run"));
+        }
+        let kept = entries(frames);
+        let mut end = INDEX + ENTRY * room;
+        if let Some(last) = kept.checked_sub(1) {
+            // `log/time`, one double, or the masses, in single precision.
+            let at = INDEX + ENTRY * last;
+            let size = if frames == 1 { 4 } else { 8 };
+            let found = kept <= room && number(at)? == frames - 1;
+            let last =
+                number(at + 8)?.checked_mul(size).and_then(|size| size.checked_add(number(at + 16).ok()?));
+            match last.filter(|last| found && (end..=length).contains(last)) {
+                Some(last) => end = last,
+                None => return Err(wrong(&format!("it has fewer than {frames} frames"))),
+            }
+        }
+        let rest = room.saturating_sub(kept) * ENTRY;
+        file.write_all_at(&vec![0; rest as usize], INDEX + ENTRY * kept)?;
+        file.set_len(end)?;
+        let most = (room + LATER).saturating_sub(NAMES.len() as u64) / LATER;
+        Ok(GsdFile { file, frames, most, end })
+    }
+
+    /// Writes a frame, with the masses of its species. Particles keep their order. Unknown velocities are written as 0.
+    ///
+    /// # Errors
+    /// The file cannot be written; it has no room; the first edge of the box is not along x, or the second not in the plane
+    /// of x and y.
+    pub fn write(&mut self, frame: &Frame, masses: &[f64]) -> io::Result<()> {
+        let wrong = |what: &str| io::Error::new(ErrorKind::InvalidInput, what.to_owned());
+        if self.frames == self.most {
+            return Err(wrong("the index is full"));
+        }
+        let chunks = chunks(frame, masses, self.frames == 0).ok_or_else(|| {
+            wrong("GSD needs a box with its first edge along x and its second in the plane of x and y")
+        })?;
+        let mut data = Vec::new();
+        let mut index = Vec::new();
+        for (name, chunk) in chunks.iter().enumerate() {
+            index.extend(self.frames.to_le_bytes());
+            index.extend(chunk.rows.to_le_bytes());
+            index.extend((self.end + data.len() as u64).to_le_bytes());
+            index.extend(chunk.columns.to_le_bytes());
+            index.extend((name as u16).to_le_bytes());
+            index.extend([chunk.kind, 0]);
+            data.extend(&chunk.bytes);
+        }
+        // The index comes last: without it the data do not count.
+        self.file.write_all_at(&data, self.end)?;
+        self.file.write_all_at(&index, INDEX + ENTRY * entries(self.frames))?;
+        self.end += data.len() as u64;
+        self.frames += 1;
+        Ok(())
+    }
+
+    /// Syncs the file to the disk.
+    ///
+    /// # Errors
+    /// The disk reports an error.
+    pub fn sync(&self) -> io::Result<()> {
+        self.file.sync_data()
+    }
+}
+
+/// The chunks of a frame in the order of [`NAMES`]; `None` for a box that the format cannot hold.
+fn chunks(frame: &Frame, masses: &[f64], first: bool) -> Option<Vec<Chunk>> {
+    let [a, b, c] = [0, 1, 2].map(|k| frame.domain.edge(k));
+    if [a[1], a[2], b[2]] != [0.0; 3] {
+        return None;
+    }
+    let flat = frame.dimensions == 2;
+    let middle = frame.domain.point([0.5; 3]);
+    let height = if flat { 0.0 } else { c[2] };
+    let shape = [a[0], b[1], height, b[0] / b[1], c[0] / c[2], c[1] / c[2]];
+    let x =
+        frame.x.iter().flat_map(|x| (0..3).map(move |k| if flat && k == 2 { 0.0 } else { x[k] - middle[k] }));
+    let v = (0..frame.len()).flat_map(|k| frame.v.map_or([0.0; 3], |v| v[k]));
+    let mut chunks = vec![
+        Chunk::new(4, 1, [frame.step.to_le_bytes()].into_iter()),
+        Chunk::singles(1, shape.into_iter()),
+        Chunk::singles(3, x),
+        Chunk::singles(3, v),
+        Chunk::new(10, 1, [frame.time.to_le_bytes()].into_iter()),
+    ];
+    if first {
+        let width = frame.names.iter().map(|name| name.len() + 1).max().unwrap_or(1);
+        let names = frame.names.iter().flat_map(|name| name.bytes().chain(std::iter::repeat(0)).take(width));
+        chunks.extend([
+            Chunk::bytes([frame.dimensions as u8].into_iter()),
+            Chunk::integers([frame.len() as u32].into_iter()),
+            Chunk::new(5, width, names.map(|x| [x])),
+            Chunk::integers(frame.species.iter().map(|s| *s as u32)),
+            Chunk::singles(1, frame.species.iter().map(|s| masses[*s as usize])),
+        ]);
+    }
+    Some(chunks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+    use psidpd_core::engine::PeriodicBox;
+
+    fn frame<'a>(step: u64, domain: &'a PeriodicBox, names: &'a [String], x: &'a [[f64; 3]]) -> Frame<'a> {
+        let (species, tag) = (&[0, 1][..], &[1, 2][..]);
+        Frame { step, time: 0.1 * step as f64, dimensions: 3, domain, names, x, v: Some(x), species, tag }
+    }
+
+    /// A file that was cut after any byte, or has later frames, ends in the same bytes; one that lacks frames is refused.
+    #[test]
+    fn a_file_is_continued_to_the_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.gsd");
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0, 5.0, 6.0], [true; 3]).unwrap();
+        let names = ["A".to_owned(), "long".to_owned()];
+        let x = [[0.5, 1.0, 2.0], [3.0, 0.25, 5.5]];
+        let write = |file: &mut GsdFile, steps: std::ops::Range<u64>| {
+            steps.for_each(|step| file.write(&frame(step, &domain, &names, &x), &[1.0, 2.0]).unwrap());
+        };
+        let mut file = GsdFile::create(&path, 4).unwrap();
+        write(&mut file, 0..4);
+        assert!(file.write(&frame(4, &domain, &names, &x), &[1.0, 2.0]).is_err());
+        let whole = std::fs::read(&path).unwrap();
+        for kept in 0..=4 {
+            std::fs::write(&path, &whole).unwrap();
+            let mut file = GsdFile::reopen(&path, kept).unwrap();
+            let length = std::fs::metadata(&path).unwrap().len();
+            assert!(kept == 4 || length < whole.len() as u64);
+            write(&mut file, kept..4);
+            assert_eq!(std::fs::read(&path).unwrap(), whole);
+            // The data of a frame may be cut; what is there before suffices.
+            std::fs::write(&path, &whole[..length as usize]).unwrap();
+            write(&mut GsdFile::reopen(&path, kept).unwrap(), kept..4);
+            assert_eq!(std::fs::read(&path).unwrap(), whole);
+            std::fs::write(&path, &whole[..length as usize - 1]).unwrap();
+            assert!(GsdFile::reopen(&path, kept).is_err(), "{kept}");
+        }
+        let mut file = GsdFile::create(&path, 4).unwrap();
+        write(&mut file, 0..2);
+        assert!(GsdFile::reopen(&path, 3).is_err() && GsdFile::reopen(&path, 5).is_err());
+        std::fs::write(&path, "not a trajectory, though as long as the header of one").unwrap();
+        assert!(GsdFile::reopen(&path, 0).is_err());
+    }
+
+    #[test]
+    fn a_box_that_leans_otherwise_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut file = GsdFile::create(&folder.path().join("t.gsd"), 1).unwrap();
+        let edges = Matrix3::new(4.0, 0.0, 0.0, 1.0, 4.0, 0.0, 0.0, 0.0, 4.0);
+        let domain = PeriodicBox::new([0.0; 3], edges, [true; 3]).unwrap();
+        let names = ["A".to_owned(), "B".to_owned()];
+        assert!(file.write(&frame(0, &domain, &names, &[[0.0; 3]; 2]), &[1.0, 1.0]).is_err());
+    }
+}

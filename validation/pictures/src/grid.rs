@@ -1,0 +1,180 @@
+//! The weighted local density on a grid, and the files of a run for VTK.
+
+use super::FieldOptions;
+use psidpd_core::model::kernel::Kernel;
+use psidpd_formats::files::WriteError;
+use psidpd_formats::{FormatError, Frame, Grid, write_vti, write_vtp};
+use std::path::Path;
+
+/// The folder of these files in that of a run.
+pub const VTK: &str = "vtk";
+
+/// Points of the grid within the range of the weight function.
+const FINE: f64 = 3.0;
+/// The most cells of the grid along an edge of the box.
+const MOST: f64 = 256.0;
+
+/// The weighted local density `n(r) = Σ_j w(|r − r_j|)` on a grid that spans the box: `density` of all particles, and, of several
+/// species, `density_NAME` of each. Points are a third of the range of the weight function apart, or a little less, but no
+/// more than 257 along an edge. A species without particles has the density 0.
+///
+/// Returns `None` for a box with edges that are not along the axes.
+pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
+    let kernel = kernel.unwrap_or(FieldOptions::coarse(frame.dimensions).kernel);
+    let lengths = frame.domain.lengths();
+    if (0..3).any(|k| frame.domain.edge(k)[k] != lengths[k]) {
+        return None;
+    }
+    let cells: [usize; 3] = std::array::from_fn(|k| match (k, frame.dimensions) {
+        (2, 2) => 0,
+        _ => (FINE * lengths[k] / kernel.range()).ceil().clamp(1.0, MOST) as usize,
+    });
+    let size = cells.map(|n| n + 1);
+    let spacing: [f64; 3] = std::array::from_fn(|k| lengths[k] / cells[k].max(1) as f64);
+    let mut origin = frame.domain.origin();
+    if frame.dimensions == 2 {
+        origin[2] = frame.x.first().map_or(0.0, |x| x[2]);
+    }
+    let kinds = if frame.names.len() > 1 { frame.names.len() } else { 0 };
+    let mut values = vec![vec![0.0; size.iter().product()]; 1 + kinds];
+    let periodic = frame.periodic();
+    for (x, species) in frame.x.iter().zip(frame.species) {
+        // For each direction the distances of the points in range, and their numbers in the grid. The last point of a
+        // periodic direction is the first of the next box, so that each point has its own share of images.
+        let near: [Vec<(f64, usize)>; 3] = std::array::from_fn(|k| {
+            let place = (x[k] - origin[k]) / spacing[k];
+            let reach = kernel.range() / spacing[k];
+            let (low, high) = ((place - reach).ceil() as i64, (place + reach).floor() as i64);
+            let mut points = Vec::new();
+            for point in low..=high {
+                let off = (point as f64 - place) * spacing[k];
+                if !periodic[k] {
+                    points.extend(usize::try_from(point).ok().filter(|p| *p < size[k]).map(|p| (off, p)));
+                    continue;
+                }
+                let first = point.rem_euclid(cells[k] as i64) as usize;
+                points.push((off, first));
+                if first == 0 {
+                    points.push((off, cells[k]));
+                }
+            }
+            points
+        });
+        for (dz, k) in &near[2] {
+            for (dy, j) in &near[1] {
+                for (dx, i) in &near[0] {
+                    let w = kernel.value((dx * dx + dy * dy + dz * dz).sqrt());
+                    let at = (k * size[1] + j) * size[0] + i;
+                    values[0][at] += w;
+                    if kinds > 0 {
+                        values[1 + *species as usize][at] += w;
+                    }
+                }
+            }
+        }
+    }
+    let names = frame.names.iter().take(kinds).map(|name| format!("density_{name}"));
+    let names = ["density".to_owned()].into_iter().chain(names);
+    let fields = names.zip(values).map(|(name, v)| (name, v.into_iter().map(|x: f64| x as f32).collect()));
+    Some(Grid { origin, spacing, size, fields: fields.collect() })
+}
+
+/// Writes the particles and their density into the folder of VTK's files of a run, each file whole or not at all. The folder is
+/// created if it does not exist. A box with edges that are not along the axes gets no density.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_vtk(folder: &Path, frame: &Frame, kernel: Option<Kernel>) -> Result<(), FormatError> {
+    let folder = folder.join(VTK);
+    std::fs::create_dir_all(&folder).map_err(|cause| WriteError { path: folder.clone(), cause })?;
+    let mut bytes = Vec::new();
+    let write = |name: &str, bytes: &mut Vec<u8>| {
+        let path = folder.join(name);
+        // A killed run leaves at most this file. The resumed run makes the same step and replaces it.
+        let new = folder.join("unfinished.new");
+        std::fs::write(&new, &bytes)
+            .and_then(|()| std::fs::rename(&new, &path))
+            .map_err(|cause| WriteError { path, cause })?;
+        bytes.clear();
+        Ok::<(), WriteError>(())
+    };
+    let write_error = |source| FormatError::Io { action: "write", path: folder.clone(), source };
+    write_vtp(frame, &mut bytes).map_err(write_error)?;
+    write(&format!("particles-{:010}.vtp", frame.step), &mut bytes)?;
+    if let Some(grid) = density_grid(frame, kernel) {
+        write_vti(&grid, frame, &mut bytes).map_err(write_error)?;
+        write(&format!("density-{:010}.vti", frame.step), &mut bytes)?;
+    }
+    Ok(())
+}
+
+/// Removes VTK's files of an earlier run from the folder of a run.
+///
+/// # Errors
+/// A file cannot be removed.
+pub fn remove_vtk(folder: &Path) -> Result<(), FormatError> {
+    let Ok(entries) = std::fs::read_dir(folder.join(VTK)) else { return Ok(()) };
+    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
+        let own = [("particles-", ".vtp"), ("density-", ".vti"), ("unfinished", ".new")];
+        if own.iter().any(|(start, end)| name.starts_with(start) && name.ends_with(end)) {
+            std::fs::remove_file(&path).map_err(|cause| WriteError { path: path.clone(), cause })?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_core::engine::PeriodicBox;
+    use psidpd_core::model::kernel::KernelKind;
+
+    /// Each value is the sum over all images, in boxes with and without walls, also narrower than the range.
+    #[test]
+    fn values_are_sums_over_all_images() {
+        let x = [[1.1, -0.9, 0.1], [3.9, 0.9, 2.4], [2.5, 0.1, 1.2]];
+        let names = ["A".to_owned(), "B".to_owned()];
+        for (dimensions, periodic) in [(3, [true; 3]), (3, [true, false, true]), (2, [true, true, false])] {
+            let domain = PeriodicBox::orthogonal([1.0, -1.0, 0.0], [3.0, 2.0, 2.5], periodic).unwrap();
+            let x = x.map(|x| if dimensions == 2 { [x[0], x[1], 0.5] } else { x });
+            let (species, tag) = (&[0, 1, 0][..], &[1, 2, 3][..]);
+            let domain = &domain;
+            let frame =
+                Frame { step: 0, time: 0.0, dimensions, domain, names: &names, x: &x, v: None, species, tag };
+            let kernel = Kernel::new(KernelKind::Quadratic, 2.2, dimensions);
+            let grid = density_grid(&frame, Some(kernel)).unwrap();
+            assert_eq!(grid.size, [6, 4, if dimensions == 3 { 5 } else { 1 }]);
+            let images = |periodic: bool| if periodic { -2..=2 } else { 0..=0 };
+            for at in 0..grid.size.iter().product() {
+                let [i, j, k] =
+                    [at % grid.size[0], at / grid.size[0] % grid.size[1], at / grid.size[0] / grid.size[1]];
+                let point: [f64; 3] =
+                    std::array::from_fn(|c| grid.origin[c] + [i, j, k][c] as f64 * grid.spacing[c]);
+                let mut sums = [0.0; 3];
+                for (x, s) in x.iter().zip(species) {
+                    for a in images(periodic[0]) {
+                        for b in images(periodic[1]) {
+                            for c in images(periodic[2]) {
+                                let d = [a as f64 * 3.0, b as f64 * 2.0, c as f64 * 2.5];
+                                let square: f64 = (0..3).map(|k| (x[k] + d[k] - point[k]).powi(2)).sum();
+                                let w = kernel.value(square.sqrt());
+                                sums[0] += w;
+                                sums[1 + *s as usize] += w;
+                            }
+                        }
+                    }
+                }
+                for ((name, values), sum) in grid.fields.iter().zip(sums) {
+                    let value = f64::from(values[at]);
+                    assert!(
+                        (value - sum).abs() < 1e-6,
+                        "{dimensions} {periodic:?} {name} {at}: {value} {sum}"
+                    );
+                }
+            }
+            let fields: Vec<&str> = grid.fields.iter().map(|(name, _)| name.as_str()).collect();
+            assert_eq!(fields, ["density", "density_A", "density_B"]);
+        }
+    }
+}
