@@ -44,7 +44,9 @@ for path in sorted(HERE.glob("*.ipynb")):
         # A plot's cell also returns the object that was drawn last.
         outputs = [output for output in outputs if not (plots and output.output_type == "execute_result")]
         parts += [shown(output, f"notebook-{path.stem}-{number}.png") for output in outputs]
-    link = f"A notebook, [`python/notebooks/{path.name}`](../python/notebooks/{path.name}), with its outputs."
+    # The notebook is not in the book.
+    address = f"https://github.com/psidpd/psidpd/blob/main/python/notebooks/{path.name}"
+    link = f"A notebook, [`python/notebooks/{path.name}`]({address}), with its outputs."
     title, *rest = "\n\n".join(parts).split("\n")
     (DOCS / f"notebook-{path.stem}.md").write_text("\n".join([title, "", link, *rest]) + "\n")
     print(path.name)

