@@ -2,7 +2,8 @@
 //! numbers, results do not depend on the number of threads.
 
 use crate::bridge::Movers;
-use crate::style::{Style, triples};
+use crate::converted::triples;
+use crate::style::Style;
 use psidpd_core::engine::part;
 
 impl Movers<'_> {

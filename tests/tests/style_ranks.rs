@@ -74,7 +74,7 @@ fn grid(random: &mut StdRng, ranks: usize, dimensions: usize) -> [usize; 3] {
     let mut grid = [1; 3];
     let mut left = ranks;
     for prime in [2, 2, 2, 3] {
-        if left % prime == 0 {
+        if left.is_multiple_of(prime) {
             grid[random.random_range(0..dimensions)] *= prime;
             left /= prime;
         }

@@ -302,7 +302,7 @@ mod tests {
     /// Of two routes to one tension the one with the smaller error counts and is named, and a width says what it is a width of.
     #[test]
     fn the_better_tension_is_named() {
-        let slab = |stress: f64, free_energy: f64| -> [Observable; 2] {
+        let slab = |stress: f64, free_energy: f64| -> [Observation; 2] {
             let column = |name: &str, error: f64| serde_json::json!({"name": name, "values": [7.0 + error], "errors": [error]});
             let read = |value| serde_json::from_value(value).unwrap();
             [
