@@ -207,7 +207,7 @@ fn clusters_have_the_distance_that_they_are_given() {
 #[test]
 fn the_density_of_a_slab_is_that_of_its_middle() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 5\nbox = [6.0, 6.0, 14.0]\ndt = 0.01\nequilibrate = 500\n\
-                steps = 5000\n[initial]\nkind = \"slab\"\nthickness = 8.0\ndensity = 6.05\n[observe]\nevery = 10\n\
+                steps = 20000\n[initial]\nkind = \"slab\"\nthickness = 8.0\ndensity = 6.05\n[observe]\nevery = 10\n\
                 interface_width = true\ndensity_profile = true\n";
     let (_, all) = super::run(&test_support::scene(SET6, text).unwrap());
     let out = super::find(&all, "interface_width");

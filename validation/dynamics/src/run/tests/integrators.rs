@@ -178,7 +178,7 @@ fn pressures_are_those_of_other_codes() {
         let mut run = simulation(DPD, start.clone());
         run.prepare_for(integrator, dt, Want::FORCES).unwrap();
         run.advance((4.0 / dt) as u64, dt, integrator).unwrap();
-        let samples = (10.0 / dt / 16.0) as usize;
+        let samples = (25.0 / dt / 16.0) as usize;
         let blocks: Vec<[f64; 2]> = (0..16)
             .map(|_| {
                 let mut sums = [0.0; 2];
