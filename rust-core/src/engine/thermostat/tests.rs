@@ -415,6 +415,31 @@ fn at_zero_temperature_drag_is_left() {
     }
 }
 
+/// Without noise the update of a pair is its own adjoint in the product `Σ m u·v`, so that updates in the opposite order are
+/// the adjoint of those in the order: `⟨u, A v⟩ = ⟨A′ u, v⟩`.
+#[test]
+fn reversed_pairs_are_the_adjoint() {
+    for (model, mut cloud) in clouds().into_iter().filter(|(_, cloud)| cloud.x.len() > 50) {
+        cloud.frozen.fill(false);
+        let pool = pool(1);
+        let act = |v: &[[f64; 3]], reversed: bool| {
+            let mut v = v.to_vec();
+            ready(model, 0.0, &cloud, &pool).act(&pool, Update::Shardlow { reversed }, &mut v);
+            v
+        };
+        let product = |u: &[[f64; 3]], v: &[[f64; 3]]| -> f64 {
+            (0..v.len()).map(|k| cloud.mass_of(k) * (0..3).map(|c| u[k][c] * v[k][c]).sum::<f64>()).sum()
+        };
+        let (v, u) = (&cloud.v, cloud.v.iter().rev().copied().collect::<Vec<_>>());
+        let size = product(v, v);
+        let [there, back, same] =
+            [product(&u, &act(v, false)), product(&act(&u, true), v), product(&act(&u, false), v)];
+        let bound = if cloud.precision == Precision::Double { 1e-12 } else { 1e-6 } * size;
+        assert!((there - back).abs() < bound, "{there} {back} of {size}");
+        assert!((there - same).abs() > 10.0 * bound, "the order matters");
+    }
+}
+
 /// Drag is a hundred times the inertia, and a hundredth of it.
 #[test]
 fn weak_and_strong_drag_converge() {
