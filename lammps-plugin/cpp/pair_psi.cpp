@@ -240,7 +240,8 @@ std::string PairPsi::advice()
       add("on one rank 'neighbor 0.0 bin' and 'neigh_modify delay 0 every 20 check no' save the ghosts, a tenth to a third of a "
           "step, unless a compute or fix needs them");
   }
-  if (why_listed.empty() && comm->nprocs > 1 && comm->layout == Comm::LAYOUT_TILED)
+  // The layout becomes tiled when it is balanced, which may be later.
+  if (why_listed.empty() && comm->nprocs > 1 && comm->style == Comm::TILED)
     add("in a tiled layout each rank works on ghosts along all periodic directions, also images of its own atoms; a brick layout "
         "has none along directions with one rank");
   const auto is_nve = [](const Fix *fix) { return strcmp(fix->style, "nve") == 0; };
