@@ -9,7 +9,7 @@
 //! simulation  particles that stay on the device: upload, advance, totals, download
 //! ```
 //!
-//! The physics is that of [`psidpd_core::model`] and the noise that of [`psidpd_core::engine::noise`]. Coordinates are 32-bit
+//! The physics is that of `psidpd_core::model` and the noise that of `psidpd_core::engine::noise`. Coordinates are 32-bit
 //! fixed-point numbers and all other numbers single precision. A particle sums over its neighbours in an order that
 //! depends on positions and tags only, so that two runs on one device give the same bits.
 #![cfg(feature = "wgpu")]
