@@ -571,7 +571,7 @@ impl GpuSimulation {
         ];
         sizes.extend([of_thermostat; 4]);
         let limits = &self.device.limits;
-        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size.into());
+        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         if let Some(size) = sizes.iter().find(|size| **size > most) {
             let what = format!("{count} particles: an array of {size} bytes on a device with at most {most}");
             return Err(Unsupported { what }.into());

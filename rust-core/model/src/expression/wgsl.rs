@@ -85,7 +85,7 @@ mod tests {
         assert_eq!(text("7"), "7.0");
         assert_eq!(text("x"), "n[0]");
         assert_eq!(text("(x + y)*(x - y)"), "t0 = n[0] + n[1]; t1 = n[0] - n[1]; t2 = t0 * t1; t2");
-        assert_eq!(text("-x/y"), "t0 = -n[0]; t1 = t0 / n[1]; t1");
+        assert_eq!(text("-x/y"), "t0 = n[0] / n[1]; t1 = -t0; t1");
         assert_eq!(text("3 + x"), "t0 = 3.0 + n[0]; t0");
         assert_eq!(text("3 - x"), "t0 = 3.0 - n[0]; t0");
         assert_eq!(text("3/x"), "t0 = 3.0 / n[0]; t0");

@@ -62,7 +62,7 @@ fn errors_name_line_key_and_cause() {
         ("strength = \"A\"", "strength = \"1/0\"", 15, "no finite value"),
         ("strength = \"A\"", "strength = nan", 15, "not a finite number"),
         ("gamma = 18.0", "gamma = -1", 18, "must not be negative"),
-        ("A = -40.0", "kT = 1", 4, "kT is the host's"),
+        ("A = -40.0", "kT = 1", 4, "the scene or the host code sets kT"),
         ("A = -40.0", "ln = 1", 4, "name of a constant or function"),
         ("A = -40.0", "n = 1\nA = 1", 8, "has the name of another"),
         ("A = -40.0", "A = \"C\"\nC = \"A\"", 3, "in a circle"),

@@ -52,7 +52,7 @@ fn other_styles_stay_beside() {
          pair_coeff * * mdpd/psi -40 25 18 1 0.75\npair_coeff 1 1 lj/cut 1 1\n"
     );
     let left = texts(&new.left);
-    for said in ["densities of the step before", "had the range 0.8, forces 0.75"] {
+    for said in ["used the densities of the previous step", "had the range 0.8, forces 0.75"] {
         assert!(left.contains(said), "{said}: {left}");
     }
     assert!(texts(&new.changed).contains("2: the thermostat needs velocities of ghosts"));
