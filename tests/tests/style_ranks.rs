@@ -207,8 +207,7 @@ const MIXED: f64 = 2e-4;
 
 /// Boxes from 2.4 cut-offs, tilted ones and such with open sides, in two and three dimensions; any division among ranks,
 /// skins, newton on and off, drops in a corner, hybrids, tiled and balanced layouts.
-#[test]
-fn random_decks_have_the_forces_of_the_model_on_any_ranks() {
+fn random_decks(for_each_number_of_ranks: usize) {
     let folder = tempfile::tempdir().unwrap();
     let shipped = |name: &str| std::fs::read_to_string(root().join("validation/models").join(name)).unwrap();
     let texts =
@@ -223,13 +222,26 @@ fn random_decks_have_the_forces_of_the_model_on_any_ranks() {
     let mut random = StdRng::seed_from_u64(30);
     for ranks in RANKS {
         let name = |k: usize| format!("deck-{k}");
-        let decks: Vec<Deck> = (0..20).map(|k| Deck::new(&mut random, &name(k), ranks, &models)).collect();
+        let decks: Vec<Deck> =
+            (0..for_each_number_of_ranks).map(|k| Deck::new(&mut random, &name(k), ranks, &models)).collect();
         let texts: Vec<String> = decks.iter().map(|deck| deck.text.clone()).collect();
         run_all(folder.path(), &texts, ranks);
         for (k, deck) in decks.iter().enumerate() {
             deck.check(folder.path(), &name(k), ranks);
         }
     }
+}
+
+#[test]
+fn random_decks_have_the_forces_of_the_model_on_any_ranks() {
+    random_decks(3);
+}
+
+/// Eight ranks on two cores wait for each other most of the time: ten minutes and more.
+#[test]
+#[ignore = "takes over ten minutes on two cores"]
+fn a_hundred_random_decks_have_the_forces_of_the_model_on_any_ranks() {
+    random_decks(20);
 }
 
 /// A balanced drop keeps the style's own search in a tiled layout, and the log says what such a layout costs.
