@@ -6,5 +6,5 @@
 mod pool;
 mod shared_slice;
 
-pub use pool::{Pool, ThreadCount, at_once, part, processors};
+pub use pool::{Pool, ThreadCount, at_once, part, processors, take};
 pub use shared_slice::SharedSlice;

@@ -348,6 +348,13 @@ pub fn part(count: usize, number: usize, threads: usize) -> std::ops::Range<usiz
     count * number / threads..count * (number + 1) / threads
 }
 
+/// Splits off the first `count` elements.
+pub fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let (first, behind) = std::mem::take(rest).split_at_mut(count);
+    *rest = behind;
+    first
+}
+
 #[cfg(all(test, not(loom)))]
 mod miri_sized;
 

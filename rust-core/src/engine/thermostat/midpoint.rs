@@ -24,6 +24,7 @@
 use super::PairThermostat;
 use super::particle_loops::{Advance, Finish, Multiply, Start};
 use super::pass::{Sums, Terms, Wide, add_to_host, virial};
+use super::progress::Progress;
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
@@ -43,20 +44,6 @@ const STRONG: f64 = 10.0;
 
 /// Most iterations: with more, drag is so strong that rounding errors stop the convergence.
 pub const MOST: usize = 500;
-
-/// State of a solution; all ranks have the same.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Progress {
-    /// Squared norm of the present residual.
-    now: f64,
-    tolerance: f64,
-    /// Drag per mass of the first residual, or 1 if that is more.
-    drag: f64,
-    /// Squared norm at which iterations end.
-    enough: f64,
-    /// Iterations so far.
-    pub iterations: usize,
-}
 
 /// The data of one plane during a step of the solver.
 struct Share<'a> {

@@ -6,7 +6,6 @@ mod fractions;
 mod sorting;
 
 use super::input::{Input, VECTOR_PADDING};
-use super::thread_slab::take;
 use crate::engine::error::EngineError;
 use count::Count;
 use fractions::Fractions;
@@ -15,7 +14,7 @@ use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::in_range_pairs::J_CODE_BITS;
 use psidpd_threads::SharedSlice;
-use psidpd_threads::{Pool, part};
+use psidpd_threads::{Pool, part, take};
 use sorting::{SortPart, Sorting};
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;

@@ -2,9 +2,9 @@
 
 use super::Workspace;
 use super::forces::ForceSink;
-use super::thread_slab::take;
 use crate::engine::error::EngineError;
 use psidpd_passes::compiled::PairPrecision;
+use psidpd_threads::take;
 use psidpd_threads::{Pool, part};
 use std::ops::Range;
 

@@ -4,10 +4,10 @@ mod fill;
 
 use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
-use super::thread_slab::take;
 use psidpd_passes::cells::ghosts::{Ghosts, OwnedOfColumn};
 use psidpd_passes::ground::arithmetic::PackedParticle;
 use psidpd_passes::ground::fixed_point::FixedPoint16;
+use psidpd_threads::take;
 use psidpd_threads::{Pool, SharedSlice, part};
 use std::ops::Range;
 

@@ -11,6 +11,7 @@ use psidpd_passes::plane::buffers::PairBuffers;
 use psidpd_passes::plane::rim::Rim;
 use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
+use psidpd_threads::take;
 use std::ops::Range;
 
 /// Number of planes of a thread slab whose pairs are in memory at once: the first two and the last two, where a part
@@ -115,13 +116,6 @@ impl<T: Scalar> PlaneResults<T> {
             + self.rims.iter().map(Rim::bytes).sum::<usize>()
             + (self.densities.capacity() + self.excess.capacity()) * size_of::<f64>()
     }
-}
-
-/// Splits off the first `count` elements.
-pub fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let (first, behind) = std::mem::take(rest).split_at_mut(count);
-    *rest = behind;
-    first
 }
 
 impl<T> ThreadSlab<'_, T> {
