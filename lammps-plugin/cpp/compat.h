@@ -52,6 +52,12 @@ auto request_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int instance, long)
 #endif
 }
 
+// Comm::TILED, which had no name before 2023.
+inline bool is_tiled(const LAMMPS_NS::Comm *comm)
+{
+  return comm->style == 1;
+}
+
 }    // namespace psidpd
 
 #endif

@@ -241,7 +241,7 @@ std::string PairPsi::advice()
           "step, unless a compute or fix needs them");
   }
   // The layout becomes tiled when it is balanced, which may be later.
-  if (why_listed.empty() && comm->nprocs > 1 && comm->style == Comm::TILED)
+  if (why_listed.empty() && comm->nprocs > 1 && is_tiled(comm))
     add("in a tiled layout each rank works on ghosts along all periodic directions, also images of its own atoms; a brick layout "
         "has none along directions with one rank");
   const auto is_nve = [](const Fix *fix) { return strcmp(fix->style, "nve") == 0; };
