@@ -119,6 +119,51 @@ fn every_page_is_in_the_book() {
     assert_eq!(contents, all);
 }
 
+/// Every picture stands beside the command or the program that makes it, or its page says that there is none.
+#[test]
+fn every_picture_says_how_it_was_made() {
+    let mut wrong = Vec::new();
+    for page in pages().iter().map(String::as_str).chain(BESIDE) {
+        let text = std::fs::read_to_string(root().join(page)).unwrap();
+        if text.contains("figures of this page are drawn by hand") {
+            continue;
+        }
+        let parts: Vec<&str> = text.split("\n\n").collect();
+        for (k, part) in parts.iter().enumerate().filter(|(_, part)| part.contains("![")) {
+            // Notebooks have the program before the picture.
+            let near = &parts[k.saturating_sub(2)..parts.len().min(k + 3)];
+            let is_said = |near: &&str| {
+                ["psidpd ", "```python", "recipes.md#", "was not kept"].iter().any(|how| near.contains(how))
+            };
+            if !near.iter().any(is_said) {
+                wrong.push(format!("{page}: {part}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Pages that are not followed, and the test that compares their blocks of text with what is printed.
+const PRINTED_ELSEWHERE: [(&str, &str); 2] =
+    [("docs/units.md", "python/tests/test_pages.py"), ("docs/running.md", "tests/tests/resume.rs")];
+
+/// Blocks of text are printed lines, and each page with one is followed, or a test elsewhere prints them;
+/// notebooks are executed.
+#[test]
+fn printed_lines_are_compared() {
+    let others = PRINTED_ELSEWHERE.map(|(page, test)| {
+        assert!(root().join(test).is_file(), "{test}");
+        page
+    });
+    let all = pages();
+    let with_text = all.iter().filter(|page| parts(page).iter().any(|part| part.language == "text"));
+    let not_compared = |page: &&String| {
+        let page = page.as_str();
+        !page.starts_with("docs/notebook-") && !FOLLOWED.contains(&page) && !others.contains(&page)
+    };
+    assert_eq!(with_text.filter(not_compared).collect::<Vec<_>>(), Vec::<&String>::new());
+}
+
 /// Follows a page in an empty folder and compares its claims with the results. A block of TOML begins with
 /// the name of its file. Returns the number of compared numbers.
 fn follow(page: &str) -> usize {

@@ -19,28 +19,37 @@ fn the_lammps_script_runs_in_the_checkout() {
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
+/// Each block of the page on LAMMPS replaces the lines of the README's script that give the same commands.
 #[test]
-fn the_drop_in_lines_replace_the_styles_of_the_script() {
+fn the_lines_of_the_page_on_lammps_run() {
     let folder = tempfile::tempdir().unwrap();
-    let script = folder.path().join("in.readme");
+    let script = folder.path().join("in.page");
     let (host, plugin) = lammps();
-    let drop_in =
-        blocks("docs/lammps.md").into_iter().map(|b| b.text).find(|b| b.contains("mdpd/psi")).unwrap();
-    let text: String = readme_block("lammps", "pair_style   dpd/psi")
-        .lines()
-        .map(|line| match line {
-            l if l.starts_with("pair_style") => format!("{drop_in}\n"),
-            l if l.starts_with("pair_coeff") => String::new(),
-            l => format!("{l}\n"),
-        })
-        .collect();
-    std::fs::write(
-        &script,
-        text.replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display())),
-    )
-    .unwrap();
-    let run = host.run_script(2, &root(), &script, &["-log", "none"], Duration::from_secs(300)).unwrap();
-    assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
+    let whole = readme_block("lammps", "pair_style   dpd/psi");
+    let (before, after) = whole.split_at(whole.find("plugin ").unwrap());
+    let command = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
+    let blocks: Vec<_> = blocks("docs/lammps.md").into_iter().filter(|b| b.language == "lammps").collect();
+    assert_eq!(blocks.len(), 4);
+    for block in blocks {
+        let given: Vec<String> = block.text.lines().map(command).collect();
+        let kept = |part: &str| {
+            let lines = part.lines().filter(|line| !given.contains(&command(line)));
+            lines.map(|line| format!("{line}\n")).collect::<String>()
+        };
+        // `newton` stands before the box, and the plugin before its styles.
+        let (newton, others): (Vec<&str>, Vec<&str>) =
+            block.text.lines().partition(|line| command(line) == "newton");
+        let load = after.lines().next().filter(|_| !given.contains(&"plugin".to_owned())).unwrap_or_default();
+        let rest = kept(&after[after.find('\n').unwrap()..]);
+        let text = format!("{}\n{}{load}\n{}\n{rest}", newton.join("\n"), kept(before), others.join("\n"))
+            .replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display()))
+            .replace(" fluid.toml", " validation/models/warren2003-set6.toml");
+        std::fs::write(&script, &text).unwrap();
+        let ranks = if block.text.contains("0.0 bin") { 1 } else { 2 };
+        let run =
+            host.run_script(ranks, &root(), &script, &["-log", "none"], Duration::from_secs(300)).unwrap();
+        assert!(run.stdout.contains("Loop time"), "{text}\n{}", run.stdout);
+    }
 }
 
 #[test]

@@ -148,11 +148,11 @@ fn many_species_are_looked_at_in_a_moment() {
             list("", &format!(" = \"{psi}\""), "\n")
         );
         write(folder.path(), "m.toml", &text);
-        let begun = Instant::now();
-        let output = psidpd(folder.path(), &["check", "m.toml"]);
-        let took = begun.elapsed();
+        // Seconds of the processor, not of a clock.
+        let mut limited = Command::new("sh");
+        limited.args(["-c", "ulimit -t 60 && exec \"$0\" check m.toml"]).arg(program());
+        let output = limited.current_dir(folder.path()).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", said(&output));
-        assert!(took < Duration::from_secs(60), "{took:?}");
     }
 }
 

@@ -1,13 +1,16 @@
 //! Particles that stay on the device.
 
+mod arrays;
+mod schedule;
+mod status;
+
 use crate::geometry::Geometry;
-use crate::kernels::{Arguments, DEFERRED, Kernels, NOISE, Run, groups_of, read};
+use crate::kernels::{Kernels, groups_of, read};
 use crate::settings::{FROZEN, MOST_BODY_FORCES};
-use crate::shader::{ENTRIES, SCAN, Shader};
-use crate::{Device, GpuError, Particles, Rule, Settings, Stop, Totals, Unsupported};
-use psidpd_core::engine::noise::PairNoise;
+use crate::shader::{ENTRIES, Shader};
+use crate::{Device, GpuError, Particles, Rule, Settings, Totals, Unsupported};
+use arrays::{Arrays, BOXES, COUNTS, FORCES, POSITIONS, SUMS, VELOCITIES};
 use psidpd_core::model::Fluid;
-use wgpu::BufferUsages as Usage;
 
 /// Device time of one kernel.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,9 +27,6 @@ pub struct Timing {
 const STEPS_AT_ONCE: u64 = 64;
 /// Steps after which faults are looked for.
 const STEPS_UNSEEN: u64 = 512;
-/// Tolerance of conjugate gradients and least tolerance, as on the CPU; single precision ends before its `FINEST` of 10⁻⁶.
-const TOLERANCE: f32 = 2e-2;
-const FINEST: f32 = 3e-5;
 /// Most iterations of one update.
 const MOST_ITERATIONS: u32 = 512;
 
@@ -51,102 +51,6 @@ pub struct GpuSimulation {
     iterations: u32,
     out_of_bounds: [u64; 2],
     effort: [u64; 3],
-}
-
-/// Buffers for a number of particles.
-#[derive(Debug)]
-struct Arrays {
-    buffers: Vec<wgpu::Buffer>,
-    groups: [wgpu::BindGroup; 2],
-    /// Workgroups of the scan.
-    scans: u32,
-    has_thermostat: bool,
-}
-
-/// Bindings of `wgsl/common.wgsl`.
-const PARAMS: usize = 0;
-const CONSTANTS: usize = 1;
-const POSITIONS: usize = 2;
-const VELOCITIES: usize = 3;
-const BOXES: usize = 4;
-const FORCES: usize = 8;
-const COUNTS: usize = 9;
-const STATUS: usize = 14;
-const SUMS: usize = 15;
-
-#[repr(C)]
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Params {
-    count: u32,
-    nan_bits: u32,
-    body_forces: u32,
-    blocks: u32,
-    cells: [u32; 4],
-    walls: [u32; 4],
-    edge: [[f32; 4]; 3],
-    row: [[f32; 4]; 3],
-    body: [[f32; 4]; MOST_BODY_FORCES],
-    mass: [[f32; 4]; 64],
-}
-
-/// `Status` of `wgsl/common.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Status {
-    failed: u32,
-    /// Lowest tag with a velocity, a move, a ψ and a force that fails.
-    tags: [u32; 4],
-    unfinished: u32,
-    out_of_bounds: [u32; 2],
-    effort: [u32; 3],
-    state: u32,
-    rest: [u32; 8],
-}
-
-/// Runs of kernels, each with its number.
-struct Runs<'a> {
-    list: Vec<Run>,
-    side: &'a mut usize,
-    sequence: &'a mut u32,
-    groups: u32,
-    scans: u32,
-    passes: bool,
-}
-
-impl Runs<'_> {
-    fn push(&mut self, kernel: &'static str, totals: bool, groups: u32, arguments: Arguments) {
-        *self.sequence += 1;
-        let arguments = Arguments { sequence: *self.sequence, ..arguments };
-        self.list.push(Run { kernel, totals, side: *self.side, groups, arguments });
-    }
-
-    fn all(&mut self, kernel: &'static str, numbers: [f32; 4], flags: u32) {
-        self.push(kernel, false, self.groups, Arguments { numbers, flags, ..Arguments::default() });
-    }
-
-    /// Puts the particles, which are counted, into the order of cells.
-    fn sort(&mut self) {
-        let arguments = Arguments::default();
-        self.push("scan_cells", false, self.scans, arguments);
-        self.push("scan_sums", false, 1, arguments);
-        self.push("list_cells", false, self.groups, arguments);
-        self.push("sort", false, self.groups, arguments);
-        *self.side = 1 - *self.side;
-    }
-
-    fn forces(&mut self, totals: bool, noise: Option<(f32, [u32; 2])>) {
-        if self.passes || totals {
-            self.push("densities", totals, self.groups, Arguments::default());
-        }
-        let (a, key) = noise.unwrap_or_default();
-        let flags = if noise.is_some() { NOISE } else { 0 };
-        self.push(
-            "forces",
-            totals,
-            self.groups,
-            Arguments { numbers: [a, 0.0, 0.0, 0.0], key, flags, ..Default::default() },
-        );
-    }
 }
 
 impl GpuSimulation {
@@ -237,7 +141,7 @@ impl GpuSimulation {
     /// [`GpuError::Stopped`] with the number of the present step.
     pub fn prepare(&mut self, dt: f64, rule: Rule, totals: bool) -> Result<(), GpuError> {
         let noise = self.noise_of(rule, dt, self.number);
-        let (list, _) = self.record(|runs| {
+        let list = self.record(|runs| {
             runs.all("count_cells", [0.0; 4], 0);
             runs.sort();
             runs.forces(totals, noise);
@@ -285,7 +189,7 @@ impl GpuSimulation {
                 if resumes {
                     let (number, iterations) = (self.number, self.iterations);
                     let heat = self.heat_of(rule, dt, number, totals == Some(number));
-                    list.extend(self.record(|runs| heat.iterate(runs, iterations)).0);
+                    list.extend(self.record(|runs| heat.iterate(runs, iterations)));
                     ends.push((number, self.sequence));
                     resumes = false;
                 }
@@ -317,83 +221,12 @@ impl GpuSimulation {
         }
     }
 
-    /// The kernels of one step; `begins` without a deferred kick, and `ends` with all kicks made.
-    fn step(&mut self, number: u64, dt: f64, rule: Rule, totals: bool, begins: bool, ends: bool) -> Vec<Run> {
-        let noise = self.noise_of(rule, dt, number);
-        let (heats_before, heats) = (self.heats_at(rule, number - 1), self.heats_at(rule, number));
-        let heat = self.heat_of(rule, dt, number, totals);
-        let iterations = self.iterations;
-        let deferred = if begins || heats_before { 0 } else { DEFERRED };
-        let single = |x: f64| x as f32;
-        let (list, _) = self.record(|runs| match rule {
-            Rule::VelocityVerlet => {
-                runs.all("kick_drift", [single(0.5 * dt), single(dt), 0.0, 0.0], deferred);
-                runs.sort();
-                runs.forces(totals, noise);
-                if ends {
-                    runs.all("kick", [single(0.5 * dt), 0.0, 0.0, 0.0], 0);
-                }
-            }
-            Rule::TwoStage { lambda, .. } => {
-                let half = single(0.5 * dt);
-                runs.all("kick_drift", [single(lambda * dt), half, 0.0, 0.0], deferred);
-                runs.sort();
-                runs.forces(false, None);
-                runs.all("kick_drift", [single((1.0 - 2.0 * lambda) * dt), half, 0.0, 0.0], 0);
-                runs.sort();
-                runs.forces(totals, None);
-                if ends || heats {
-                    runs.all("kick", [single(lambda * dt), 0.0, 0.0, 0.0], 0);
-                }
-                if heats {
-                    runs.push("heat_start", false, runs.groups, heat.arguments);
-                    heat.iterate(runs, iterations);
-                }
-            }
-        });
-        list
-    }
-
-    /// The factor and the key of noise in the forces.
-    fn noise_of(&self, rule: Rule, dt: f64, number: u64) -> Option<(f32, [u32; 2])> {
-        let acts = rule == Rule::VelocityVerlet && self.has_drag();
-        let key = PairNoise::new(self.settings.seed, number).key();
-        acts.then(|| ((2.0 * self.fluid.kt / dt).sqrt() as f32, key))
-    }
-
-    fn has_drag(&self) -> bool {
-        self.settings.thermostat && self.fluid.thermostats.iter().flatten().any(|law| law.gamma > 0.0)
-    }
-
-    /// Whether the implicit thermostat acts in steps by this rule.
-    fn heats(&self, rule: Rule) -> bool {
-        matches!(rule, Rule::TwoStage { .. }) && self.has_drag()
-    }
-
-    fn heats_at(&self, rule: Rule, number: u64) -> bool {
-        matches!(rule, Rule::TwoStage { every, .. } if number.is_multiple_of(every)) && self.heats(rule)
-    }
-
-    fn heat_of(&self, rule: Rule, dt: f64, number: u64, virial: bool) -> Heat {
-        let time = match rule {
-            Rule::TwoStage { every, .. } => dt * every as f64,
-            Rule::VelocityVerlet => dt,
-        };
-        let numbers = [(0.5 * time).sqrt() as f32, self.fluid.kt.sqrt() as f32, TOLERANCE, FINEST];
-        let key = PairNoise::of_stream(self.settings.seed, number, 1).key();
-        let of_virial = [numbers[0], numbers[1], (2.0 / dt) as f32, 0.0];
-        Heat {
-            arguments: Arguments { numbers, key, ..Arguments::default() },
-            of_virial: virial.then_some(Arguments { numbers: of_virial, key, ..Arguments::default() }),
-        }
-    }
-
     /// The sums at the end of the last step that computed them. Momenta and forces are those of the present particles.
     ///
     /// # Errors
     /// The device was lost.
     pub fn totals(&mut self) -> Result<Totals, GpuError> {
-        let (list, _) = self.record(|runs| runs.all("measure", [0.0; 4], 0));
+        let list = self.record(|runs| runs.all("measure", [0.0; 4], 0));
         self.submit(&list)?;
         let Some(arrays) = &self.arrays else { return Ok(Totals::default()) };
         let blocks = groups_of(self.count) as usize;
@@ -531,214 +364,6 @@ impl GpuSimulation {
     /// Times since the last call of [`GpuSimulation::measure_time`], longest first.
     pub fn timings(&self) -> Vec<Timing> {
         self.kernels.timings()
-    }
-
-    /// Creates the buffers, with those of the implicit thermostat if asked for; particles keep their place.
-    fn allocate(&mut self, thermostat: bool) -> Result<(), GpuError> {
-        if self.arrays.as_ref().is_some_and(|arrays| arrays.has_thermostat || !thermostat) {
-            return Ok(());
-        }
-        let count = self.count as u64;
-        let cells = self
-            .geometry
-            .cells(self.fluid.cutoff(), self.count)
-            .iter()
-            .map(|n| u64::from(*n))
-            .product::<u64>()
-            + 1;
-        let scans = cells.div_ceil(u64::from(SCAN));
-        let shader = self.kernels.shader();
-        let vectors = 16 * count;
-        let of_thermostat = if thermostat { vectors } else { 16 };
-        let mut sizes = vec![
-            size_of::<Params>() as u64,
-            4 * shader.constants.len() as u64,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            4 * cells,
-            4 * scans * u64::from(SCAN),
-            4 * scans,
-            8 * count,
-            4 * count * shader.variables.max(1) as u64,
-            size_of::<Status>() as u64,
-            u64::from(4 * ENTRIES * groups_of(self.count)),
-            4 * shader.tables.len() as u64,
-        ];
-        sizes.extend([of_thermostat; 4]);
-        let limits = &self.device.limits;
-        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        if let Some(size) = sizes.iter().find(|size| **size > most) {
-            let what = format!("{count} particles: an array of {size} bytes on a device with at most {most}");
-            return Err(Unsupported { what }.into());
-        }
-        let scope = self.device.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let old = self.arrays.take().map(|arrays| arrays.buffers).unwrap_or_default();
-        let buffers: Vec<wgpu::Buffer> = sizes
-            .iter()
-            .enumerate()
-            .map(|(k, size)| match old.get(k) {
-                Some(buffer) if buffer.size() == *size => buffer.clone(),
-                _ => self.device.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: None,
-                    size: *size,
-                    usage: Usage::COPY_DST
-                        | Usage::COPY_SRC
-                        | if k < 2 { Usage::UNIFORM } else { Usage::STORAGE },
-                    mapped_at_creation: false,
-                }),
-            })
-            .collect();
-        if let Some(error) = pollster::block_on(scope.pop()) {
-            return Err(self.device.failed(error));
-        }
-        let groups = [0, 1].map(|side| {
-            let entries: Vec<_> = (0..buffers.len())
-                .map(|binding| {
-                    let swapped = match binding {
-                        2..5 if side == 1 => binding + 3,
-                        5..8 if side == 1 => binding - 3,
-                        other => other,
-                    };
-                    wgpu::BindGroupEntry {
-                        binding: binding as u32,
-                        resource: buffers[swapped].as_entire_binding(),
-                    }
-                })
-                .collect();
-            self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &self.kernels.groups_layout,
-                entries: &entries,
-            })
-        });
-        self.arrays = Some(Arrays { buffers, groups, scans: scans as u32, has_thermostat: thermostat });
-        self.write_constants();
-        Ok(())
-    }
-
-    fn write_constants(&self) {
-        let Some(arrays) = &self.arrays else { return };
-        let shader = self.kernels.shader();
-        self.device.queue.write_buffer(
-            &arrays.buffers[CONSTANTS],
-            0,
-            bytemuck::cast_slice(&shader.constants),
-        );
-        self.device.queue.write_buffer(
-            &arrays.buffers[CONSTANTS + 15],
-            0,
-            bytemuck::cast_slice(&shader.tables),
-        );
-    }
-
-    fn write_params(&self) {
-        let Some(arrays) = &self.arrays else { return };
-        let [nx, ny, nz] = self.geometry.cells(self.fluid.cutoff(), self.count);
-        let [wx, wy, wz] = self.geometry.walls();
-        let (mut body, mut mass) = ([[0.0; 4]; MOST_BODY_FORCES], [[0.0; 4]; 64]);
-        for (to, force) in body.iter_mut().zip(&self.settings.body_forces) {
-            let [x, y, z] = force.acceleration.map(|a| a as f32);
-            *to = [x, y, z, force.reversed_along.unwrap_or(3) as f32];
-        }
-        for (to, m) in mass.iter_mut().zip(&self.settings.mass) {
-            *to = [*m as f32, m.recip() as f32, 0.0, 0.0];
-        }
-        let params = Params {
-            count: self.count as u32,
-            nan_bits: 0x7fc0_0000,
-            body_forces: self.settings.body_forces.len() as u32,
-            blocks: groups_of(self.count),
-            cells: [nx, ny, nz, 0],
-            walls: [wx, wy, wz, 0],
-            edge: self.geometry.edges(),
-            row: self.geometry.rows(),
-            body,
-            mass,
-        };
-        self.device.queue.write_buffer(&arrays.buffers[PARAMS], 0, bytemuck::bytes_of(&params));
-    }
-
-    fn record(&mut self, work: impl FnOnce(&mut Runs)) -> (Vec<Run>, u32) {
-        let scans = self.arrays.as_ref().map_or(0, |arrays| arrays.scans);
-        let passes = self.kernels.shader().variables > 0;
-        let groups = groups_of(self.count);
-        let mut runs = Runs {
-            list: Vec::new(),
-            side: &mut self.side,
-            sequence: &mut self.sequence,
-            groups,
-            scans,
-            passes,
-        };
-        work(&mut runs);
-        (runs.list, groups)
-    }
-
-    fn submit(&mut self, list: &[Run]) -> Result<(), GpuError> {
-        match &self.arrays {
-            None => Err(GpuError::Host("there are no particles")),
-            Some(arrays) => self.kernels.submit(&self.device, &arrays.groups, list),
-        }
-    }
-
-    fn clear_status(&mut self) {
-        let Some(arrays) = &self.arrays else { return };
-        self.sequence = 0;
-        let clear = [0, u32::MAX, u32::MAX, u32::MAX, u32::MAX, 0, 0, 0, 0, 0, 0];
-        self.device.queue.write_buffer(&arrays.buffers[STATUS], 0, bytemuck::cast_slice(&clear));
-    }
-
-    /// Reads and clears what kernels reported.
-    fn status(&mut self) -> Result<Status, GpuError> {
-        let Some(arrays) = &self.arrays else { return Err(GpuError::Host("there are no particles")) };
-        let found: Vec<Status> = read(&self.device, &arrays.buffers[STATUS], size_of::<Status>() as u64)?;
-        let status = found[0];
-        (0..2).for_each(|k| self.out_of_bounds[k] += u64::from(status.out_of_bounds[k]));
-        (0..3).for_each(|k| self.effort[k] += u64::from(status.effort[k]));
-        self.clear_status();
-        Ok(status)
-    }
-
-    /// The fault that kernels reported, of a step.
-    fn fault(&self, status: &Status) -> Option<impl Fn(u64) -> Stop + use<>> {
-        let found = status.tags.iter().position(|tag| *tag != u32::MAX);
-        let tag = found.map_or(0, |reason| status.tags[reason] as i32);
-        found.map(|reason| {
-            move |step| match reason {
-                0 => Stop::Velocity { step, tag },
-                1 => Stop::Runaway { step, tag },
-                2 => Stop::ExcessFreeEnergy { step, tag },
-                _ => Stop::Force { step, tag },
-            }
-        })
-    }
-}
-
-/// The arguments of the implicit thermostat's kernels.
-#[derive(Debug, Clone, Copy)]
-struct Heat {
-    arguments: Arguments,
-    of_virial: Option<Arguments>,
-}
-
-impl Heat {
-    fn iterate(&self, runs: &mut Runs, iterations: u32) {
-        for _ in 0..iterations {
-            runs.push("heat_image", false, runs.groups, self.arguments);
-            runs.push("heat_decide", false, 1, self.arguments);
-            runs.push("heat_advance", false, runs.groups, self.arguments);
-            runs.push("heat_judge", false, 1, self.arguments);
-            runs.push("heat_turn", false, runs.groups, self.arguments);
-        }
-        if let Some(arguments) = self.of_virial {
-            runs.push("heat_virial", false, runs.groups, arguments);
-        }
-        runs.push("heat_apply", false, runs.groups, self.arguments);
     }
 }
 

