@@ -97,7 +97,7 @@ every = 20
 A run writes what it measured to `observables.json` and, one file each, to `observables/NAME.csv`
 (`NAME-STAGE.csv` if several stages have it). The JSON file is a list of objects
 
-```text
+```js
 { "name", "title", "stage", "kind": "scalar" | "profile" | "curve" | "series" | "field",
   "x": { "name", "unit", "values" } or null,
   "columns": [ { "name", "unit", "values", "errors" } ],

@@ -202,6 +202,9 @@ mod tests {
                 assert!((c.values[lag] - truth).abs() < 5.0 * c.errors[lag], "{lag}");
             }
             assert!((c.values[0] - s * s - q * q).abs() < 5.0 * c.errors[0]);
+            // The factor of the integral has no error of its own.
+            let integral = dt * (0.5 * (c.values[0] + c.values[40]) + c.values[1..40].iter().sum::<f64>());
+            assert!((eta.value / (volume / kt * integral) - 1.0).abs() < 1e-9, "{eta:?}");
         }
     }
 }
