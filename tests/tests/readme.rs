@@ -43,6 +43,22 @@ fn the_drop_in_lines_replace_the_styles_of_the_script() {
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
+/// With the model of the tutorial, as the page says.
+#[test]
+fn the_script_of_the_page_on_lammps_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (host, plugin) = lammps();
+    let model = blocks("docs/tutorial.md").into_iter().find(|b| b.text.starts_with("# fluid.toml")).unwrap();
+    std::fs::write(folder.path().join("fluid.toml"), model.text).unwrap();
+    let page = blocks("docs/lammps.md").into_iter().find(|b| b.language == "lammps").unwrap();
+    let script = folder.path().join("in.page");
+    let there = format!("\"{}\"", plugin.display());
+    std::fs::write(&script, page.text.replace("target/lammps/psidpdplugin.so", &there)).unwrap();
+    let limit = Duration::from_secs(300);
+    let run = host.run_script(1, folder.path(), &script, &["-log", "none"], limit).unwrap();
+    assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
+}
+
 #[test]
 fn the_native_scene_runs() {
     let folder = tempfile::tempdir().unwrap();
