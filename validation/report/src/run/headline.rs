@@ -171,7 +171,8 @@ pub fn gather(
             false => format!("a smaller time step than {} brings it nearer", s.dt),
         };
         let off = 100.0 * (t.value / s.kt - 1.0);
-        all.notes.push(format!("the temperature is {off:+.1} % off the kT = {} of its stage: {because}", s.kt));
+        all.notes
+            .push(format!("the temperature is {off:+.1} % off the kT = {} of its stage: {because}", s.kt));
     }
     all.notes.extend(about.and_then(|a| image_of_drop(a, &all)));
     for o in observables.iter().filter(of_stage) {
@@ -331,10 +332,13 @@ mod tests {
         let mut hot = table(&[0.0; 80]);
         hot.columns[1] = (0..80).map(|k| 1.4 + 0.01 * noise(k)).collect();
         let mut about = super::super::tests::about();
-        for (body_forces, says) in [(false, "a smaller time step than 0.01"), (true, "`temperature_profile` in [observe]")] {
+        for (body_forces, says) in
+            [(false, "a smaller time step than 0.01"), (true, "`temperature_profile` in [observe]")]
+        {
             about.stages.iter_mut().for_each(|s| s.body_forces = body_forces);
             let notes = gather(Some(&about), None, Some(&hot), &[]).notes;
-            let temperature: Vec<&String> = notes.iter().filter(|n| n.starts_with("the temperature is")).collect();
+            let temperature: Vec<&String> =
+                notes.iter().filter(|n| n.starts_with("the temperature is")).collect();
             assert!(temperature.len() == 1 && temperature[0].contains(says), "{notes:?}");
         }
     }
