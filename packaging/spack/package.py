@@ -1,6 +1,8 @@
 # Spack: copy this file to packages/psidpd of a repository of packages.
 # SPDX-License-Identifier: GPL-2.0-or-later
 
+from spack_repo.builtin.build_systems.cargo import CargoPackage
+
 from spack.package import *
 
 

@@ -26,5 +26,14 @@ def test_the_python_of_a_page_runs(page):
         assert run.stdout.strip() in page.read_text()
 
 
+def test_the_program_prints_what_the_tutorial_shows(tmp_path):
+    page = (ROOT / "docs" / "tutorial.md").read_text()
+    (tmp_path / "fluid.toml").write_text(re.search(r"^```toml\n(# fluid.toml\n.*?)^```", page, re.M | re.S).group(1))
+    command = [sys.executable, "-m", "psidpd", "theory", "fluid.toml", "--kT", "0.9"]
+    printed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout.splitlines()
+    shown = re.search(r"^```text\n(critical point.*?)^```", page, re.M | re.S).group(1).splitlines()
+    assert set(shown) <= set(printed)
+
+
 def test_there_are_pages():
     assert {"README.md", "python.md", "units.md"} <= {page.name for page in PAGES}

@@ -333,6 +333,21 @@ fn every_template_can_be_written_checked_and_run() {
     assert!(said(&unknown).contains("pendant-drop"), "{}", said(&unknown));
 }
 
+/// A template at its full length ends without a doubt about its results; two minutes of computing.
+#[test]
+fn every_template_is_long_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for template in ["bulk", "slab", "droplet", "pendant-drop", "demixing", "collision", "channel"] {
+        psidpd(here, &["new", template, "--template", template]);
+        let run = psidpd(here, &["run", &format!("{template}.toml"), "--out", template]);
+        assert_eq!(run.status.code(), Some(0), "{template}: {}", said(&run));
+        for doubt in ["do not trust", "short", "a smaller time step", "touches its image"] {
+            assert!(!said(&run).contains(doubt), "{template}: {}", said(&run));
+        }
+    }
+}
+
 /// The forces of a drop are too strong for the time step, so it stays hot: the run stops, names the cause,
 /// and leaves a state.
 #[test]

@@ -19,7 +19,7 @@ fn the_lammps_script_runs_in_the_checkout() {
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
-/// Each block of the page on LAMMPS replaces the lines of the README's script that give the same commands.
+/// Each block of the page on LAMMPS behind its whole script replaces the lines of the README's script that give the same commands.
 #[test]
 fn the_lines_of_the_page_on_lammps_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -28,8 +28,9 @@ fn the_lines_of_the_page_on_lammps_run() {
     let whole = readme_block("lammps", "pair_style   dpd/psi");
     let (before, after) = whole.split_at(whole.find("plugin ").unwrap());
     let command = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
-    let blocks: Vec<_> = blocks("docs/lammps.md").into_iter().filter(|b| b.language == "lammps").collect();
-    assert_eq!(blocks.len(), 4);
+    let blocks: Vec<_> =
+        blocks("docs/lammps.md").into_iter().filter(|b| b.language == "lammps").skip(1).collect();
+    assert_eq!(blocks.len(), 3);
     for block in blocks {
         let given: Vec<String> = block.text.lines().map(command).collect();
         let kept = |part: &str| {
@@ -42,14 +43,29 @@ fn the_lines_of_the_page_on_lammps_run() {
         let load = after.lines().next().filter(|_| !given.contains(&"plugin".to_owned())).unwrap_or_default();
         let rest = kept(&after[after.find('\n').unwrap()..]);
         let text = format!("{}\n{}{load}\n{}\n{rest}", newton.join("\n"), kept(before), others.join("\n"))
-            .replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display()))
-            .replace(" fluid.toml", " validation/models/warren2003-set6.toml");
+            .replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display()));
         std::fs::write(&script, &text).unwrap();
         let ranks = if block.text.contains("0.0 bin") { 1 } else { 2 };
         let run =
             host.run_script(ranks, &root(), &script, &["-log", "none"], Duration::from_secs(300)).unwrap();
         assert!(run.stdout.contains("Loop time"), "{text}\n{}", run.stdout);
     }
+}
+
+/// With the model of the tutorial, as the page says.
+#[test]
+fn the_script_of_the_page_on_lammps_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (host, plugin) = lammps();
+    let model = blocks("docs/tutorial.md").into_iter().find(|b| b.text.starts_with("# fluid.toml")).unwrap();
+    std::fs::write(folder.path().join("fluid.toml"), model.text).unwrap();
+    let page = blocks("docs/lammps.md").into_iter().find(|b| b.language == "lammps").unwrap();
+    let script = folder.path().join("in.page");
+    let there = format!("\"{}\"", plugin.display());
+    std::fs::write(&script, page.text.replace("target/lammps/psidpdplugin.so", &there)).unwrap();
+    let limit = Duration::from_secs(300);
+    let run = host.run_script(1, folder.path(), &script, &["-log", "none"], limit).unwrap();
+    assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
 #[test]

@@ -381,7 +381,12 @@ fn shown(value: &Value) -> String {
     match value {
         Value::Object(map) => match map.get("none").and_then(Value::as_str) {
             Some(why) => format!("none ({why})"),
-            None => map.iter().map(|(k, v)| format!("{k} {}", shown(v))).collect::<Vec<_>>().join(", "),
+            None => {
+                let mut parts: Vec<String> = map.iter().map(|(k, v)| format!("{k} {}", shown(v))).collect();
+                // The order of a map depends on the features with which serde_json was compiled.
+                parts.sort();
+                parts.join(", ")
+            }
         },
         Value::Array(items) if items.is_empty() => "none".into(),
         Value::Array(items) => items.iter().map(shown).collect::<Vec<_>>().join(" .. "),

@@ -15,6 +15,7 @@ pub fn about(scene: &Scene) -> About {
             dt: s.dt,
             kt: s.kt,
             thermostat: s.thermostat,
+            body_forces: s.body_forces && !scene.body_forces.is_empty(),
             integrator: s.integrator.to_string(),
         };
         begin = stage.end;

@@ -165,13 +165,14 @@ pub fn gather(
         && let Some(error) = t.error
         && (t.value - s.kt).abs() > (4.0 * error).max(0.01 * s.kt)
     {
-        let text = format!(
-            "the temperature is {:+.1} % off the kT = {} of its stage: a smaller time step than {} brings it nearer",
-            100.0 * (t.value / s.kt - 1.0),
-            s.kt,
-            s.dt
-        );
-        all.notes.push(text);
+        // A flow that body forces drive counts as heat, at any time step.
+        let because = match s.body_forces {
+            true => "it includes the flow that the body forces drive; `temperature_profile` in [observe] leaves the flow out".into(),
+            false => format!("a smaller time step than {} brings it nearer", s.dt),
+        };
+        let off = 100.0 * (t.value / s.kt - 1.0);
+        all.notes
+            .push(format!("the temperature is {off:+.1} % off the kT = {} of its stage: {because}", s.kt));
     }
     all.notes.extend(about.and_then(|a| image_of_drop(a, &all)));
     for o in observables.iter().filter(of_stage) {
@@ -322,6 +323,23 @@ mod tests {
             let tension = found.get("tension").unwrap();
             assert_eq!((tension.source.as_str(), tension.value, tension.error), (source, value, Some(0.1)));
             assert_eq!(found.get("width").unwrap().source, "interface_width.width: 2 d of tanh(z/d)");
+        }
+    }
+
+    /// The advice on a temperature that is off: a shorter step, but not for a flow.
+    #[test]
+    fn a_driven_flow_is_not_blamed_on_the_step() {
+        let mut hot = table(&[0.0; 80]);
+        hot.columns[1] = (0..80).map(|k| 1.4 + 0.01 * noise(k)).collect();
+        let mut about = super::super::tests::about();
+        for (body_forces, says) in
+            [(false, "a smaller time step than 0.01"), (true, "`temperature_profile` in [observe]")]
+        {
+            about.stages.iter_mut().for_each(|s| s.body_forces = body_forces);
+            let notes = gather(Some(&about), None, Some(&hot), &[]).notes;
+            let temperature: Vec<&String> =
+                notes.iter().filter(|n| n.starts_with("the temperature is")).collect();
+            assert!(temperature.len() == 1 && temperature[0].contains(says), "{notes:?}");
         }
     }
 

@@ -11,6 +11,7 @@ pub fn about() -> About {
         dt: 0.01,
         kt: 1.0,
         thermostat: true,
+        body_forces: false,
         integrator: "velocity-verlet".into(),
     };
     About {
