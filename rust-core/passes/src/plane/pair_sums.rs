@@ -29,37 +29,33 @@ impl std::ops::DerefMut for Wide {
     }
 }
 
-/// Factors of a pair: `a` and `b` of [`add_pairs`].
-#[derive(Debug, Clone, Copy)]
-pub struct Terms {
-    pub noise: f64,
-    pub drag: f64,
-}
-
-/// Adds `g (a ξ − b g·(p_i − p_j))` to particle `i` of every pair, and subtracts it from `j`. `p` and
-/// `sums` have entries for the particles of the plane, followed by those of the next; without noise
-/// `xi` is not read. The result has the same bits on every instruction set.
+/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`, with the opposite term of the pair for `j`, and adds it to
+/// `sums`; without noise, `a = 0`, it does not read `xi`. `p` and `sums` have entries for the particles of the plane,
+/// followed by those of the next. The result has the same bits on every instruction set.
+///
+/// # Safety
+/// Both arrays have entries for all particles of the list.
 ///
 /// # Panics
-/// Panics if arrays are too short for the list.
-pub fn add_pairs(
+/// Panics if there is noise and `xi` has not an entry for each pair.
+pub unsafe fn add_pairs(
     set: InstructionSet,
     list: &PairList,
     xi: &[f32],
-    terms: Terms,
+    noise: f64,
     p: &[Wide],
     sums: &mut [Wide],
 ) {
     match list.exact.is_empty() {
-        true => add(set, AddPairs { start: &list.start, pairs: &list.pairs, xi, terms, p, sums }),
-        false => add(set, AddPairs { start: &list.start, pairs: &list.exact, xi, terms, p, sums }),
+        true => add(set, AddPairs { start: &list.start, pairs: &list.pairs, xi, noise, p, sums }),
+        false => add(set, AddPairs { start: &list.start, pairs: &list.exact, xi, noise, p, sums }),
     }
 }
 
 fn add<P: Entry>(set: InstructionSet, task: AddPairs<P>) {
-    // SAFETY: the kernels require the instruction set only, which `InstructionSet` guarantees.
+    // SAFETY: `InstructionSet` guarantees the instructions, the caller of `add_pairs` the particles.
     unsafe {
-        match task.terms.noise == 0.0 {
+        match task.noise == 0.0 {
             true => run(set, WithNoise::<P, false>(task)),
             false => run(set, WithNoise::<P, true>(task)),
         }
@@ -79,7 +75,8 @@ trait Entry {
 impl Entry for Pair {
     #[inline(always)]
     fn j(&self) -> usize {
-        self.j as usize
+        // SAFETY: it is a reference. The read is volatile: otherwise the compiler loads it together with `g`, and extracts it.
+        unsafe { (&raw const self.j).read_volatile() as usize }
     }
 
     #[inline(always)]
@@ -106,7 +103,7 @@ struct AddPairs<'a, P> {
     start: &'a [u32],
     pairs: &'a [P],
     xi: &'a [f32],
-    terms: Terms,
+    noise: f64,
     p: &'a [Wide],
     sums: &'a mut [Wide],
 }
@@ -118,33 +115,64 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let AddPairs { start, pairs, xi, terms, p, sums } = self.0;
-        // With equal lengths one comparison is enough for both arrays.
-        let count = p.len().min(sums.len());
-        let (p, sums) = (&p[..count], &mut sums[..count]);
-        // SAFETY: all loads and stores are at arrays of four numbers.
+        let AddPairs { start, pairs, xi, noise, p, sums } = self.0;
+        assert!(p.len() >= start.len() - 1 && sums.len() >= start.len() - 1, "particles of the list");
+        assert!(!NOISE || xi.len() >= pairs.len(), "noise of the pairs");
+        let (p, sums) = (p.as_ptr(), sums.as_mut_ptr());
+        // SAFETY: `start` has indices of pairs, and these have particles that the arrays contain.
         unsafe {
-            let minus_drag = I::Quad::splat(-terms.drag);
             for (i, of_i) in pairs_of_each(start) {
-                let noises = if NOISE { &xi[of_i.clone()] } else { &[] };
-                let at = I::Quad::load(p[i].as_ptr());
+                let at = I::Quad::load(p.add(i).cast());
                 let mut sum = I::Quad::zero();
-                for (k, pair) in pairs[of_i].iter().enumerate() {
-                    let j = pair.j();
-                    let g = pair.g::<I>();
-                    let along = at.sub(I::Quad::load(p[j].as_ptr())).mul(g).total();
-                    let mut factor = minus_drag.mul(along);
+                // Two pairs at once share the additions across elements.
+                let (two, one) = pairs.get_unchecked(of_i.clone()).as_chunks::<2>();
+                let noises = if NOISE { xi.get_unchecked(of_i) } else { &[] };
+                for (n, [a, b]) in two.iter().enumerate() {
+                    let (j_a, j_b) = (a.j(), b.j());
+                    let (g_a, g_b) = (a.g::<I>(), b.g::<I>());
+                    let d_a = at.sub(I::Quad::load(p.add(j_a).cast()));
+                    let d_b = at.sub(I::Quad::load(p.add(j_b).cast()));
+                    let [mut along_a, mut along_b] = d_a.mul(g_a).totals(d_b.mul(g_b));
                     if NOISE {
-                        factor = factor.add(I::Quad::splat(terms.noise * f64::from(noises[k])));
+                        along_a = along_a.sub(random::<I>(noise, noises, 2 * n));
+                        along_b = along_b.sub(random::<I>(noise, noises, 2 * n + 1));
                     }
-                    let push = factor.mul(g);
-                    sum = sum.add(push);
-                    let to = sums[j].as_mut_ptr();
-                    I::Quad::load(to).sub(push).store(to);
+                    sum = sum.add(push_away::<I>(along_a.mul(g_a), sums.add(j_a)));
+                    sum = sum.add(push_away::<I>(along_b.mul(g_b), sums.add(j_b)));
                 }
-                let to = sums[i].as_mut_ptr();
+                for a in one {
+                    let (j, g) = (a.j(), a.g::<I>());
+                    let d = at.sub(I::Quad::load(p.add(j).cast()));
+                    let [mut along, _] = d.mul(g).totals(I::Quad::zero());
+                    if NOISE {
+                        along = along.sub(random::<I>(noise, noises, noises.len() - 1));
+                    }
+                    sum = sum.add(push_away::<I>(along.mul(g), sums.add(j)));
+                }
+                let to = sums.add(i).cast();
                 I::Quad::load(to).add(sum).store(to);
             }
         }
     }
+}
+
+/// The noise of pair `k`.
+///
+/// # Safety
+/// The pair has noise; the caller fulfils the contract of `simd`.
+#[inline(always)]
+unsafe fn random<I: Isa>(noise: f64, noises: &[f32], k: usize) -> I::Quad {
+    // SAFETY: the caller promises it.
+    unsafe { I::Quad::splat(noise * f64::from(*noises.get_unchecked(k))) }
+}
+
+/// Subtracts `push` from the sum of a particle, and returns it.
+///
+/// # Safety
+/// The caller fulfils the contract of `simd`.
+#[inline(always)]
+unsafe fn push_away<I: Isa>(push: I::Quad, sum: *mut Wide) -> I::Quad {
+    // SAFETY: the caller promises a particle.
+    unsafe { I::Quad::load(sum.cast()).sub(push).store(sum.cast()) };
+    push
 }

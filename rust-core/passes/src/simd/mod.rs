@@ -188,8 +188,8 @@ pub trait Quad: Copy {
     unsafe fn load_three_f32(p: *const f32) -> Self;
     /// Loads the first three of four readable numbers, and sets the fourth to 0.
     unsafe fn load_three(p: *const f64) -> Self;
-    /// The sum `(x₀ + x₂) + (x₁ + x₃)`, in all four elements.
-    unsafe fn total(self) -> Self;
+    /// The sum `(x₀ + x₁) + (x₂ + x₃)` of either, in all four elements.
+    unsafe fn totals(self, other: Self) -> [Self; 2];
 }
 
 /// An instruction set.

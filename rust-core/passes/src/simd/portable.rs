@@ -334,9 +334,8 @@ impl Quad for Four {
         Four([x, y, z, 0.0])
     }
     #[inline(always)]
-    unsafe fn total(self) -> Self {
-        let [a, b, c, d] = self.0;
-        Four([(a + c) + (b + d); 4])
+    unsafe fn totals(self, other: Self) -> [Self; 2] {
+        [self, other].map(|Four([a, b, c, d])| Four([(a + b) + (c + d); 4]))
     }
 }
 

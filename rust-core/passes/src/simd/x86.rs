@@ -49,10 +49,12 @@ impl Quad for Quad4 {
         unsafe { Quad4(_mm256_blend_pd::<0b1000>(_mm256_loadu_pd(p), _mm256_setzero_pd())) }
     }
     #[inline(always)]
-    unsafe fn total(self) -> Self {
+    unsafe fn totals(self, other: Self) -> [Self; 2] {
         unsafe {
-            let halves = _mm256_add_pd(self.0, _mm256_permute2f128_pd::<0x01>(self.0, self.0));
-            Quad4(_mm256_add_pd(halves, _mm256_permute_pd::<0b0101>(halves)))
+            // Sums of two elements, of both in turn.
+            let halves = _mm256_hadd_pd(self.0, other.0);
+            let sums = _mm256_add_pd(halves, _mm256_permute2f128_pd::<0x01>(halves, halves));
+            [Quad4(_mm256_movedup_pd(sums)), Quad4(_mm256_permute_pd::<0b1111>(sums))]
         }
     }
 }

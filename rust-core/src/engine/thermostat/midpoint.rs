@@ -23,7 +23,7 @@
 
 use super::PairThermostat;
 use super::particle_loops::{Advance, Finish, Multiply, Start};
-use super::pass::{Sums, Terms, Wide, add_to_host, virial};
+use super::pass::{Sums, Wide, add_to_host, virial};
 use super::progress::Progress;
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
@@ -116,9 +116,8 @@ impl PairThermostat {
         for vectors in [residual, solution] {
             vectors.resize(lists.order().len(), Wide::ZERO);
         }
-        let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
         sums.gather(pool, lists.order(), v);
-        sums.compute(pool, *set, planes, start);
+        sums.compute(pool, *set, planes, if noise { kt.sqrt() } else { 0.0 });
         let [first, _] =
             self.on_planes(pool, |Share { p, image: own, below, inverse_mass, residual, .. }, set| {
                 [vectors::run(set, Start { inverse_mass, own, below, residual, p }), 0.0]
@@ -129,7 +128,7 @@ impl PairThermostat {
     /// Computes the image of the direction, `A p` with `A = M + K`, and returns `p · A p` and
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
-        self.sums.compute(pool, self.set, &self.planes, Terms { noise: 0.0, drag: -1.0 });
+        self.sums.compute(pool, self.set, &self.planes, 0.0);
         self.on_planes(pool, |Share { p, image, below, mass, inverse_mass, .. }, set| {
             vectors::run(set, Multiply { p, mass, inverse_mass, image, below })
         })
@@ -190,10 +189,9 @@ impl PairThermostat {
     /// The virial of drag at the velocities `v`, and of noise.
     pub(super) fn virial_at(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> [f64; 6] {
         let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
-        let scale = 2.0 / *dt;
-        let noise = if noise { scale * kt.sqrt() } else { 0.0 };
+        let noise = if noise { kt.sqrt() } else { 0.0 };
         sums.gather(pool, lists.order(), v);
         sums.close(planes);
-        virial(pool, planes, sums, lists.ghosts(), Terms { noise, drag: scale })
+        virial(pool, planes, sums, lists.ghosts(), noise, 2.0 / *dt)
     }
 }

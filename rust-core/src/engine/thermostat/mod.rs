@@ -21,6 +21,7 @@
 mod bodies;
 mod effort;
 mod forces;
+mod listed;
 mod measure;
 mod midpoint;
 mod particle_loops;
@@ -45,11 +46,13 @@ use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, Places, Pool};
+use listed::Listed;
 use pass::{Sums, Wide};
 use planes::Plane;
 use progress::Progress;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
+use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
 use round::Round;
 
@@ -87,8 +90,6 @@ pub struct PairThermostat {
     /// Mass of each sorted particle.
     mass: Vec<f64>,
     inverse_mass: Vec<f64>,
-    /// Tag of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
-    tag: Vec<u32>,
     sums: Sums,
     /// Residual and solution of each sorted particle.
     residual: Vec<Wide>,
@@ -99,6 +100,8 @@ pub struct PairThermostat {
     effort: Effort,
     /// Whether distances are stored.
     wants_virial: bool,
+    /// The pairs that an engine has listed, for a search that follows.
+    listed: Option<Listed>,
     /// State of a solution in rounds with other ranks.
     round: Round,
     /// Squared norm of the first residual of this rank.
@@ -130,7 +133,6 @@ impl PairThermostat {
             places: Places::default(),
             mass: Vec::new(),
             inverse_mass: Vec::new(),
-            tag: Vec::new(),
             sums: Sums::default(),
             residual: Vec::new(),
             solution: Vec::new(),
@@ -138,6 +140,7 @@ impl PairThermostat {
             progress: Progress::default(),
             effort: Effort::default(),
             wants_virial: false,
+            listed: None,
             round: Round::default(),
             first: 0.0,
             noise: [PairNoise::default(); 2],
@@ -178,32 +181,39 @@ impl PairThermostat {
         mass: impl Fn(usize) -> f64 + Sync,
     ) -> Result<(), EngineError> {
         (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
-        let margin = if self.is_exact { MARGIN } else { 0.0 };
-        let weights = planes::weights(&self.plan, dt, margin);
-        let range = [self.plan.longest, margin];
-        let listed_virial = virial && !self.is_exact;
-        let PairThermostat { lists, planes, .. } = self;
-        lists.find(pool, around, particles, species_of_kind, &weights, range, listed_virial, planes)?;
-        if self.is_exact {
-            self.measure(pool, around.domain, particles, species_of_kind);
+        let listed = Listed { dt, virial, particles: particles.x.len() };
+        if self.listed.take().is_none_or(|there| !there.serves(listed)) {
+            let terms = self.terms(dt, virial);
+            let range = [self.plan.longest, self.margin()];
+            let PairThermostat { lists, planes, .. } = self;
+            lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
+            if self.is_exact {
+                self.measure(pool, around.domain, particles, species_of_kind);
+            }
         }
-        let PairThermostat { lists, planes, tag, .. } = self;
-        let order = lists.order();
-        pass::fill(pool, tag, order, |k| particles.tag[k] as u32);
-        if let Some(last) = planes.last() {
-            tag.extend_from_within(last.found.next.clone());
-        }
+        let order = self.lists.order();
         pass::fill(pool, &mut self.mass, order, &mass);
-        pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
+        self.inverse_mass.clear();
+        self.inverse_mass.extend(self.mass.iter().map(|mass| mass.recip()));
         Ok(())
+    }
+
+    /// Fraction by which the range of the search is extended.
+    fn margin(&self) -> f64 {
+        if self.is_exact { MARGIN } else { 0.0 }
+    }
+
+    /// The pairs for a time `dt`, with or without their distances.
+    fn terms(&self, dt: f64, virial: bool) -> ListTerms {
+        let with_stretch = virial && !self.is_exact;
+        ListTerms { tables: planes::weights(&self.plan, dt, self.margin()), with_stretch }
     }
 
     /// Draws the noise of the pairs of the last search.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
-        let (tags, set) = (&self.tag, self.set);
-        pool.each(&mut self.planes, |plane| plane.draw(set, tags, noise[0], law));
+        pool.each(&mut self.planes, |plane| plane.draw(noise[0], law));
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the

@@ -3,7 +3,7 @@
 use super::pass::Wide;
 use crate::engine::vectors::Loop;
 
-/// Sets the residual to the sum of `own` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
+/// Sets the residual to the negative sum of `own` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
 pub struct Start<'a> {
     pub inverse_mass: &'a [f64],
     pub own: &'a [Wide],
@@ -22,7 +22,7 @@ impl Loop for Start<'_> {
         let mut sum = Wide::ZERO;
         let particles = residual.iter_mut().zip(p).zip(own).zip(inverse_mass);
         let each = |(((r, p), own), inverse): (((&mut Wide, &mut Wide), &Wide), &f64), below: Wide| {
-            *r = plus(*own, 1.0, below);
+            *r = times(Wide([-1.0; 4]), plus(*own, 1.0, below));
             *p = times(Wide([*inverse; 4]), *r);
             sum = plus(sum, 1.0, times(*p, *r));
         };

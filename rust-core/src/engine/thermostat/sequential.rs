@@ -148,7 +148,7 @@ impl PairThermostat {
             }
             pool.each(&mut shares, |share| {
                 if draws {
-                    let [a, b] = &share.plane.tags;
+                    let [a, b] = &share.plane.found.list.tags;
                     share.chances.resize(a.len(), 0.0);
                     noise[1].fill(Law::Uniform, a, b, &mut share.chances);
                 }
