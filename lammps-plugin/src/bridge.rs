@@ -305,7 +305,7 @@ fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleE
 }
 
 fn effort(style: &mut Style) -> ffi::Effort {
-    let Effort { updates, iterations, most, inaccurate } = style.effort();
+    let Effort { updates, iterations, most, inaccurate, .. } = style.effort();
     ffi::Effort { updates, iterations, most, inaccurate }
 }
 

@@ -7,9 +7,9 @@ use super::data::PassData;
 use super::list::{ListTerms, PairList, PairsAt, VectorsOfPairs, append_batch};
 use super::traversal::{BatchVisitor, each_batch};
 use crate::ground::arithmetic::{Arithmetic, PairVector};
+use crate::instruction_set::InstructionSet;
 use crate::pair_batch::accumulators::PlaneSums;
 use crate::pair_batch::batch::Batch;
-use crate::instruction_set::InstructionSet;
 use crate::pair_batch::buffers::{BatchBuffers, CacheLines};
 use crate::pair_batch::evaluate::evaluate;
 use crate::pair_batch::in_range_pairs::InRangePairs;
@@ -151,7 +151,8 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 && let Some(terms) = self.listed
             {
                 let [a, b] = &buffers.tags;
-                let computed = Computed { pairs: buffers.pairs.as_ptr().cast(), tags: [a.as_ptr(), b.as_ptr()] };
+                let computed =
+                    Computed { pairs: buffers.pairs.as_ptr().cast(), tags: [a.as_ptr(), b.as_ptr()] };
                 let (list, plane_first) = (&mut *self.list, self.plane_first);
                 run(self.set, Append::<MULTISPECIES> { list, terms, plane_first, batch, computed });
             }

@@ -182,7 +182,8 @@ pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
             }
             *kept.get_unchecked_mut(k / lanes) = [mask, found as u32];
             let [dx, dy, dz] = geometry.d;
-            let j = W::<I>::load(batch.j_offsets.as_ptr().add(k)).sub(plane_first).shift_right::<OFFSET_BITS>();
+            let j =
+                W::<I>::load(batch.j_offsets.as_ptr().add(k)).sub(plane_first).shift_right::<OFFSET_BITS>();
             let columns = [factor * dx, factor * dy, factor * dz, I::of_bits(j)];
             I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
             I::of_bits(tags[0]).compress(mask).store(to_tags[0].add(found).cast());
@@ -205,7 +206,8 @@ pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
         a.set_len(before + found);
         b.set_len(before + found);
         if terms.with_stretch {
-            stretch.extend(per_distance.get_unchecked(..found).iter().map(|factor| f64::from(factor.recip())));
+            stretch
+                .extend(per_distance.get_unchecked(..found).iter().map(|factor| f64::from(factor.recip())));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Sums over the listed pairs of a plane.
 
-use super::list::{ExactPair, Pair, PairList, pairs_of_each};
+use super::list::{ExactPair, Pair, PairList};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
@@ -29,9 +29,8 @@ impl std::ops::DerefMut for Wide {
     }
 }
 
-/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`, with the opposite term of the pair for `j`, and adds it to
-/// `sums`; without noise, `a = 0`, it does not read `xi`. `p` and `sums` have entries for the particles of the plane,
-/// followed by those of the next. The result has the same bits on every instruction set.
+/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`, with the opposite term of the pair for `j`; without noise,
+/// `a = 0`, it does not read `xi`. `p` and `sums` have entries for the particles of the plane, followed by those of the next.
 ///
 /// # Safety
 /// Both arrays have entries for all particles of the list.
@@ -118,61 +117,59 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
         let AddPairs { start, pairs, xi, noise, p, sums } = self.0;
         assert!(p.len() >= start.len() - 1 && sums.len() >= start.len() - 1, "particles of the list");
         assert!(!NOISE || xi.len() >= pairs.len(), "noise of the pairs");
+        sums.fill(Wide::ZERO);
         let (p, sums) = (p.as_ptr(), sums.as_mut_ptr());
         // SAFETY: `start` has indices of pairs, and these have particles that the arrays contain.
         unsafe {
-            for (i, of_i) in pairs_of_each(start) {
+            let (minus_noise, first) = (I::Quad::splat(-noise), pairs.as_ptr());
+            let (mut next, mut xi) = (first, xi.as_ptr());
+            for (i, end) in start.iter().skip(1).enumerate() {
+                let end = first.add(*end as usize);
                 let at = I::Quad::load(p.add(i).cast());
-                let mut sum = I::Quad::zero();
+                let mut sum = I::Quad::load(sums.add(i).cast());
                 // Two pairs at once share the additions across elements.
-                let (two, one) = pairs.get_unchecked(of_i.clone()).as_chunks::<2>();
-                let noises = if NOISE { xi.get_unchecked(of_i) } else { &[] };
-                for (n, [a, b]) in two.iter().enumerate() {
+                while next.wrapping_add(1) < end {
+                    let (a, b) = (&*next, &*next.add(1));
                     let (j_a, j_b) = (a.j(), b.j());
                     let (g_a, g_b) = (a.g::<I>(), b.g::<I>());
                     let d_a = at.sub(I::Quad::load(p.add(j_a).cast()));
                     let d_b = at.sub(I::Quad::load(p.add(j_b).cast()));
                     let [mut along_a, mut along_b] = d_a.mul(g_a).totals(d_b.mul(g_b));
                     if NOISE {
-                        along_a = along_a.sub(random::<I>(noise, noises, 2 * n));
-                        along_b = along_b.sub(random::<I>(noise, noises, 2 * n + 1));
+                        along_a = I::Quad::splat_f32(*xi).mul_add(minus_noise, along_a);
+                        along_b = I::Quad::splat_f32(*xi.add(1)).mul_add(minus_noise, along_b);
+                        xi = xi.add(2);
                     }
-                    sum = sum.add(push_away::<I>(along_a.mul(g_a), sums.add(j_a)));
-                    sum = sum.add(push_away::<I>(along_b.mul(g_b), sums.add(j_b)));
+                    sum = along_a.mul_add(g_a, sum);
+                    push_away::<I>(along_a, g_a, sums.add(j_a));
+                    sum = along_b.mul_add(g_b, sum);
+                    push_away::<I>(along_b, g_b, sums.add(j_b));
+                    next = next.add(2);
                 }
-                for a in one {
-                    let (j, g) = (a.j(), a.g::<I>());
+                if next < end {
+                    let (j, g) = ((*next).j(), (*next).g::<I>());
                     let d = at.sub(I::Quad::load(p.add(j).cast()));
                     let [mut along, _] = d.mul(g).totals(I::Quad::zero());
                     if NOISE {
-                        along = along.sub(random::<I>(noise, noises, noises.len() - 1));
+                        along = I::Quad::splat_f32(*xi).mul_add(minus_noise, along);
+                        xi = xi.add(1);
                     }
-                    sum = sum.add(push_away::<I>(along.mul(g), sums.add(j)));
+                    sum = along.mul_add(g, sum);
+                    push_away::<I>(along, g, sums.add(j));
+                    next = next.add(1);
                 }
-                let to = sums.add(i).cast();
-                I::Quad::load(to).add(sum).store(to);
+                sum.store(sums.add(i).cast());
             }
         }
     }
 }
 
-/// The noise of pair `k`.
-///
-/// # Safety
-/// The pair has noise; the caller fulfils the contract of `simd`.
-#[inline(always)]
-unsafe fn random<I: Isa>(noise: f64, noises: &[f32], k: usize) -> I::Quad {
-    // SAFETY: the caller promises it.
-    unsafe { I::Quad::splat(noise * f64::from(*noises.get_unchecked(k))) }
-}
-
-/// Subtracts `push` from the sum of a particle, and returns it.
+/// Subtracts `along g` from the sum of a particle.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`.
 #[inline(always)]
-unsafe fn push_away<I: Isa>(push: I::Quad, sum: *mut Wide) -> I::Quad {
+unsafe fn push_away<I: Isa>(along: I::Quad, g: I::Quad, sum: *mut Wide) {
     // SAFETY: the caller promises a particle.
-    unsafe { I::Quad::load(sum.cast()).sub(push).store(sum.cast()) };
-    push
+    unsafe { along.neg_mul_add(g, I::Quad::load(sum.cast())).store(sum.cast()) };
 }

@@ -183,6 +183,11 @@ pub trait Quad: Copy {
     unsafe fn add(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
+    /// Computes `self · a + b`, perhaps rounded once only.
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self;
+    /// Computes `b − self · a`, perhaps rounded once only.
+    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self;
+    unsafe fn splat_f32(x: f32) -> Self;
     unsafe fn load_f32(p: *const f32) -> Self;
     /// Loads the first three of four readable numbers, and sets the fourth to 0.
     unsafe fn load_three_f32(p: *const f32) -> Self;

@@ -37,6 +37,18 @@ impl Quad for Quad4 {
         unsafe { Quad4(_mm256_mul_pd(self.0, other.0)) }
     }
     #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Quad4(_mm256_fmadd_pd(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Quad4(_mm256_fnmadd_pd(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn splat_f32(x: f32) -> Self {
+        unsafe { Quad4(_mm256_cvtps_pd(_mm_set1_ps(x))) }
+    }
+    #[inline(always)]
     unsafe fn load_f32(p: *const f32) -> Self {
         unsafe { Quad4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
     }

@@ -165,7 +165,16 @@ impl<P: PairPrecision> Workspace<P> {
         work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>]),
     ) {
         let Workspace {
-            fluid, order, particles, excluded, accumulators, slopes, results, threads, listed, ..
+            fluid,
+            order,
+            particles,
+            excluded,
+            accumulators,
+            slopes,
+            results,
+            threads,
+            listed,
+            ..
         } = self;
         let (particles, excluded) = (&particles.share(), excluded.share());
         let (slopes, sums) = (slopes.share(), accumulators.share());

@@ -51,7 +51,7 @@ struct Share<'a> {
     /// Sums over pairs, of the plane itself and of the plane below.
     image: &'a mut [Wide],
     below: &'a [Wide],
-    mass: &'a [f64],
+    inertia: &'a [f64],
     inverse_mass: &'a [f64],
     residual: &'a mut [Wide],
     solution: &'a mut [Wide],
@@ -69,7 +69,7 @@ impl PairThermostat {
         pool: &Pool,
         work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let PairThermostat { planes, set, mass, inverse_mass, sums, residual, solution, .. } = self;
+        let PairThermostat { planes, set, inertia, inverse_mass, sums, residual, solution, .. } = self;
         let Sums { p, of_plane } = sums;
         let mut rest = [&mut p[..], residual, solution];
         let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
@@ -77,8 +77,8 @@ impl PairThermostat {
             .map(|((image, below), plane)| {
                 let own = plane.found.own.clone();
                 let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
-                let (mass, inverse_mass) = (&mass[own.clone()], &inverse_mass[own]);
-                (Share { p, image, below, mass, inverse_mass, residual, solution }, [0.0; 2])
+                let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
+                (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
             })
             .collect();
         pool.each(&mut shares, |(share, sums)| *sums = work(share, *set));
@@ -129,8 +129,8 @@ impl PairThermostat {
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
         self.sums.compute(pool, self.set, &self.planes, 0.0);
-        self.on_planes(pool, |Share { p, image, below, mass, inverse_mass, .. }, set| {
-            vectors::run(set, Multiply { p, mass, inverse_mass, image, below })
+        self.on_planes(pool, |Share { p, image, below, inertia, inverse_mass, .. }, set| {
+            vectors::run(set, Multiply { p, inertia, inverse_mass, image, below })
         })
     }
 
@@ -155,7 +155,7 @@ impl PairThermostat {
         if !goes_on {
             let inaccurate =
                 next.is_nan() || next > progress.enough || progress.tolerance < FINEST * progress.drag;
-            self.effort.add(progress.iterations, inaccurate);
+            self.effort.add(progress.iterations, self.are_listed, inaccurate);
         }
         let rest = if self.progress.drag < STRONG { 1.0 } else { 0.0 };
         let is_first = self.progress.iterations == 1;

@@ -11,10 +11,10 @@
 //! derive from the same `g`, its single precision in mixed precision changes the friction by rounding
 //! errors, but not the equilibrium.
 //!
-//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep, [`PairThermostat::draw`]
-//! draws their noise, and [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once,
-//! `sequential` pair by pair. Results depend on positions, velocities and tags, and neither on the
-//! order of particles in memory nor on the number of threads. On a rank with ghosts the midpoint rule
+//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep or, as `listed` explains, those of the last
+//! forces; [`PairThermostat::draw`] draws their noise, and [`PairThermostat::act`] changes velocities: `midpoint` for all
+//! pairs at once, `sequential` pair by pair. Results depend on positions, velocities and tags, not on the number of
+//! threads, and by rounding on the order of particles in memory if pairs are those of the last forces. On a rank with ghosts the midpoint rule
 //! exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of [`Update`]
 //! and its rule in one of these files.
 
@@ -87,8 +87,8 @@ pub struct PairThermostat {
     /// Whether pairs are computed in double precision.
     is_exact: bool,
     places: Places,
-    /// Mass of each sorted particle.
-    mass: Vec<f64>,
+    /// Mass of each sorted particle, 0 where it is infinite, and its inverse.
+    inertia: Vec<f64>,
     inverse_mass: Vec<f64>,
     sums: Sums,
     /// Residual and solution of each sorted particle.
@@ -102,6 +102,8 @@ pub struct PairThermostat {
     wants_virial: bool,
     /// The pairs that an engine has listed, for a search that follows.
     listed: Option<Listed>,
+    /// Whether the present pairs are those.
+    are_listed: bool,
     /// State of a solution in rounds with other ranks.
     round: Round,
     /// Squared norm of the first residual of this rank.
@@ -131,7 +133,7 @@ impl PairThermostat {
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
             places: Places::default(),
-            mass: Vec::new(),
+            inertia: Vec::new(),
             inverse_mass: Vec::new(),
             sums: Sums::default(),
             residual: Vec::new(),
@@ -141,6 +143,7 @@ impl PairThermostat {
             effort: Effort::default(),
             wants_virial: false,
             listed: None,
+            are_listed: false,
             round: Round::default(),
             first: 0.0,
             noise: [PairNoise::default(); 2],
@@ -182,7 +185,8 @@ impl PairThermostat {
     ) -> Result<(), EngineError> {
         (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
         let listed = Listed { dt, virial, particles: particles.x.len() };
-        if self.listed.take().is_none_or(|there| !there.serves(listed)) {
+        self.are_listed = self.listed.take().is_some_and(|there| there.serves(listed));
+        if !self.are_listed {
             let terms = self.terms(dt, virial);
             let range = [self.plan.longest, self.margin()];
             let PairThermostat { lists, planes, .. } = self;
@@ -192,9 +196,11 @@ impl PairThermostat {
             }
         }
         let order = self.lists.order();
-        pass::fill(pool, &mut self.mass, order, &mass);
-        self.inverse_mass.clear();
-        self.inverse_mass.extend(self.mass.iter().map(|mass| mass.recip()));
+        pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
+        let inertia =
+            self.inverse_mass.iter().map(|inverse| if *inverse > 0.0 { inverse.recip() } else { 0.0 });
+        self.inertia.clear();
+        self.inertia.extend(inertia);
         Ok(())
     }
 
@@ -231,7 +237,7 @@ impl PairThermostat {
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let moving = self.mass.iter().filter(|m| m.is_finite()).count();
+        let moving = self.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
@@ -239,7 +245,7 @@ impl PairThermostat {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.found.list.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
+                let inverse = self.inverse_mass[i] + self.inverse_mass[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     squares += along * along / inverse;

@@ -7,8 +7,8 @@ use super::planes::Plane;
 use crate::engine::sweep::{Pool, part};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::pairs_of_each;
-use psidpd_passes::plane::pair_sums::add_pairs;
 pub use psidpd_passes::plane::pair_sums::Wide;
+use psidpd_passes::plane::pair_sums::add_pairs;
 
 /// The vectors of the particles, and the sums over their pairs.
 #[derive(Debug, Clone, Default)]
@@ -44,7 +44,6 @@ impl Sums {
         pool.each(&mut work, |(plane, sums)| {
             let Plane { found, xi, .. } = plane;
             let count = found.own.len() + found.next.len();
-            sums.clear();
             sums.resize(count, Wide::ZERO);
             // SAFETY: the pairs of a plane are those of its own particles with each other and with the next.
             unsafe { add_pairs(set, &found.list, xi, noise, &p[found.own.start..][..count], sums) };

@@ -1,7 +1,7 @@
 //! Compares the midpoint rule on several ranks with that on one.
 
-use super::*;
 use super::listed::{engine, request};
+use super::*;
 use crate::engine::surroundings::{Around, Newton, Surroundings};
 
 /// The particles of one rank: the host's numbers of owned particles and of the owners of ghosts, and the ghosts' periods.

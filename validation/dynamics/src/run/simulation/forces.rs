@@ -2,11 +2,11 @@
 
 use super::particles::Particles;
 use super::{RunError, Simulation};
+use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
     self, Engine, Fault, PassCounts, PeriodicBox, Plan, Pool, Precision, Request, Settings, Step,
     Surroundings, Tally, Want,
 };
-use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::model::Model;
 
 #[derive(Debug, Clone)]
