@@ -11,12 +11,12 @@
 //! derive from the same `g`, its single precision in mixed precision changes the friction by rounding
 //! errors, but not the equilibrium.
 //!
-//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep or, as `listed` explains, those of the last
+//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep or, as `of_forces` explains, those of the last
 //! forces; [`PairThermostat::draw`] draws their noise, and [`PairThermostat::act`] changes velocities: `midpoint` for all
 //! pairs at once, `sequential` pair by pair. Results depend on positions, velocities and tags, not on the number of
-//! threads, and by rounding on the order of particles in memory if pairs are those of the last forces. On a rank with ghosts the midpoint rule
-//! exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of [`Update`]
-//! and its rule in one of these files.
+//! threads, and by rounding on the order of particles in memory if pairs are those of the last forces. On a rank with
+//! ghosts the midpoint rule exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of
+//! [`Update`] and its rule in one of these files.
 
 mod bodies;
 mod effort;
@@ -24,6 +24,7 @@ mod forces;
 mod listed;
 mod measure;
 mod midpoint;
+mod of_forces;
 mod particle_loops;
 mod pass;
 mod planes;
