@@ -189,6 +189,7 @@ void FixSplitting::initial_integrate(int vflag)
   const double dt = update->dt;
   if (scheme == Scheme::aboba) {
     drift(0.5 * dt);
+    expect();
     return;
   }
   kick(lambda * dt);
@@ -199,6 +200,7 @@ void FixSplitting::initial_integrate(int vflag)
   if (scheme == Scheme::force_gradient && gradient > 0.0) compute_displaced_forces();
   kick((1.0 - 2.0 * lambda) * dt);
   drift(0.5 * dt);
+  expect();
 }
 
 void FixSplitting::final_integrate()
@@ -279,10 +281,20 @@ void FixSplitting::reflect()
     if ((modify->fmask[k] & POST_INTEGRATE) && begins(modify->fix[k]->style, "wall/")) modify->fix[k]->post_integrate();
 }
 
+bool FixSplitting::is_due() const
+{
+  return update->ntimestep % every == 0;
+}
+
+// The forces of the step are computed where the thermostat acts.
+void FixSplitting::expect()
+{
+  if (is_due()) pair->expect_heat(static_cast<double>(every) * update->dt, vflag_of_step != 0);
+}
+
 void FixSplitting::act()
 {
-  const bigint step = update->ntimestep;
-  if (step % every != 0) return;
+  if (!is_due()) return;
   double impulses[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const double times = static_cast<double>(every);
   masses.resize(atom->nlocal);

@@ -76,6 +76,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void restore();
   // Computes all forces at the present positions, as a step of run_style verlet does.
   void compute_forces(int eflag, int vflag);
+  bool is_due() const;
+  void expect();
   void act();
   // Adds what other fixes add to forces.
   void add_forces(int vflag);

@@ -50,6 +50,8 @@ class PairPsi : public LAMMPS_NS::Pair {
 
   // Why the fix that applies drag and noise apart from the forces cannot act; empty if it can.
   std::string why_not_apart() const;
+  // Announces that the thermostat will act, for a time, where the next forces are computed.
+  void expect_heat(double time, bool wants_virial);
   // Applies drag and noise for a time to the velocities of atoms with these masses (energy over squared velocity), at
   // the positions where forces were last computed; adds the virial. Atoms of infinite mass keep their velocities.
   void heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial);

@@ -33,6 +33,12 @@ void PairPsi::forward_vectors()
   exchange.carry(GhostExchange::Carries::vectors, [this] { forward_values(comm, this, 0); });
 }
 
+void PairPsi::expect_heat(double time, bool wants_virial)
+{
+  refresh();
+  attempt([&] { thermostat_expected(**style, time, wants_virial); });
+}
+
 void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial)
 {
   refresh();

@@ -251,6 +251,8 @@ mod ffi {
         fn copy(self: &Style, from: &[f64], to: &mut [f64]);
         fn find_masses(self: &Style, unit: f64, movers: &Movers, held: &[u8], masses: &mut [f64]);
 
+        /// Announces that the thermostat will act for a time where the next forces are computed.
+        fn thermostat_expected(style: &mut Style, time: f64, virial: bool) -> Result<()>;
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
         /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
         fn thermostat_pairs(
@@ -279,6 +281,10 @@ mod ffi {
 
 pub use ffi::Movers;
 
+fn thermostat_expected(style: &mut Style, time: f64, virial: bool) -> Result<(), StyleError> {
+    style.expect_thermostat(time, virial)
+}
+
 fn thermostat_pairs(
     style: &mut Style,
     extent: &ffi::Extent,
@@ -299,7 +305,7 @@ fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleE
 }
 
 fn effort(style: &mut Style) -> ffi::Effort {
-    let Effort { updates, iterations, most, inaccurate } = style.effort();
+    let Effort { updates, iterations, most, inaccurate, .. } = style.effort();
     ffi::Effort { updates, iterations, most, inaccurate }
 }
 

@@ -159,6 +159,11 @@ impl Style {
         (self.thermostat.as_mut(), &self.pool, &self.kinds, &mut self.converted)
     }
 
+    /// The thermostat apart from the forces, and the engine, whose forces list its pairs.
+    pub(crate) fn thermostat_beside_engine(&mut self) -> Option<(&mut PairThermostat, &mut Engine)> {
+        Some((self.thermostat.as_mut()?, &mut self.engine))
+    }
+
     pub(crate) fn effort_before(&self) -> Effort {
         self.effort_before
     }

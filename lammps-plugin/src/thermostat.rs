@@ -17,6 +17,21 @@ pub struct Noise {
 }
 
 impl Style {
+    /// Announces that the thermostat will act for `dt` where the next forces are computed: these then list its pairs, if
+    /// they can.
+    ///
+    /// # Errors
+    /// Fails for an internal error only.
+    pub fn expect_thermostat(&mut self, dt: f64, virial: bool) -> Result<(), StyleError> {
+        let dt = dt / self.scale().time;
+        guard(|| {
+            if let Some((thermostat, engine)) = self.thermostat_beside_engine() {
+                thermostat.ask(engine, dt, virial);
+            }
+            Ok(())
+        })
+    }
+
     /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no
     /// thermostat. `mass` has the masses of owned atoms, infinite for atoms that keep their velocities.
     /// With `virial` pair distances are stored.
@@ -35,6 +50,9 @@ impl Style {
     ) -> Result<bool, StyleError> {
         guard(|| {
             let scale = self.scale();
+            if let Some((thermostat, engine)) = self.thermostat_beside_engine() {
+                thermostat.take(engine);
+            }
             let (Some(thermostat), pool, kinds, converted) = self.thermostat() else { return Ok(false) };
             let taken = converted.take(&scale, &at_rest(particles));
             let unit = scale.velocity().powi(2) / scale.energy;

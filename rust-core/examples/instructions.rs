@@ -9,7 +9,7 @@
 //! With a number of sides as fifth word the particles are those of a rank that has ghosts on 2 (along z), 4
 //! or 6 sides; the sixth word is the number of particles, 2000 unless given; the seventh that of threads. With the
 //! fifth word `thermostat` drag and noise act apart from the forces instead, for the time of six steps, by the
-//! midpoint rule.
+//! midpoint rule; with `listed` they act after an evaluation of forces at the same positions, which lists their pairs.
 //!
 //! The difference between runs of different length is the cost of the additional evaluations. The
 //! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
@@ -19,7 +19,7 @@ mod setup;
 
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update};
-use psidpd_core::engine::{Pool, Settings, Sweep};
+use psidpd_core::engine::{Engine, Particles, Pool, Request, Settings, Sweep, Want};
 use setup::{Cloud, Rank, choose, faces};
 use std::num::NonZeroUsize;
 use std::process::ExitCode;
@@ -32,7 +32,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat [PARTICLES [THREADS]]]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat|listed [PARTICLES [THREADS]]]"
             );
             ExitCode::FAILURE
         }
@@ -51,14 +51,23 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let threads = threads.map_err(|_| "THREADS is a number above 0")?;
     let settings = Settings { precision, instructions, threads };
     let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;
-    if rest.first().is_some_and(|word| word == "thermostat") {
+    let apart = rest.first().filter(|word| ["thermostat", "listed"].contains(&word.as_str()));
+    if let Some(word) = apart {
+        let mut engine = Engine::new(&fluid, settings).map_err(|e| e.to_string())?;
         let mut cloud = Cloud::new(subject, &fluid, count);
         let mut thermostat =
             PairThermostat::new(sweep.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
         let (pool, dt) = (Pool::new(settings.threads), 6.0 * cloud.dt());
         for number in 0..evaluations {
             cloud.drift();
-            let Cloud { domain, x, v, tag, kind, .. } = &mut cloud;
+            let Cloud { domain, x, v, tag, kind, force, .. } = &mut cloud;
+            if word == "listed" {
+                thermostat.ask(&mut engine, dt, false);
+                let particles = Particles { owned: count, x, tag, kind };
+                let request = Request { particles, v: &[], step: None, want: Want::FORCES };
+                engine.forces(domain, &request, force, false).map_err(|e| e.to_string())?;
+                thermostat.take(&mut engine);
+            }
             let bodies = Bodies { domain, x, tag, species: kind, mass: &[1.0; 2], frozen: &[] };
             thermostat.find_pairs(&pool, &bodies, dt, false).map_err(|e| e.to_string())?;
             thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);

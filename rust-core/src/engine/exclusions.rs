@@ -87,6 +87,11 @@ impl Exclusions {
         self.start[0] = 0;
     }
 
+    /// Whether no pair is excluded.
+    pub fn is_empty(&self) -> bool {
+        !self.has_partners() && self.kinds == [false; 2]
+    }
+
     /// Whether single pairs are excluded.
     pub fn has_partners(&self) -> bool {
         !self.start.is_empty()

@@ -132,6 +132,11 @@ impl Engine {
         self.sweep.sweep.plan()
     }
 
+    /// The sweep, which lists pairs for a thermostat.
+    pub(super) fn sweep_mut(&mut self) -> &mut Sweep {
+        &mut self.sweep.sweep
+    }
+
     /// The settings of the sweep, with the instruction set in use.
     pub fn settings(&self) -> Settings {
         self.sweep.sweep.settings()
@@ -278,6 +283,7 @@ impl Engine {
         self.path = Some(path);
         self.sweep.forget();
         if path != Path::Sweep {
+            self.sweep.sweep.ask_for_pairs(None);
             self.tell_pair_sums();
         }
         self.last_mut()

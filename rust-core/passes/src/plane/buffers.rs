@@ -1,19 +1,26 @@
 //! Scratch arrays of a thread for the first pass.
 
+use super::list::PairList;
 use crate::pair_batch::buffers::BatchBuffers;
 use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::Scalar;
 
-/// Result of the search, and scratch arrays of the evaluation of a batch.
+/// Result of the search, scratch arrays of the evaluation of a batch, and listed pairs.
 #[derive(Debug)]
 pub struct PairBuffers<T> {
     pub search: SearchBuffers,
     pub batch: BatchBuffers<T>,
+    /// The pairs of the present plane that are listed for the thermostat.
+    pub list: PairList,
 }
 
 impl<T: Scalar> PairBuffers<T> {
     /// Buffers for the weights of `passes` densities.
     pub fn new(passes: usize) -> PairBuffers<T> {
-        PairBuffers { search: SearchBuffers::default(), batch: BatchBuffers::new(passes) }
+        PairBuffers {
+            search: SearchBuffers::default(),
+            batch: BatchBuffers::new(passes),
+            list: PairList::default(),
+        }
     }
 }

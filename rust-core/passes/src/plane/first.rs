@@ -4,22 +4,25 @@
 
 use super::buffers::PairBuffers;
 use super::data::PassData;
+use super::list::{ListTerms, PairList, PairsAt, VectorsOfPairs, append_batch};
 use super::traversal::{BatchVisitor, each_batch};
-use crate::ground::arithmetic::Arithmetic;
+use crate::ground::arithmetic::{Arithmetic, PairVector};
+use crate::instruction_set::InstructionSet;
 use crate::pair_batch::accumulators::PlaneSums;
 use crate::pair_batch::batch::Batch;
-use crate::pair_batch::buffers::BatchBuffers;
+use crate::pair_batch::buffers::{BatchBuffers, CacheLines};
 use crate::pair_batch::evaluate::evaluate;
 use crate::pair_batch::in_range_pairs::InRangePairs;
 use crate::pair_batch::inputs::PairInputs;
 use crate::pair_batch::scatter::{scatter_forces, scatter_weights};
 use crate::pair_batch::step_constants::StepConstants;
 use crate::pair_search::buffers::SearchBuffers;
-use crate::simd::{Isa, Reals};
+use crate::simd::{Isa, Kernel, Reals, Words, run};
 use crate::tally::Tally;
 use std::ops::Range;
 
-/// Does the first pass over `columns` of `plane`, and writes to `in_range` the pairs that the second pass needs.
+/// Does the first pass over `columns` of `plane`, writes to `in_range` the pairs that the second pass needs, and appends
+/// those that are listed to the list of the plane.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. Arrays have the sizes that the types in [`PassData`]
@@ -35,7 +38,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
 ) -> Tally {
-    let (cells, inputs) = (&data.cells, &data.inputs);
+    let (cells, inputs, listed) = (&data.cells, &data.inputs, data.listed);
     let passes = inputs.terms.passes.len();
     // SAFETY: the caller promises a plane of the grid; the scheduler has filled it and the next one.
     unsafe {
@@ -44,18 +47,26 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
         } else {
             in_range.clear(passes, cells.column(plane, 0)[0] as u32);
         }
-        let PairBuffers { search, batch } = buffers;
-        let constants = StepConstants::<I, A>::new(inputs);
+        let PairBuffers { search, batch, list } = buffers;
+        let constants = StepConstants::<I, A>::new(inputs, listed.is_some());
         let mut pass = FirstPass::<I, A, MULTISPECIES, TALLY> {
             inputs,
             constants,
             sums,
             buffers: &mut *batch,
             in_range,
+            listed,
+            set: cells.set,
+            plane_first: cells.column(plane, 0)[0],
+            list: &mut *list,
             tally: Tally::default(),
         };
+        let last = columns.end - 1;
         let groups = each_batch::<I, _>(cells, plane, columns, A::Reals::LANES, search, &mut pass);
         let tally = pass.tally;
+        if listed.is_some() {
+            list.begin_at(cells.column(plane, last)[1]);
+        }
         batch.counts.searched += groups;
         tally
     }
@@ -68,7 +79,51 @@ struct FirstPass<'a, I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
     sums: PlaneSums<'a>,
     buffers: &'a mut BatchBuffers<A::Scalar>,
     in_range: &'a mut InRangePairs<A::Scalar>,
+    listed: Option<&'a ListTerms>,
+    set: InstructionSet,
+    plane_first: usize,
+    list: &'a mut PairList,
     tally: Tally,
+}
+
+/// The pairs of a batch in mixed precision, as the pass has computed them.
+struct Computed {
+    /// [`PairVector`]s of the instruction set.
+    pairs: *const CacheLines<f32>,
+    tags: [*const u32; 2],
+}
+
+impl<I: Isa> VectorsOfPairs<I> for Computed {
+    #[inline(always)]
+    unsafe fn at(&self, k: usize) -> PairsAt<I> {
+        // SAFETY: the caller promises a number of a pair; the arrays have whole vectors.
+        unsafe {
+            let pairs = self.pairs.cast::<PairVector<I::F32>>();
+            let PairVector { geometry, species_pair } = *pairs.add(k / I::F32::LANES);
+            let tags = [Words::load(self.tags[0].add(k)), Words::load(self.tags[1].add(k))];
+            PairsAt { geometry, species_pair, tags }
+        }
+    }
+}
+
+/// Lists the pairs of a batch. It is called, as the pass is compiled for more fluids than the list.
+struct Append<'a, const MULTISPECIES: bool> {
+    list: &'a mut PairList,
+    terms: &'a ListTerms,
+    plane_first: usize,
+    batch: Batch<'a>,
+    computed: Computed,
+}
+
+impl<const MULTISPECIES: bool> Kernel for Append<'_, MULTISPECIES> {
+    type Out = ();
+
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) {
+        let Append { list, terms, plane_first, batch, computed } = self;
+        // SAFETY: the pass appends its batches in their order, with the arrays of this batch.
+        unsafe { append_batch::<I, MULTISPECIES>(list, terms, plane_first, batch, &computed) }
+    }
 }
 
 impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> BatchVisitor<I>
@@ -92,6 +147,15 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 batch,
                 &mut self.tally,
             );
+            if size_of::<A::Scalar>() == size_of::<f32>()
+                && let Some(terms) = self.listed
+            {
+                let [a, b] = &buffers.tags;
+                let computed =
+                    Computed { pairs: buffers.pairs.as_ptr().cast(), tags: [a.as_ptr(), b.as_ptr()] };
+                let (list, plane_first) = (&mut *self.list, self.plane_first);
+                run(self.set, Append::<MULTISPECIES> { list, terms, plane_first, batch, computed });
+            }
             // Forces are added first: the quads of weights replace theirs.
             if !(MULTISPECIES && inputs.caches_all_pairs()) {
                 scatter_forces::<I, A>(sums, buffers, batch);

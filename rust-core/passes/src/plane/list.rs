@@ -2,7 +2,7 @@
 
 use super::traversal::{BatchVisitor, each_batch};
 use crate::cells::sorted::SortedCells;
-use crate::ground::arithmetic::{Arithmetic, IParticles, Mixed, MixedParticle};
+use crate::ground::arithmetic::{Arithmetic, IParticles, Mixed, MixedParticle, PairGeometry};
 use crate::ground::species_pairs::{SpeciesPair, SpeciesPairTable, TableLookup};
 use crate::ground::terms::Exponent;
 use crate::instruction_set::InstructionSet;
@@ -33,16 +33,30 @@ pub struct ExactPair {
     pub j: u64,
 }
 
-/// The pairs of a plane, sorted by first particle, in the order of cells.
+/// Pairs whose first particles follow each other in the order of cells, sorted by first particle.
 #[derive(Debug, Clone, Default)]
 pub struct PairList {
+    /// The first of these particles.
+    pub first: usize,
     /// Index of each particle's first pair; the last entry is one past the last pair.
     pub start: Vec<u32>,
     pub pairs: Vec<Pair>,
+    /// Tags of both particles of each pair.
+    pub tags: [Vec<u32>; 2],
     /// The pairs in double precision, if these have been computed; otherwise empty.
     pub exact: Vec<ExactPair>,
     /// Ratio `r/|g|` of each pair; empty unless requested.
     pub stretch: Vec<f64>,
+    scratch: Scratch,
+}
+
+/// Scratch arrays of a batch that is listed.
+#[derive(Debug, Clone, Default)]
+struct Scratch {
+    /// For each vector of pairs the mask of those that are kept, and the number of those kept before.
+    kept: Vec<[u32; 2]>,
+    /// Ratio `|g|/r` of each kept pair, if requested.
+    per_distance: Vec<f32>,
 }
 
 /// The particles of a plane, counted from its first, each with the range of its pairs in the list.
@@ -54,6 +68,33 @@ pub fn pairs_of_each(
 }
 
 impl PairList {
+    /// Empties the list; its first particle will be `first`.
+    pub fn clear(&mut self, first: usize) {
+        self.first = first;
+        self.start.clear();
+        self.start.push(0);
+        self.pairs.clear();
+        self.tags.iter_mut().for_each(Vec::clear);
+        self.exact.clear();
+        self.stretch.clear();
+    }
+
+    /// Appends a list whose particles follow.
+    pub fn append(&mut self, next: &PairList) {
+        let count = self.pairs.len() as u32;
+        self.start.extend(next.start.iter().skip(1).map(|start| count + start));
+        self.pairs.extend_from_slice(&next.pairs);
+        self.tags.iter_mut().zip(&next.tags).for_each(|(tags, next)| tags.extend_from_slice(next));
+        self.stretch.extend_from_slice(&next.stretch);
+    }
+
+    /// Gives no pairs to the particles before `place` that are not listed yet.
+    #[inline(always)]
+    pub fn begin_at(&mut self, place: usize) {
+        let PairList { start, pairs, first, .. } = self;
+        start.resize(place - *first + 1, pairs.len() as u32);
+    }
+
     /// The vector `g` of a pair, in the highest precision available.
     #[inline(always)]
     pub fn g(&self, k: usize) -> [f64; 3] {
@@ -71,25 +112,119 @@ pub struct WeightTables {
     pub exponent: Exponent<f32>,
 }
 
-/// Scratch arrays of the listing.
+/// The pairs that are listed, and whether `r/|g|` is requested.
+#[derive(Debug, Clone)]
+pub struct ListTerms {
+    pub tables: WeightTables,
+    pub with_stretch: bool,
+}
+
+/// What the list needs of a vector of pairs.
+pub struct PairsAt<I: Isa> {
+    pub geometry: PairGeometry<I::F32>,
+    /// Read only with several species.
+    pub species_pair: SpeciesPair<I::F32>,
+    pub tags: [<I::F32 as Reals>::Words; 2],
+}
+
+/// The pairs of a batch, a vector at a time.
+pub trait VectorsOfPairs<I: Isa> {
+    /// The pairs from number `k` on; lanes beyond the last pair are unspecified.
+    ///
+    /// # Safety
+    /// The caller fulfils the contract of `simd`; `k` is a multiple of the lanes, and a number of a pair.
+    unsafe fn at(&self, k: usize) -> PairsAt<I>;
+}
+
+/// Appends the pairs of a batch within their range to a list; indices of second particles count from `plane_first`.
+///
+/// # Safety
+/// The caller fulfils the contract of `simd`. The list has no particle of the batch or after it yet.
+#[inline(always)]
+pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
+    list: &mut PairList,
+    terms: &ListTerms,
+    plane_first: usize,
+    batch: Batch,
+    vectors: &impl VectorsOfPairs<I>,
+) {
+    type W<I> = <<I as Isa>::F32 as Reals>::Words;
+    list.begin_at(batch.first);
+    let PairList { start, pairs, tags: [a, b], stretch, scratch: Scratch { kept, per_distance }, .. } = list;
+    let (lanes, tables) = (I::F32::LANES, &terms.tables);
+    let room = batch.count + 16;
+    make_room(start, batch.members);
+    make_room(pairs, room);
+    make_room(a, room);
+    make_room(b, room);
+    kept.resize(kept.len().max(room), [0; 2]);
+    if terms.with_stretch {
+        per_distance.resize(per_distance.len().max(room), 0.0);
+    }
+    // SAFETY: the search pads lists of the batch; room for all its pairs and a vector has been reserved, and `found`
+    // written pairs are initialised. The caller promises the rest.
+    unsafe {
+        let weight = ThermostatWeight::<I::F32>::new(&tables.inverse_range, &tables.exponent);
+        let amplitude = TableLookup::<I::F32>::new(&tables.amplitude);
+        let before = pairs.len();
+        let to_pairs = pairs.as_mut_ptr().add(before);
+        let to_tags = [a.as_mut_ptr().add(before), b.as_mut_ptr().add(before)];
+        let plane_first = W::<I>::splat((plane_first as u32) << OFFSET_BITS);
+        let mut found = 0;
+        let mut k = 0;
+        while k < batch.count {
+            let PairsAt { geometry, species_pair, tags } = vectors.at(k);
+            let w = weight.weight::<MULTISPECIES>(geometry.r, species_pair);
+            let factor = amplitude.lookup::<MULTISPECIES>(species_pair) * w * geometry.inverse;
+            let mut mask = I::F32::constant(0.0).mask_below(factor);
+            if batch.count - k < lanes {
+                mask &= (1 << (batch.count - k)) - 1;
+            }
+            *kept.get_unchecked_mut(k / lanes) = [mask, found as u32];
+            let [dx, dy, dz] = geometry.d;
+            let j =
+                W::<I>::load(batch.j_offsets.as_ptr().add(k)).sub(plane_first).shift_right::<OFFSET_BITS>();
+            let columns = [factor * dx, factor * dy, factor * dz, I::of_bits(j)];
+            I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
+            I::of_bits(tags[0]).compress(mask).store(to_tags[0].add(found).cast());
+            I::of_bits(tags[1]).compress(mask).store(to_tags[1].add(found).cast());
+            if terms.with_stretch {
+                factor.compress(mask).store(per_distance.as_mut_ptr().add(found));
+            }
+            found += mask.count_ones() as usize;
+            k += lanes;
+        }
+        *kept.get_unchecked_mut(k / lanes) = [0, found as u32];
+        let first = *batch.begin.get_unchecked(0);
+        for end in batch.begin.get_unchecked(1..=batch.members) {
+            let at = (end - first) as usize;
+            let [mask, found] = *kept.get_unchecked(at / lanes);
+            let below = mask & !(u32::MAX << (at % lanes));
+            start.push(before as u32 + found + below.count_ones());
+        }
+        pairs.set_len(before + found);
+        a.set_len(before + found);
+        b.set_len(before + found);
+        if terms.with_stretch {
+            stretch
+                .extend(per_distance.get_unchecked(..found).iter().map(|factor| f64::from(factor.recip())));
+        }
+    }
+}
+
+/// Scratch arrays of a search whose pairs are only listed.
 #[derive(Debug, Default)]
 pub struct ListBuffers {
     search: SearchBuffers,
     i_particles: IParticles<f32>,
-    /// The i-particle of each kept pair of a batch.
-    i_in_batch: Vec<u32>,
-    /// Ratio `|g|/r` of each pair, if requested.
-    per_distance: Vec<f32>,
 }
 
-/// Particles in the order of cells, and the factors of their pairs.
+/// Particles in the order of cells, and the pairs of them that are listed.
 #[derive(Clone, Copy)]
 pub struct ListInputs<'a> {
     pub cells: SortedCells<'a>,
     pub packed: SharedSlice<'a, MixedParticle>,
-    pub tables: &'a WeightTables,
-    /// Whether `r/|g|` is requested.
-    pub with_stretch: bool,
+    pub terms: &'a ListTerms,
 }
 
 /// Lists the pairs of particles of a plane with each other and with the next plane, each pair once.
@@ -103,22 +238,17 @@ pub unsafe fn list_pairs(
     buffers: &mut ListBuffers,
     list: &mut PairList,
 ) {
-    list.start.clear();
-    list.start.push(0);
-    list.pairs.clear();
-    list.exact.clear();
-    list.stretch.clear();
-    buffers.per_distance.clear();
+    // SAFETY: the caller promises a plane of the grid.
+    list.clear(unsafe { inputs.cells.column(plane, 0)[0] });
     let task = ListPairs { inputs, plane, buffers, list };
     // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before it lists any
     // plane, and writes none of them while it lists.
     unsafe {
-        match inputs.tables.species {
+        match inputs.terms.tables.species {
             1 => run(set, WithSpecies::<false>(task)),
             _ => run(set, WithSpecies::<true>(task)),
         }
     }
-    list.stretch.extend(buffers.per_distance.iter().map(|factor| f64::from(factor.recip())));
 }
 
 struct ListPairs<'a> {
@@ -135,25 +265,15 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let ListPairs { inputs, plane, buffers, list } = self.0;
-        let ListBuffers { search, i_particles, i_in_batch, per_distance } = buffers;
+        let ListPairs { inputs, plane, buffers: ListBuffers { search, i_particles }, list } = self.0;
         // SAFETY: the caller of `list_pairs` promises filled arrays; a plane has a first column.
         unsafe {
-            let first = inputs.cells.column(plane, 0)[0];
             let columns = inputs.cells.grid.columns_per_plane;
             let end = inputs.cells.column(plane, columns - 1)[1];
             let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
-            let mut lister = Lister::<I, MULTISPECIES> {
-                inputs,
-                metric,
-                first,
-                i_particles,
-                i_in_batch,
-                per_distance,
-                list,
-            };
+            let mut lister = Lister::<I, MULTISPECIES> { inputs, metric, i_particles, list };
             each_batch::<I, _>(&inputs.cells, plane, 0..columns, I::F32::LANES, search, &mut lister);
-            lister.begin_at(end);
+            list.begin_at(end);
         }
     }
 }
@@ -161,104 +281,59 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
 struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
     inputs: &'a ListInputs<'a>,
     metric: <Mixed as Arithmetic<I>>::Metric,
-    /// The first particle of the plane.
-    first: usize,
     i_particles: &'a mut IParticles<f32>,
-    i_in_batch: &'a mut Vec<u32>,
-    per_distance: &'a mut Vec<f32>,
     list: &'a mut PairList,
-}
-
-impl<I: Isa, const MULTISPECIES: bool> Lister<'_, I, MULTISPECIES> {
-    /// Gives no pairs to the particles before `place` that were not visited: they are in columns of ghosts.
-    #[inline(always)]
-    fn begin_at(&mut self, place: usize) {
-        let PairList { start, pairs, .. } = &mut *self.list;
-        start.resize(place - self.first + 1, pairs.len() as u32);
-    }
 }
 
 impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISPECIES> {
     #[inline(always)]
     unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]) {
-        type W<I> = <<I as Isa>::F32 as Reals>::Words;
-        let members = slots[1] - slots[0];
-        self.begin_at(search.first + slots[0]);
-        let PairList { start, pairs, .. } = &mut *self.list;
-        let per_distance = &mut *self.per_distance;
-        make_room(start, members);
-        // SAFETY: `SortedParticles::make_room` pads `packed` by a vector after the last particle, and
-        // the search pads lists of the batch; room for all its pairs and a vector has been reserved,
-        // and `found` written pairs are initialised. The caller promises the rest.
+        // SAFETY: `SortedParticles::make_room` pads `packed` by a vector after the last particle. The caller
+        // promises the rest.
         unsafe {
-            let Some(batch) = Batch::of_group(search, slots) else {
-                start.resize(start.len() + members, pairs.len() as u32);
-                return;
+            let Some(batch) = Batch::of_group(search, slots) else { return };
+            let ListInputs { packed, terms, .. } = self.inputs;
+            let packed = packed.as_ptr();
+            <Mixed as Arithmetic<I>>::load_i_particles(packed.add(batch.first), self.i_particles);
+            let (metric, i_particles, species) = (self.metric, &*self.i_particles, terms.tables.species);
+            let computed = Computed::<I, MULTISPECIES> { metric, packed, i_particles, batch, species };
+            let plane_first = self.list.first;
+            append_batch::<I, MULTISPECIES>(self.list, terms, plane_first, batch, &computed);
+        }
+    }
+}
+
+/// Computes the pairs of a batch.
+struct Computed<'a, I: Isa, const MULTISPECIES: bool> {
+    metric: <Mixed as Arithmetic<I>>::Metric,
+    packed: *const MixedParticle,
+    i_particles: &'a IParticles<f32>,
+    batch: Batch<'a>,
+    species: usize,
+}
+
+impl<I: Isa, const MULTISPECIES: bool> VectorsOfPairs<I> for Computed<'_, I, MULTISPECIES> {
+    #[inline(always)]
+    unsafe fn at(&self, k: usize) -> PairsAt<I> {
+        type W<I> = <<I as Isa>::F32 as Reals>::Words;
+        let Computed { metric, packed, i_particles, batch, species } = self;
+        // SAFETY: the search pads the lists of a batch by a vector of valid particles.
+        unsafe {
+            let i = W::<I>::load_bytes(batch.i_in_batch.as_ptr().add(k));
+            let (geometry, tags) = <Mixed as Arithmetic<I>>::pair_geometry::<MULTISPECIES>(
+                metric,
+                *packed,
+                *i_particles,
+                i,
+                batch.j_offsets.as_ptr().add(k),
+                false,
+            );
+            let species_pair = if MULTISPECIES {
+                SpeciesPair::new(W::<I>::pick(i_particles.species.as_ptr(), i), tags.species_j, *species)
+            } else {
+                SpeciesPair(i)
             };
-            let tables = self.inputs.tables;
-            let weight = ThermostatWeight::<I::F32>::new(&tables.inverse_range, &tables.exponent);
-            let amplitude = TableLookup::<I::F32>::new(&tables.amplitude);
-            let packed = self.inputs.packed.as_ptr();
-            let i_particles = &mut *self.i_particles;
-            <Mixed as Arithmetic<I>>::load_i_particles(packed.add(batch.first), i_particles);
-            make_room(pairs, batch.count + 16);
-            if self.inputs.with_stretch {
-                make_room(per_distance, batch.count + 16);
-            }
-            self.i_in_batch.resize(self.i_in_batch.len().max(batch.count + 16), 0);
-            let to_pairs = pairs.as_mut_ptr().add(pairs.len());
-            let to_per_distance = per_distance.as_mut_ptr().add(per_distance.len());
-            let to_i = self.i_in_batch.as_mut_ptr();
-            let plane_first = W::<I>::splat((self.first as u32) << OFFSET_BITS);
-            let mut found = 0;
-            let mut k = 0;
-            while k < batch.count {
-                let i = W::<I>::load_bytes(batch.i_in_batch.as_ptr().add(k));
-                let j = batch.j_offsets.as_ptr().add(k);
-                let (geometry, tags) = <Mixed as Arithmetic<I>>::pair_geometry::<MULTISPECIES>(
-                    &self.metric,
-                    packed,
-                    i_particles,
-                    i,
-                    j,
-                    false,
-                );
-                let species_pair = if MULTISPECIES {
-                    let species_i = W::<I>::pick(i_particles.species.as_ptr(), i);
-                    SpeciesPair::new(species_i, tags.species_j, tables.species)
-                } else {
-                    SpeciesPair(i)
-                };
-                let w = weight.weight::<MULTISPECIES>(geometry.r, species_pair);
-                let factor = amplitude.lookup::<MULTISPECIES>(species_pair) * w * geometry.inverse;
-                let mut mask = I::F32::constant(0.0).mask_below(factor);
-                if batch.count - k < I::F32::LANES {
-                    mask &= (1 << (batch.count - k)) - 1;
-                }
-                let [dx, dy, dz] = geometry.d;
-                let j = W::<I>::load(j).sub(plane_first).shift_right::<OFFSET_BITS>();
-                let columns = [factor * dx, factor * dy, factor * dz, I::of_bits(j)];
-                I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
-                I::of_bits(i).compress(mask).store(to_i.add(found).cast());
-                if self.inputs.with_stretch {
-                    factor.compress(mask).store(to_per_distance.add(found));
-                }
-                found += mask.count_ones() as usize;
-                k += I::F32::LANES;
-            }
-            let mut counts = [0; 16];
-            for i in self.i_in_batch.get_unchecked(..found) {
-                counts[*i as usize % 16] += 1;
-            }
-            let mut end = pairs.len() as u32;
-            for count in counts.get_unchecked(..members) {
-                end += count;
-                start.push(end);
-            }
-            pairs.set_len(pairs.len() + found);
-            if self.inputs.with_stretch {
-                per_distance.set_len(per_distance.len() + found);
-            }
+            PairsAt { geometry, species_pair, tags: tags.tags }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Sums over the listed pairs of a plane.
 
-use super::list::{ExactPair, Pair, PairList, pairs_of_each};
+use super::list::{ExactPair, Pair, PairList};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
@@ -29,37 +29,32 @@ impl std::ops::DerefMut for Wide {
     }
 }
 
-/// Factors of a pair: `a` and `b` of [`add_pairs`].
-#[derive(Debug, Clone, Copy)]
-pub struct Terms {
-    pub noise: f64,
-    pub drag: f64,
-}
-
-/// Adds `g (a ξ − b g·(p_i − p_j))` to particle `i` of every pair, and subtracts it from `j`. `p` and
-/// `sums` have entries for the particles of the plane, followed by those of the next; without noise
-/// `xi` is not read. The result has the same bits on every instruction set.
+/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`, with the opposite term of the pair for `j`; without noise,
+/// `a = 0`, it does not read `xi`. `p` and `sums` have entries for the particles of the plane, followed by those of the next.
+///
+/// # Safety
+/// Both arrays have entries for all particles of the list.
 ///
 /// # Panics
-/// Panics if arrays are too short for the list.
-pub fn add_pairs(
+/// Panics if there is noise and `xi` has not an entry for each pair.
+pub unsafe fn add_pairs(
     set: InstructionSet,
     list: &PairList,
     xi: &[f32],
-    terms: Terms,
+    noise: f64,
     p: &[Wide],
     sums: &mut [Wide],
 ) {
     match list.exact.is_empty() {
-        true => add(set, AddPairs { start: &list.start, pairs: &list.pairs, xi, terms, p, sums }),
-        false => add(set, AddPairs { start: &list.start, pairs: &list.exact, xi, terms, p, sums }),
+        true => add(set, AddPairs { start: &list.start, pairs: &list.pairs, xi, noise, p, sums }),
+        false => add(set, AddPairs { start: &list.start, pairs: &list.exact, xi, noise, p, sums }),
     }
 }
 
 fn add<P: Entry>(set: InstructionSet, task: AddPairs<P>) {
-    // SAFETY: the kernels require the instruction set only, which `InstructionSet` guarantees.
+    // SAFETY: `InstructionSet` guarantees the instructions, the caller of `add_pairs` the particles.
     unsafe {
-        match task.terms.noise == 0.0 {
+        match task.noise == 0.0 {
             true => run(set, WithNoise::<P, false>(task)),
             false => run(set, WithNoise::<P, true>(task)),
         }
@@ -79,7 +74,8 @@ trait Entry {
 impl Entry for Pair {
     #[inline(always)]
     fn j(&self) -> usize {
-        self.j as usize
+        // SAFETY: it is a reference. The read is volatile: otherwise the compiler loads it together with `g`, and extracts it.
+        unsafe { (&raw const self.j).read_volatile() as usize }
     }
 
     #[inline(always)]
@@ -106,7 +102,7 @@ struct AddPairs<'a, P> {
     start: &'a [u32],
     pairs: &'a [P],
     xi: &'a [f32],
-    terms: Terms,
+    noise: f64,
     p: &'a [Wide],
     sums: &'a mut [Wide],
 }
@@ -118,33 +114,62 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let AddPairs { start, pairs, xi, terms, p, sums } = self.0;
-        // With equal lengths one comparison is enough for both arrays.
-        let count = p.len().min(sums.len());
-        let (p, sums) = (&p[..count], &mut sums[..count]);
-        // SAFETY: all loads and stores are at arrays of four numbers.
+        let AddPairs { start, pairs, xi, noise, p, sums } = self.0;
+        assert!(p.len() >= start.len() - 1 && sums.len() >= start.len() - 1, "particles of the list");
+        assert!(!NOISE || xi.len() >= pairs.len(), "noise of the pairs");
+        sums.fill(Wide::ZERO);
+        let (p, sums) = (p.as_ptr(), sums.as_mut_ptr());
+        // SAFETY: `start` has indices of pairs, and these have particles that the arrays contain.
         unsafe {
-            let minus_drag = I::Quad::splat(-terms.drag);
-            for (i, of_i) in pairs_of_each(start) {
-                let noises = if NOISE { &xi[of_i.clone()] } else { &[] };
-                let at = I::Quad::load(p[i].as_ptr());
-                let mut sum = I::Quad::zero();
-                for (k, pair) in pairs[of_i].iter().enumerate() {
-                    let j = pair.j();
-                    let g = pair.g::<I>();
-                    let along = at.sub(I::Quad::load(p[j].as_ptr())).mul(g).total();
-                    let mut factor = minus_drag.mul(along);
+            let (minus_noise, first) = (I::Quad::splat(-noise), pairs.as_ptr());
+            let (mut next, mut xi) = (first, xi.as_ptr());
+            for (i, end) in start.iter().skip(1).enumerate() {
+                let end = first.add(*end as usize);
+                let at = I::Quad::load(p.add(i).cast());
+                let mut sum = I::Quad::load(sums.add(i).cast());
+                // Two pairs at once share the additions across elements.
+                while next.wrapping_add(1) < end {
+                    let (a, b) = (&*next, &*next.add(1));
+                    let (j_a, j_b) = (a.j(), b.j());
+                    let (g_a, g_b) = (a.g::<I>(), b.g::<I>());
+                    let d_a = at.sub(I::Quad::load(p.add(j_a).cast()));
+                    let d_b = at.sub(I::Quad::load(p.add(j_b).cast()));
+                    let [mut along_a, mut along_b] = d_a.mul(g_a).totals(d_b.mul(g_b));
                     if NOISE {
-                        factor = factor.add(I::Quad::splat(terms.noise * f64::from(noises[k])));
+                        along_a = I::Quad::splat_f32(*xi).mul_add(minus_noise, along_a);
+                        along_b = I::Quad::splat_f32(*xi.add(1)).mul_add(minus_noise, along_b);
+                        xi = xi.add(2);
                     }
-                    let push = factor.mul(g);
-                    sum = sum.add(push);
-                    let to = sums[j].as_mut_ptr();
-                    I::Quad::load(to).sub(push).store(to);
+                    sum = along_a.mul_add(g_a, sum);
+                    push_away::<I>(along_a, g_a, sums.add(j_a));
+                    sum = along_b.mul_add(g_b, sum);
+                    push_away::<I>(along_b, g_b, sums.add(j_b));
+                    next = next.add(2);
                 }
-                let to = sums[i].as_mut_ptr();
-                I::Quad::load(to).add(sum).store(to);
+                if next < end {
+                    let (j, g) = ((*next).j(), (*next).g::<I>());
+                    let d = at.sub(I::Quad::load(p.add(j).cast()));
+                    let [mut along, _] = d.mul(g).totals(I::Quad::zero());
+                    if NOISE {
+                        along = I::Quad::splat_f32(*xi).mul_add(minus_noise, along);
+                        xi = xi.add(1);
+                    }
+                    sum = along.mul_add(g, sum);
+                    push_away::<I>(along, g, sums.add(j));
+                    next = next.add(1);
+                }
+                sum.store(sums.add(i).cast());
             }
         }
     }
+}
+
+/// Subtracts `along g` from the sum of a particle.
+///
+/// # Safety
+/// The caller fulfils the contract of `simd`.
+#[inline(always)]
+unsafe fn push_away<I: Isa>(along: I::Quad, g: I::Quad, sum: *mut Wide) {
+    // SAFETY: the caller promises a particle.
+    unsafe { along.neg_mul_add(g, I::Quad::load(sum.cast())).store(sum.cast()) };
 }

@@ -183,13 +183,18 @@ pub trait Quad: Copy {
     unsafe fn add(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
+    /// Computes `self · a + b`, perhaps rounded once only.
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self;
+    /// Computes `b − self · a`, perhaps rounded once only.
+    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self;
+    unsafe fn splat_f32(x: f32) -> Self;
     unsafe fn load_f32(p: *const f32) -> Self;
     /// Loads the first three of four readable numbers, and sets the fourth to 0.
     unsafe fn load_three_f32(p: *const f32) -> Self;
     /// Loads the first three of four readable numbers, and sets the fourth to 0.
     unsafe fn load_three(p: *const f64) -> Self;
-    /// The sum `(x₀ + x₂) + (x₁ + x₃)`, in all four elements.
-    unsafe fn total(self) -> Self;
+    /// The sum `(x₀ + x₁) + (x₂ + x₃)` of either, in all four elements.
+    unsafe fn totals(self, other: Self) -> [Self; 2];
 }
 
 /// An instruction set.

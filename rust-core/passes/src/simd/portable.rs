@@ -319,6 +319,18 @@ impl Quad for Four {
         self
     }
     #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { self.mul(a).add(b) }
+    }
+    #[inline(always)]
+    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { b.sub(self.mul(a)) }
+    }
+    #[inline(always)]
+    unsafe fn splat_f32(x: f32) -> Self {
+        Four([f64::from(x); 4])
+    }
+    #[inline(always)]
     unsafe fn load_f32(p: *const f32) -> Self {
         let row = unsafe { p.cast::<[f32; 4]>().read_unaligned() };
         Four([row[0] as f64, row[1] as f64, row[2] as f64, row[3] as f64])
@@ -334,9 +346,8 @@ impl Quad for Four {
         Four([x, y, z, 0.0])
     }
     #[inline(always)]
-    unsafe fn total(self) -> Self {
-        let [a, b, c, d] = self.0;
-        Four([(a + c) + (b + d); 4])
+    unsafe fn totals(self, other: Self) -> [Self; 2] {
+        [self, other].map(|Four([a, b, c, d])| Four([(a + b) + (c + d); 4]))
     }
 }
 

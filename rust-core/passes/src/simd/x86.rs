@@ -37,6 +37,18 @@ impl Quad for Quad4 {
         unsafe { Quad4(_mm256_mul_pd(self.0, other.0)) }
     }
     #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Quad4(_mm256_fmadd_pd(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Quad4(_mm256_fnmadd_pd(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn splat_f32(x: f32) -> Self {
+        unsafe { Quad4(_mm256_cvtps_pd(_mm_set1_ps(x))) }
+    }
+    #[inline(always)]
     unsafe fn load_f32(p: *const f32) -> Self {
         unsafe { Quad4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
     }
@@ -49,10 +61,12 @@ impl Quad for Quad4 {
         unsafe { Quad4(_mm256_blend_pd::<0b1000>(_mm256_loadu_pd(p), _mm256_setzero_pd())) }
     }
     #[inline(always)]
-    unsafe fn total(self) -> Self {
+    unsafe fn totals(self, other: Self) -> [Self; 2] {
         unsafe {
-            let halves = _mm256_add_pd(self.0, _mm256_permute2f128_pd::<0x01>(self.0, self.0));
-            Quad4(_mm256_add_pd(halves, _mm256_permute_pd::<0b0101>(halves)))
+            // Sums of two elements, of both in turn.
+            let halves = _mm256_hadd_pd(self.0, other.0);
+            let sums = _mm256_add_pd(halves, _mm256_permute2f128_pd::<0x01>(halves, halves));
+            [Quad4(_mm256_movedup_pd(sums)), Quad4(_mm256_permute_pd::<0b1111>(sums))]
         }
     }
 }

@@ -9,7 +9,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::{WeightTables, pairs_of_each};
+use psidpd_passes::plane::list::{ListTerms, WeightTables, pairs_of_each};
 use std::num::NonZeroUsize;
 
 /// Finds the pairs of a fluid in boxes at least twice as wide as their range.
@@ -19,7 +19,7 @@ pub struct SweepPairs {
     dimensions: usize,
     range: f64,
     /// Weights greater than 0 within the range.
-    tables: WeightTables,
+    terms: ListTerms,
     kinds: Vec<i32>,
     tags: Vec<i32>,
     planes: Vec<PlanePairs>,
@@ -42,11 +42,14 @@ impl SweepPairs {
             pool: Pool::new(NonZeroUsize::MIN),
             dimensions: fluid.dimensions,
             range,
-            tables: WeightTables {
-                species,
-                amplitude: SpeciesPairTable::of(species * species, 1.0),
-                inverse_range: SpeciesPairTable::of(species * species, inverse_range as f32),
-                exponent: Exponent::One,
+            terms: ListTerms {
+                tables: WeightTables {
+                    species,
+                    amplitude: SpeciesPairTable::of(species * species, 1.0),
+                    inverse_range: SpeciesPairTable::of(species * species, inverse_range as f32),
+                    exponent: Exponent::One,
+                },
+                with_stretch: false,
             },
             kinds: (0..species as i32).collect(),
             tags: Vec::new(),
@@ -58,7 +61,7 @@ impl SweepPairs {
     /// Adds the pairs of particles at `x`, and returns whether it could: it cannot if a particle may be
     /// near two images of another, or if a position is not finite.
     pub fn find(&mut self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox, pairs: &mut Pairs) -> bool {
-        let SweepPairs { lists, pool, dimensions, range, tables, kinds, tags, planes, places } = self;
+        let SweepPairs { lists, pool, dimensions, range, terms, kinds, tags, planes, places } = self;
         let is_periodic = [0, 1, 2].map(|k| domain.periodic()[k] && k < *dimensions);
         let search_range = *range * (1.0 + MARGIN);
         let is_wide = |k: usize| !is_periodic[k] || domain.height(k) > 2.0 * search_range;
@@ -69,7 +72,7 @@ impl SweepPairs {
         tags.iter_mut().zip(1..).for_each(|(tag, k)| *tag = k);
         let particles = Particles { x, tag: tags, kind: species, owned: x.len() };
         let around = Around { domain, images: &[] };
-        if lists.find(pool, around, &particles, kinds, tables, [*range, MARGIN], false, planes).is_err() {
+        if lists.find(pool, around, &particles, kinds, terms, [*range, MARGIN], planes).is_err() {
             return false;
         }
         let copies = planes.last().map_or(0..0, |last| last.next.clone());

@@ -37,6 +37,7 @@ use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
+use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::{Tally, Want};
 use region::{can_stretch, is_open, region};
@@ -66,6 +67,10 @@ pub struct Sweep {
     want: Want,
     times: Times,
     ready: bool,
+    /// The pairs that the next evaluation is asked to list.
+    asked: Option<ListTerms>,
+    /// Whether the last evaluation has listed pairs, which nobody has taken.
+    has_listed: bool,
 }
 
 /// A workspace in mixed or in double precision.
@@ -133,6 +138,8 @@ impl Sweep {
             want: Want::FORCES,
             times: Times::default(),
             ready: false,
+            asked: None,
+            has_listed: false,
         }
     }
 
@@ -279,16 +286,50 @@ impl Sweep {
         let input =
             Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
                 .excluding(&self.exclusions);
+        let can_list = self.settings.precision == Precision::Mixed
+            && input.thermostat.is_none()
+            && self.exclusions.is_empty();
+        let listed = self.asked.take().filter(|_| can_list);
+        self.has_listed = false;
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
         with!(&mut self.workspace, m => {
+            m.listed = listed;
             let mut since = Instant::now();
             let (geometry, grid) = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
-            m.run_all(pool, plan, &input, out, times)
-        })
+            m.run_all(pool, plan, &input, out, times)?;
+            self.has_listed = m.listed.is_some();
+        });
+        Ok(())
+    }
+
+    /// Asks the next evaluation to list pairs for a thermostat, with the geometry that it computes anyway. It lists them
+    /// in mixed precision, without excluded pairs, and if drag and noise are not among the forces.
+    pub(super) fn ask_for_pairs(&mut self, terms: Option<ListTerms>) {
+        (self.asked, self.has_listed) = (terms, false);
+    }
+
+    /// Moves the pairs that the last evaluation has listed, once; returns whether it has listed any. Particles of a cell
+    /// are in the order of the host.
+    pub(super) fn take_pairs<T: AsMut<PlanePairs> + Default>(
+        &mut self,
+        lists: &mut PairLists,
+        planes: &mut Vec<T>,
+    ) -> bool {
+        let has_listed = std::mem::take(&mut self.has_listed);
+        if has_listed {
+            with!(&mut self.workspace, m => {
+                let (cells, ghosts) = m.sorted();
+                lists.follow(cells, ghosts);
+                planes.resize_with(cells.grid.planes, T::default);
+                planes.iter_mut().enumerate().for_each(|(k, plane)| plane.as_mut().lie_in(cells, k));
+                m.move_lists(planes.iter_mut().map(|plane| &mut plane.as_mut().list));
+            });
+        }
+        has_listed
     }
 
     /// Checks the input of an evaluation, and stores its sizes; returns the thermostat, if it acts.

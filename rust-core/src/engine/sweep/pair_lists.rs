@@ -14,7 +14,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::{ListBuffers, ListInputs, PairList, WeightTables, list_pairs};
+use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, PairList, list_pairs};
 use psidpd_passes::tally::Want;
 use psidpd_threads::{Pool, part};
 use std::ops::Range;
@@ -26,6 +26,17 @@ pub struct PlanePairs {
     pub own: Range<usize>,
     pub next: Range<usize>,
     pub list: PairList,
+}
+
+impl PlanePairs {
+    /// Sets the particles of a plane of cells.
+    pub fn lie_in(&mut self, cells: &CellOrder, plane: usize) {
+        let (next, count) = (plane + 1, cells.grid.planes);
+        let next = if next < count { next } else { 0 };
+        let follows = next > 0 || cells.is_periodic();
+        self.own = cells.particles_of(&(plane..plane + 1));
+        self.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
+    }
 }
 
 impl AsMut<PlanePairs> for PlanePairs {
@@ -104,9 +115,8 @@ impl PairLists {
         Around { domain, images }: Around,
         particles: &Particles,
         species_of_kind: &[i32],
-        tables: &WeightTables,
+        terms: &ListTerms,
         [range, margin]: [f64; 2],
-        with_stretch: bool,
         planes: &mut Vec<T>,
     ) -> Result<(), EngineError> {
         let input = Input::new(particles, images, &[], species_of_kind, &[], None, Want::FORCES);
@@ -120,7 +130,7 @@ impl PairLists {
         }
         self.cells.sort(pool, set, geometry, grid, &input)?;
         self.sort_by_tags(pool, particles.tag);
-        self.fill(pool, &input, tables.species > 1);
+        self.fill(pool, &input, terms.tables.species > 1);
         planes.resize_with(grid.planes, T::default);
         self.buffers.resize_with(pool.threads(), ListBuffers::default);
         let cells = &self.cells;
@@ -138,10 +148,10 @@ impl PairLists {
                 excluded: Excluded::default(),
             },
             packed: shared.packed,
-            tables,
-            with_stretch,
+            terms,
         };
-        let (count, threads) = (grid.planes, pool.threads());
+        let threads = pool.threads();
+        let count = planes.len();
         let mut rest = planes.iter_mut().enumerate();
         let mut work: Vec<_> = self
             .buffers
@@ -154,15 +164,20 @@ impl PairLists {
         pool.each(&mut work, |(buffers, planes)| {
             for (number, plane) in planes {
                 let plane = (*plane).as_mut();
-                plane.own = cells.particles_of(&(*number..*number + 1));
-                let next = if *number + 1 < count { *number + 1 } else { 0 };
-                let follows = *number + 1 < count || cells.is_periodic();
-                plane.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
+                plane.lie_in(cells, *number);
                 // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
                 unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.list) };
             }
         });
         Ok(())
+    }
+
+    /// Takes over the order of a sweep, with the flags of its ghosts, whose planes have their own pairs.
+    pub fn follow(&mut self, cells: &CellOrder, ghosts: &[bool]) {
+        self.cells.order.clone_from(&cells.order);
+        self.particles.ghost.clear();
+        self.particles.ghost.extend_from_slice(ghosts);
+        self.find_places(cells.all);
     }
 
     /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag
@@ -201,9 +216,14 @@ impl PairLists {
                 order[from - first..to - first].sort_unstable_by_key(|k| tags[*k as usize]);
             }
         });
+        self.find_places(tags.len());
+    }
+
+    /// Finds the sorted index of each of the host's particles.
+    fn find_places(&mut self, all: usize) {
         self.place.clear();
-        self.place.resize(tags.len(), NOWHERE);
-        for (sorted, k) in order.iter().enumerate() {
+        self.place.resize(all, NOWHERE);
+        for (sorted, k) in self.cells.order.iter().enumerate() {
             self.place[*k as usize] = sorted as u32;
         }
     }

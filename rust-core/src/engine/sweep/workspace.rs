@@ -37,6 +37,7 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::pair_batch::inputs::PairInputs;
 use psidpd_passes::plane::data::PassData;
+use psidpd_passes::plane::list::{ListTerms, PairList};
 use psidpd_threads::Pool;
 use scheduler::{PassInput, Scheduler};
 use slopes::SlopeArrays;
@@ -56,6 +57,8 @@ pub struct Workspace<P: PairPrecision> {
     threads: Vec<ThreadState<P::Scalar>>,
     /// Noise and `dt^{−1/2}` of the present evaluation.
     thermostat: Option<(PairNoise, f64)>,
+    /// The pairs that the present evaluation lists.
+    pub listed: Option<ListTerms>,
     totals: bool,
 }
 
@@ -75,6 +78,7 @@ impl<P: PairPrecision> Workspace<P> {
             results: PlaneResults::default(),
             threads,
             thermostat: None,
+            listed: None,
             totals: false,
         }
     }
@@ -160,8 +164,18 @@ impl<P: PairPrecision> Workspace<P> {
         units: &[Range<usize>],
         work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>]),
     ) {
-        let Workspace { fluid, order, particles, excluded, accumulators, slopes, results, threads, .. } =
-            self;
+        let Workspace {
+            fluid,
+            order,
+            particles,
+            excluded,
+            accumulators,
+            slopes,
+            results,
+            threads,
+            listed,
+            ..
+        } = self;
         let (particles, excluded) = (&particles.share(), excluded.share());
         let (slopes, sums) = (slopes.share(), accumulators.share());
         let SharedParticles { x, fixed16_scale, fixed16, packed, species, ghosts } = *particles;
@@ -181,11 +195,32 @@ impl<P: PairPrecision> Workspace<P> {
             },
             inputs: PairInputs { geometry, terms, thermostat, packed, species, ghosts },
             slopes: slopes.slopes,
+            listed: listed.as_ref(),
         };
         let passes = Passes::new(fluid.set, &fluid.terms, self.totals);
         let mut slabs = results.split(order, units, fluid.width(), threads);
         let scheduler = &Scheduler { fluid, passes, order, data, particles, slopes, sums };
         work(scheduler, &mut slabs);
+    }
+
+    /// The order of the particles, and their flags of ghosts, if there are any.
+    pub fn sorted(&self) -> (&CellOrder, &[bool]) {
+        (&self.order, &self.particles.ghost)
+    }
+
+    /// Moves the pairs that the last evaluation has listed to the lists of the planes, whose memory it keeps for the next.
+    pub fn move_lists<'a>(&mut self, lists: impl Iterator<Item = &'a mut PairList>) {
+        let Workspace { order, threads, .. } = self;
+        let mut lists: Vec<_> = lists.collect();
+        for (units, state) in order.thread_slabs(threads.len()).iter().zip(threads) {
+            for (plane, found) in order.planes_of(units).zip(&mut state.lists) {
+                // A plane may be in several slabs.
+                match found.first == order.plane_start(plane) {
+                    true => std::mem::swap(lists[plane], found),
+                    false => lists[plane].append(found),
+                }
+            }
+        }
     }
 
     /// Adds the times of the caller's thread; fails for ψ or a force that is not finite, and names the lowest tag.

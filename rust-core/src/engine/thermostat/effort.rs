@@ -9,14 +9,17 @@ pub struct Effort {
     pub iterations: u64,
     /// The most iterations of one update.
     pub most: usize,
+    /// Updates of pairs that forces had listed.
+    pub listed: u64,
     /// Updates that ended before they were accurate, because of too strong drag.
     pub inaccurate: u64,
 }
 
 impl Effort {
     /// Adds an update.
-    pub(super) fn add(&mut self, iterations: usize, inaccurate: bool) {
+    pub(super) fn add(&mut self, iterations: usize, listed: bool, inaccurate: bool) {
         self.updates += 1;
+        self.listed += u64::from(listed);
         self.iterations += iterations as u64;
         self.most = self.most.max(iterations);
         self.inaccurate += u64::from(inaccurate);
@@ -33,6 +36,7 @@ impl std::ops::AddAssign for Effort {
         self.updates += other.updates;
         self.iterations += other.iterations;
         self.most = self.most.max(other.most);
+        self.listed += other.listed;
         self.inaccurate += other.inaccurate;
     }
 }

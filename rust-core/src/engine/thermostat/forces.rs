@@ -1,7 +1,7 @@
 //! Drag and noise as forces on the particles of a host.
 
 use super::PairThermostat;
-use super::pass::{Terms, Wide, add_to_host, virial};
+use super::pass::{Wide, add_to_host, virial};
 use crate::engine::sweep::Pool;
 
 impl PairThermostat {
@@ -17,14 +17,16 @@ impl PairThermostat {
     ) -> [f64; 6] {
         let PairThermostat { planes, lists, set, sums, kt, dt, .. } = self;
         let factor = 2.0 / *dt;
-        let noise = if noise { factor * kt.sqrt() } else { 0.0 };
-        let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
+        let noise = if noise { kt.sqrt() } else { 0.0 };
         sums.gather(pool, lists.order(), v);
-        sums.compute(pool, *set, planes, terms);
-        let virial = virial(pool, planes, sums, lists.ghosts(), terms);
+        if !drag {
+            sums.p.fill(Wide::ZERO);
+        }
+        sums.compute(pool, *set, planes, noise);
+        let virial = virial(pool, planes, sums, lists.ghosts(), noise, factor);
         // Frozen particles receive forces like others; the integrator does not move them.
         let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
-        add_to_host(pool, lists.place(), &all, 1.0, force);
+        add_to_host(pool, lists.place(), &all, -factor, force);
         virial
     }
 }

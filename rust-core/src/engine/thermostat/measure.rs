@@ -96,7 +96,7 @@ impl Plane {
     ) {
         let first = self.found.own.start;
         let x = &places.x()[first..];
-        let PairList { start, pairs, exact, stretch } = &mut self.found.list;
+        let PairList { start, pairs, tags, exact, stretch, .. } = &mut self.found.list;
         exact.reserve(pairs.len());
         // The row of the next pair, and the number of kept pairs.
         let (mut i, mut kept) = (0, 0);
@@ -127,6 +127,7 @@ impl Plane {
                     continue;
                 }
                 pairs[kept] = pair;
+                tags.iter_mut().for_each(|tags| tags[kept] = tags[k]);
                 kept += 1;
                 exact.push(ExactPair { g: [factor * x[n], factor * y[n], factor * z[n]], j: pair.j.into() });
                 if with_stretch {
@@ -136,6 +137,7 @@ impl Plane {
         }
         start[i + 1..].fill(kept as u32);
         pairs.truncate(kept);
+        tags.iter_mut().for_each(|tags| tags.truncate(kept));
     }
 }
 

@@ -23,7 +23,7 @@
 
 use super::PairThermostat;
 use super::particle_loops::{Advance, Finish, Multiply, Start};
-use super::pass::{Sums, Terms, Wide, add_to_host, virial};
+use super::pass::{Sums, Wide, add_to_host, virial};
 use super::progress::Progress;
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
@@ -51,7 +51,7 @@ struct Share<'a> {
     /// Sums over pairs, of the plane itself and of the plane below.
     image: &'a mut [Wide],
     below: &'a [Wide],
-    mass: &'a [f64],
+    inertia: &'a [f64],
     inverse_mass: &'a [f64],
     residual: &'a mut [Wide],
     solution: &'a mut [Wide],
@@ -69,7 +69,7 @@ impl PairThermostat {
         pool: &Pool,
         work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let PairThermostat { planes, set, mass, inverse_mass, sums, residual, solution, .. } = self;
+        let PairThermostat { planes, set, inertia, inverse_mass, sums, residual, solution, .. } = self;
         let Sums { p, of_plane } = sums;
         let mut rest = [&mut p[..], residual, solution];
         let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
@@ -77,8 +77,8 @@ impl PairThermostat {
             .map(|((image, below), plane)| {
                 let own = plane.found.own.clone();
                 let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
-                let (mass, inverse_mass) = (&mass[own.clone()], &inverse_mass[own]);
-                (Share { p, image, below, mass, inverse_mass, residual, solution }, [0.0; 2])
+                let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
+                (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
             })
             .collect();
         pool.each(&mut shares, |(share, sums)| *sums = work(share, *set));
@@ -116,9 +116,8 @@ impl PairThermostat {
         for vectors in [residual, solution] {
             vectors.resize(lists.order().len(), Wide::ZERO);
         }
-        let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
         sums.gather(pool, lists.order(), v);
-        sums.compute(pool, *set, planes, start);
+        sums.compute(pool, *set, planes, if noise { kt.sqrt() } else { 0.0 });
         let [first, _] =
             self.on_planes(pool, |Share { p, image: own, below, inverse_mass, residual, .. }, set| {
                 [vectors::run(set, Start { inverse_mass, own, below, residual, p }), 0.0]
@@ -129,9 +128,9 @@ impl PairThermostat {
     /// Computes the image of the direction, `A p` with `A = M + K`, and returns `p · A p` and
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
-        self.sums.compute(pool, self.set, &self.planes, Terms { noise: 0.0, drag: -1.0 });
-        self.on_planes(pool, |Share { p, image, below, mass, inverse_mass, .. }, set| {
-            vectors::run(set, Multiply { p, mass, inverse_mass, image, below })
+        self.sums.compute(pool, self.set, &self.planes, 0.0);
+        self.on_planes(pool, |Share { p, image, below, inertia, inverse_mass, .. }, set| {
+            vectors::run(set, Multiply { p, inertia, inverse_mass, image, below })
         })
     }
 
@@ -156,7 +155,7 @@ impl PairThermostat {
         if !goes_on {
             let inaccurate =
                 next.is_nan() || next > progress.enough || progress.tolerance < FINEST * progress.drag;
-            self.effort.add(progress.iterations, inaccurate);
+            self.effort.add(progress.iterations, self.are_listed, inaccurate);
         }
         let rest = if self.progress.drag < STRONG { 1.0 } else { 0.0 };
         let is_first = self.progress.iterations == 1;
@@ -190,10 +189,9 @@ impl PairThermostat {
     /// The virial of drag at the velocities `v`, and of noise.
     pub(super) fn virial_at(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> [f64; 6] {
         let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
-        let scale = 2.0 / *dt;
-        let noise = if noise { scale * kt.sqrt() } else { 0.0 };
+        let noise = if noise { kt.sqrt() } else { 0.0 };
         sums.gather(pool, lists.order(), v);
         sums.close(planes);
-        virial(pool, planes, sums, lists.ghosts(), Terms { noise, drag: scale })
+        virial(pool, planes, sums, lists.ghosts(), noise, 2.0 / *dt)
     }
 }

@@ -11,18 +11,20 @@
 //! derive from the same `g`, its single precision in mixed precision changes the friction by rounding
 //! errors, but not the equilibrium.
 //!
-//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep, [`PairThermostat::draw`]
-//! draws their noise, and [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once,
-//! `sequential` pair by pair. Results depend on positions, velocities and tags, and neither on the
-//! order of particles in memory nor on the number of threads. On a rank with ghosts the midpoint rule
-//! exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of [`Update`]
-//! and its rule in one of these files.
+//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep or, as `of_forces` explains, those of the last
+//! forces; [`PairThermostat::draw`] draws their noise, and [`PairThermostat::act`] changes velocities: `midpoint` for all
+//! pairs at once, `sequential` pair by pair. Results depend on positions, velocities and tags, not on the number of
+//! threads, and by rounding on the order of particles in memory if pairs are those of the last forces. On a rank with
+//! ghosts the midpoint rule exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of
+//! [`Update`] and its rule in one of these files.
 
 mod bodies;
 mod effort;
 mod forces;
+mod listed;
 mod measure;
 mod midpoint;
+mod of_forces;
 mod particle_loops;
 mod pass;
 mod planes;
@@ -45,11 +47,13 @@ use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, Places, Pool};
+use listed::Listed;
 use pass::{Sums, Wide};
 use planes::Plane;
 use progress::Progress;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
+use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
 use round::Round;
 
@@ -84,11 +88,9 @@ pub struct PairThermostat {
     /// Whether pairs are computed in double precision.
     is_exact: bool,
     places: Places,
-    /// Mass of each sorted particle.
-    mass: Vec<f64>,
+    /// Mass of each sorted particle, 0 where it is infinite, and its inverse.
+    inertia: Vec<f64>,
     inverse_mass: Vec<f64>,
-    /// Tag of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
-    tag: Vec<u32>,
     sums: Sums,
     /// Residual and solution of each sorted particle.
     residual: Vec<Wide>,
@@ -99,6 +101,10 @@ pub struct PairThermostat {
     effort: Effort,
     /// Whether distances are stored.
     wants_virial: bool,
+    /// The pairs that an engine has listed, for a search that follows.
+    listed: Option<Listed>,
+    /// Whether the present pairs are those.
+    are_listed: bool,
     /// State of a solution in rounds with other ranks.
     round: Round,
     /// Squared norm of the first residual of this rank.
@@ -128,9 +134,8 @@ impl PairThermostat {
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
             places: Places::default(),
-            mass: Vec::new(),
+            inertia: Vec::new(),
             inverse_mass: Vec::new(),
-            tag: Vec::new(),
             sums: Sums::default(),
             residual: Vec::new(),
             solution: Vec::new(),
@@ -138,6 +143,8 @@ impl PairThermostat {
             progress: Progress::default(),
             effort: Effort::default(),
             wants_virial: false,
+            listed: None,
+            are_listed: false,
             round: Round::default(),
             first: 0.0,
             noise: [PairNoise::default(); 2],
@@ -178,32 +185,42 @@ impl PairThermostat {
         mass: impl Fn(usize) -> f64 + Sync,
     ) -> Result<(), EngineError> {
         (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
-        let margin = if self.is_exact { MARGIN } else { 0.0 };
-        let weights = planes::weights(&self.plan, dt, margin);
-        let range = [self.plan.longest, margin];
-        let listed_virial = virial && !self.is_exact;
-        let PairThermostat { lists, planes, .. } = self;
-        lists.find(pool, around, particles, species_of_kind, &weights, range, listed_virial, planes)?;
-        if self.is_exact {
-            self.measure(pool, around.domain, particles, species_of_kind);
+        let listed = Listed { dt, virial, particles: particles.x.len() };
+        self.are_listed = self.listed.take().is_some_and(|there| there.serves(listed));
+        if !self.are_listed {
+            let terms = self.terms(dt, virial);
+            let range = [self.plan.longest, self.margin()];
+            let PairThermostat { lists, planes, .. } = self;
+            lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
+            if self.is_exact {
+                self.measure(pool, around.domain, particles, species_of_kind);
+            }
         }
-        let PairThermostat { lists, planes, tag, .. } = self;
-        let order = lists.order();
-        pass::fill(pool, tag, order, |k| particles.tag[k] as u32);
-        if let Some(last) = planes.last() {
-            tag.extend_from_within(last.found.next.clone());
-        }
-        pass::fill(pool, &mut self.mass, order, &mass);
+        let order = self.lists.order();
         pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
+        let inertia =
+            self.inverse_mass.iter().map(|inverse| if *inverse > 0.0 { inverse.recip() } else { 0.0 });
+        self.inertia.clear();
+        self.inertia.extend(inertia);
         Ok(())
+    }
+
+    /// Fraction by which the range of the search is extended.
+    fn margin(&self) -> f64 {
+        if self.is_exact { MARGIN } else { 0.0 }
+    }
+
+    /// The pairs for a time `dt`, with or without their distances.
+    fn terms(&self, dt: f64, virial: bool) -> ListTerms {
+        let with_stretch = virial && !self.is_exact;
+        ListTerms { tables: planes::weights(&self.plan, dt, self.margin()), with_stretch }
     }
 
     /// Draws the noise of the pairs of the last search.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
-        let (tags, set) = (&self.tag, self.set);
-        pool.each(&mut self.planes, |plane| plane.draw(set, tags, noise[0], law));
+        pool.each(&mut self.planes, |plane| plane.draw(noise[0], law));
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
@@ -221,7 +238,7 @@ impl PairThermostat {
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let moving = self.mass.iter().filter(|m| m.is_finite()).count();
+        let moving = self.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
@@ -229,7 +246,7 @@ impl PairThermostat {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.found.list.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
+                let inverse = self.inverse_mass[i] + self.inverse_mass[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     squares += along * along / inverse;

@@ -3,7 +3,7 @@
 use super::pass::Wide;
 use crate::engine::vectors::Loop;
 
-/// Sets the residual to the sum of `own` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
+/// Sets the residual to the negative sum of `own` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
 pub struct Start<'a> {
     pub inverse_mass: &'a [f64],
     pub own: &'a [Wide],
@@ -22,7 +22,7 @@ impl Loop for Start<'_> {
         let mut sum = Wide::ZERO;
         let particles = residual.iter_mut().zip(p).zip(own).zip(inverse_mass);
         let each = |(((r, p), own), inverse): (((&mut Wide, &mut Wide), &Wide), &f64), below: Wide| {
-            *r = plus(*own, 1.0, below);
+            *r = times(Wide([-1.0; 4]), plus(*own, 1.0, below));
             *p = times(Wide([*inverse; 4]), *r);
             sum = plus(sum, 1.0, times(*p, *r));
         };
@@ -35,8 +35,8 @@ impl Loop for Start<'_> {
 /// image `(M + K) p`; returns `p · image` and `image · M⁻¹ image` of the particles that are not frozen.
 pub struct Multiply<'a> {
     pub p: &'a [Wide],
-    /// Mass of each particle; infinite if it is frozen.
-    pub mass: &'a [f64],
+    /// Mass of each particle; 0 if it is frozen.
+    pub inertia: &'a [f64],
     pub inverse_mass: &'a [f64],
     pub image: &'a mut [Wide],
     /// Contributions of the plane below; empty if it has no pairs with these particles.
@@ -48,14 +48,15 @@ impl Loop for Multiply<'_> {
 
     #[inline(always)]
     fn run(self) -> [f64; 2] {
-        let Multiply { p, mass, inverse_mass, image, below } = self;
+        let Multiply { p, inertia, inverse_mass, image, below } = self;
         let (mut curvature, mut square) = (Wide::ZERO, Wide::ZERO);
-        let particles = image.iter_mut().zip(p).zip(mass).zip(inverse_mass);
-        let each = |(((image, p), m), inverse): (((&mut Wide, &Wide), &f64), &f64), below: Wide| {
-            let (inertia, counts) = if m.is_finite() { (*m, 1.0) } else { (0.0, 0.0) };
-            *image = plus(plus(*image, 1.0, below), inertia, *p);
-            curvature = plus(curvature, counts, times(*p, *image));
-            square = plus(square, *inverse, times(*image, *image));
+        let particles = image.iter_mut().zip(p).zip(inertia).zip(inverse_mass);
+        let each = |(((image, p), inertia), inverse): (((&mut Wide, &Wide), &f64), &f64), below: Wide| {
+            let momentum = times(Wide([*inertia; 4]), *p);
+            *image = plus(plus(*image, 1.0, below), 1.0, momentum);
+            let change = times(Wide([*inverse; 4]), *image);
+            curvature = plus(curvature, 1.0, times(momentum, change));
+            square = plus(square, 1.0, times(*image, change));
         };
         with_below(particles, below, each);
         [total(curvature), total(square)]

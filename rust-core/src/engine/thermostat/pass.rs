@@ -1,4 +1,4 @@
-//! A pass over the pairs, which computes `Σ_j g (a ξ − b g·(p_i − p_j))` for every particle `i`.
+//! A pass over the pairs, which computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`.
 //!
 //! Each plane adds to its own particles and to those of the next in a buffer of its own, so that the
 //! order of each sum is fixed, whichever thread computes it.
@@ -7,8 +7,8 @@ use super::planes::Plane;
 use crate::engine::sweep::{Pool, part};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::pairs_of_each;
+pub use psidpd_passes::plane::pair_sums::Wide;
 use psidpd_passes::plane::pair_sums::add_pairs;
-pub use psidpd_passes::plane::pair_sums::{Terms, Wide};
 
 /// The vectors of the particles, and the sums over their pairs.
 #[derive(Debug, Clone, Default)]
@@ -35,7 +35,7 @@ impl Sums {
         self.p.extend_from_within(last.found.next.clone());
     }
 
-    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[Plane], terms: Terms) {
+    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[Plane], noise: f64) {
         self.close(planes);
         let Sums { p, of_plane } = self;
         of_plane.resize_with(planes.len(), Vec::new);
@@ -44,9 +44,9 @@ impl Sums {
         pool.each(&mut work, |(plane, sums)| {
             let Plane { found, xi, .. } = plane;
             let count = found.own.len() + found.next.len();
-            sums.clear();
             sums.resize(count, Wide::ZERO);
-            add_pairs(set, &found.list, xi, terms, &p[found.own.start..][..count], sums);
+            // SAFETY: the pairs of a plane are those of its own particles with each other and with the next.
+            unsafe { add_pairs(set, &found.list, xi, noise, &p[found.own.start..][..count], sums) };
         });
     }
 
@@ -90,9 +90,9 @@ fn below(planes: &[Plane], number: usize) -> Option<(usize, usize)> {
 }
 
 impl Plane {
-    /// Virial `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with
+    /// Virial `Σ r_ij ⊗ F_ij` of the opposite, `g (a ξ − g·(p_i − p_j))`: xx, yy, zz, xy, xz, yz; half of it for pairs with
     /// a ghost. `ghosts` may be empty.
-    pub fn virial(&self, p: &[Wide], ghosts: &[bool], Terms { noise, drag }: Terms) -> [f64; 6] {
+    pub fn virial(&self, p: &[Wide], ghosts: &[bool], noise: f64) -> [f64; 6] {
         let ghosts = ghosts.get(self.found.own.start..).unwrap_or_default();
         let is_ghost = |k: usize| ghosts.get(k).is_some_and(|ghost| *ghost);
         let p = &p[self.found.own.start..];
@@ -108,7 +108,7 @@ impl Plane {
                 let xi = self.xi.get(k).map_or(0.0, |xi| f64::from(*xi));
                 let share = if is_ghost(i) || is_ghost(pair.j as usize) { 0.5 } else { 1.0 };
                 let stretch = share * self.found.list.stretch[k];
-                add_virial(&mut virial, g, (noise * xi - drag * along) * stretch);
+                add_virial(&mut virial, g, (noise * xi - along) * stretch);
             }
         }
         virial
@@ -122,16 +122,23 @@ pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
     }
 }
 
-/// The virial of all planes, in their order.
-pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, ghosts: &[bool], terms: Terms) -> [f64; 6] {
+/// The virial of all planes, in their order, times `factor`.
+pub fn virial(
+    pool: &Pool,
+    planes: &[Plane],
+    sums: &Sums,
+    ghosts: &[bool],
+    noise: f64,
+    factor: f64,
+) -> [f64; 6] {
     if planes.iter().all(|plane| plane.found.list.stretch.is_empty()) {
         return [0.0; 6];
     }
     let mut parts: Vec<_> = planes.iter().map(|plane| (plane, [0.0; 6])).collect();
-    pool.each(&mut parts, |(plane, virial)| *virial = plane.virial(&sums.p, ghosts, terms));
+    pool.each(&mut parts, |(plane, virial)| *virial = plane.virial(&sums.p, ghosts, noise));
     let mut sum = [0.0; 6];
     for (_, virial) in parts {
-        (0..6).for_each(|c| sum[c] += virial[c]);
+        (0..6).for_each(|c| sum[c] += factor * virial[c]);
     }
     sum
 }

@@ -2,10 +2,8 @@
 
 use crate::engine::plan::ThermostatPlan;
 use crate::engine::sweep::PlanePairs;
-use crate::engine::vectors::{self, Loop};
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
-use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::plane::list::{PairList, WeightTables, pairs_of_each};
 use std::ops::Range;
@@ -16,8 +14,6 @@ pub struct Plane {
     pub found: PlanePairs,
     /// Noise of each pair.
     pub xi: Vec<f32>,
-    /// Tags of both particles of each pair.
-    pub tags: [Vec<u32>; 2],
 }
 
 impl AsMut<PlanePairs> for Plane {
@@ -63,42 +59,9 @@ impl Plane {
     }
 
     /// Draws the noise of the pairs.
-    pub fn draw(&mut self, set: InstructionSet, tags: &[u32], noise: PairNoise, law: Law) {
-        let Plane { found: PlanePairs { own, next, list }, xi, tags: [a, b] } = self;
-        let tags = &tags[own.start..][..own.len() + next.len()];
-        vectors::run(set, ListTags { list, tags, a, b });
-        xi.resize(list.pairs.len(), 0.0);
-        noise.fill(law, a, b, xi);
-    }
-}
-
-/// Lists the tags of both particles of each pair.
-struct ListTags<'a> {
-    list: &'a PairList,
-    tags: &'a [u32],
-    a: &'a mut Vec<u32>,
-    b: &'a mut Vec<u32>,
-}
-
-/// Number of tags that are written at once.
-const TAGS: usize = 16;
-
-impl Loop for ListTags<'_> {
-    type Out = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let ListTags { list, tags, a, b } = self;
-        let count = list.pairs.len();
-        a.resize(count + TAGS, 0);
-        for ((_, of_i), tag) in pairs_of_each(&list.start).zip(tags) {
-            // The tags beyond the last pair of a particle are those of the next ones, which follow.
-            for k in of_i.step_by(TAGS) {
-                a[k..k + TAGS].fill(*tag);
-            }
-        }
-        a.truncate(count);
-        b.clear();
-        b.extend(list.pairs.iter().map(|pair| tags[pair.j as usize]));
+    pub fn draw(&mut self, noise: PairNoise, law: Law) {
+        let PairList { pairs, tags: [a, b], .. } = &self.found.list;
+        self.xi.resize(pairs.len(), 0.0);
+        noise.fill(law, a, b, &mut self.xi);
     }
 }

@@ -78,6 +78,7 @@ struct Share<'a> {
     plane: &'a Plane,
     own: &'a mut [[f64; 3]],
     next: &'a mut [[f64; 3]],
+    /// Inverse masses.
     of_own: &'a [f64],
     of_next: &'a [f64],
     chances: Vec<f32>,
@@ -111,9 +112,9 @@ impl PairThermostat {
         order: Order,
         draws: bool,
     ) -> [f64; 6] {
-        let PairThermostat { planes, lists, mass, kt, dt, noise, impulses, .. } = self;
+        let PairThermostat { planes, lists, inverse_mass, kt, dt, noise, impulses, .. } = self;
         impulses.resize_with(planes.len(), Vec::new);
-        let (planes, mass, kt) = (&planes[..], &mass[..], *kt);
+        let (planes, inverse_mass, kt) = (&planes[..], &inverse_mass[..], *kt);
         let reversed = order == Order::Reversed;
         let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
@@ -139,8 +140,8 @@ impl PairThermostat {
                     plane,
                     own,
                     next: next.unwrap_or_default(),
-                    of_own: &mass[plane.found.own.clone()],
-                    of_next: &mass[plane.found.next.clone()],
+                    of_own: &inverse_mass[plane.found.own.clone()],
+                    of_next: &inverse_mass[plane.found.next.clone()],
                     chances: Vec::new(),
                     virial: [0.0; 6],
                     impulses,
@@ -148,7 +149,7 @@ impl PairThermostat {
             }
             pool.each(&mut shares, |share| {
                 if draws {
-                    let [a, b] = &share.plane.tags;
+                    let [a, b] = &share.plane.found.list.tags;
                     share.chances.resize(a.len(), 0.0);
                     noise[1].fill(Law::Uniform, a, b, &mut share.chances);
                 }
@@ -181,11 +182,11 @@ impl Share<'_> {
         let list = &self.plane.found.list;
         let (j, g) = (list.pairs[k].j as usize, list.g(k));
         let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
-        let (other, mass) = match j < own {
+        let (other, inverse) = match j < own {
             true => (self.own[j], self.of_own[j]),
             false => (self.next[beyond], self.of_next[beyond]),
         };
-        let inverse = [1.0 / self.of_own[i], 1.0 / mass];
+        let inverse = [self.of_own[i], inverse];
         let sum = inverse[0] + inverse[1];
         // A pair of frozen particles does not move.
         if sum == 0.0 {

@@ -5,6 +5,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::noise::threefry2x32;
 use std::num::NonZeroUsize;
 
+mod listed;
 mod ranks;
 
 const ONE: &str = "title = \"one\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";

@@ -132,11 +132,14 @@ impl<P: PairPrecision> Scheduler<'_, P> {
             unsafe { self.particles.fill(self.fluid.set, self.order, input.input, filled..end) };
             filled = end;
             lap(&mut since, &mut slab.state.times.sort);
+            slab.state.exchange_list(plane - planes.start);
+            slab.state.buffers.list.clear(self.order.plane_start(plane).max(slab.first));
             for unit in self.units(slab, plane) {
                 // SAFETY: this plane, the next and the vectors after them are filled; if the next plane is
                 // not of this slab, or a copy, it was filled by `fill_start`.
                 unsafe { self.first(slab, &unit) };
             }
+            slab.state.exchange_list(plane - planes.start);
             lap(&mut since, &mut slab.state.times.first);
             if self.order.has_densities(&slab.units, plane) {
                 for unit in self.units(slab, plane) {

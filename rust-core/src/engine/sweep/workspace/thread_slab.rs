@@ -8,6 +8,7 @@ use crate::engine::sweep::times::Times;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::in_range_pairs::InRangePairs;
 use psidpd_passes::plane::buffers::PairBuffers;
+use psidpd_passes::plane::list::PairList;
 use psidpd_passes::plane::rim::Rim;
 use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
@@ -21,6 +22,8 @@ pub const KEPT_PLANES: usize = 6;
 /// The state of a thread that lasts from one evaluation to the next.
 pub struct ThreadState<T> {
     pub buffers: PairBuffers<T>,
+    /// The listed pairs of each plane of the slab, or of the part that the slab has.
+    pub lists: Vec<PairList>,
     pub excess: ExcessPass,
     /// Error of a ψ that was not finite.
     pub fault: Option<EngineError>,
@@ -36,12 +39,21 @@ impl<T: Scalar> ThreadState<T> {
         let buffers = PairBuffers::new(passes);
         ThreadState {
             buffers,
+            lists: Vec::new(),
             excess: ExcessPass::new(set),
             fault: None,
             lost: None,
             planes_written: 0,
             times: Times::default(),
         }
+    }
+
+    /// Exchanges the list of the present plane with that of plane `number` of the slab.
+    pub fn exchange_list(&mut self, number: usize) {
+        if number == self.lists.len() {
+            self.lists.push(PairList::default());
+        }
+        std::mem::swap(&mut self.buffers.list, &mut self.lists[number]);
     }
 }
 

@@ -1,7 +1,8 @@
 //! Compares the midpoint rule on several ranks with that on one.
 
+use super::listed::{engine, request};
 use super::*;
-use crate::engine::surroundings::Around;
+use crate::engine::surroundings::{Around, Newton, Surroundings};
 
 /// The particles of one rank: the host's numbers of owned particles and of the owners of ghosts, and the ghosts' periods.
 struct Piece {
@@ -48,12 +49,14 @@ fn cut(cloud: &Cloud, ranks: usize, closed: bool) -> Vec<Piece> {
         .collect()
 }
 
-/// Computes the velocities after the midpoint rule, the virial, and the iterations of each rank.
+/// Computes the velocities after the midpoint rule, the virial, and the iterations of each rank; with pairs that
+/// evaluations have `listed`, or with those of the search.
 fn by_ranks(
     model: &str,
     cloud: &Cloud,
     pieces: &[Piece],
     virial: bool,
+    listed: bool,
 ) -> (Vec<[f64; 3]>, [f64; 6], Vec<usize>) {
     struct Hand {
         thermostat: PairThermostat,
@@ -83,6 +86,15 @@ fn by_ranks(
                 mass: &mass,
             };
             let mut thermostat = thermostat(model, 1.0, cloud.precision);
+            if listed {
+                let mut engine = engine(model, cloud.precision, 2);
+                engine.map_kinds(rank.species_of_kind).unwrap();
+                thermostat.ask(&mut engine, DT, virial);
+                let surroundings = Surroundings::Ghosts(rank.around, Newton::On);
+                let mut force = vec![[0.0; 3]; x.len()];
+                drop(engine.first(surroundings, &request(rank.particles), &mut force).unwrap());
+                thermostat.take(&mut engine);
+            }
             thermostat.find_pairs_of_rank(&pool, &rank, DT, virial).unwrap();
             thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
             let mut vectors: Vec<[f64; 3]> = all().map(|(k, _)| cloud.v[k]).collect();
@@ -147,14 +159,15 @@ fn ranks_do_what_one_does() {
                 continue;
             }
             let pieces = cut(&cloud, ranks, closed);
-            let (found, w, iterations) = by_ranks(model, &cloud, &pieces, true);
-            let (also, none, _) = by_ranks(model, &cloud, &pieces, false);
+            let (found, w, iterations) = by_ranks(model, &cloud, &pieces, true, false);
+            let (also, none, _) = by_ranks(model, &cloud, &pieces, false, false);
             assert!(also == found && none == [0.0; 6], "cloud {number}, {ranks} ranks");
             assert!(iterations.iter().all(|i| *i == one.iterations()), "{iterations:?}");
-            let pairs = found.as_flattened().iter().zip(v.as_flattened());
+            let (listed, w_listed, _) = by_ranks(model, &cloud, &pieces, true, true);
+            let pairs = found.iter().chain(&listed).flatten().zip(v.iter().chain(&v).flatten());
             let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(most < rounding(&cloud), "cloud {number}, {ranks} ranks: {most:e}");
-            for (a, b) in w.iter().zip(virial) {
+            for (a, b) in w.iter().zip(virial).chain(w_listed.iter().zip(virial)) {
                 assert!((a - b).abs() < rounding(&cloud) * (1.0 + v.len() as f64), "cloud {number}: {a} {b}");
             }
             if cloud.frozen.is_empty() {

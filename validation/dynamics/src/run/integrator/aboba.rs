@@ -14,6 +14,7 @@ use super::{Coupling, RunError, Simulation, Want};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want, coupling: Coupling) -> Result<(), RunError> {
     system.drift(0.5 * dt)?;
+    coupling.announce(system, dt, want);
     system.conservative_forces(Want::FORCES)?;
     system.kick(0.5 * dt)?;
     coupling.act(system, dt, want)?;

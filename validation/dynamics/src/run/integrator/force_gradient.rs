@@ -25,6 +25,7 @@ pub fn step(
     system.kick_and_drift(lambda * dt, 0.5 * dt)?;
     system.displaced_forces(gradient * dt * dt)?;
     system.kick_and_drift((1.0 - 2.0 * lambda) * dt, 0.5 * dt)?;
+    coupling.announce(system, dt, want);
     system.conservative_forces(want)?;
     system.defer_kick(lambda * dt);
     coupling.act(system, dt, want)

@@ -23,6 +23,7 @@ pub fn step(
     system.kick_and_drift(lambda * dt, 0.5 * dt)?;
     system.conservative_forces(Want::FORCES)?;
     system.kick_and_drift((1.0 - 2.0 * lambda) * dt, 0.5 * dt)?;
+    coupling.announce(system, dt, want);
     system.conservative_forces(want)?;
     system.defer_kick(lambda * dt);
     coupling.act(system, dt, want)

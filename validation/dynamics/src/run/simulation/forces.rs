@@ -2,6 +2,7 @@
 
 use super::particles::Particles;
 use super::{RunError, Simulation};
+use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
     self, Engine, Fault, PassCounts, PeriodicBox, Plan, Pool, Precision, Request, Settings, Step,
     Surroundings, Tally, Want,
@@ -14,6 +15,8 @@ pub(super) struct Forces {
     kt: f64,
     engine: Engine,
     tally: Tally,
+    /// The number of the positions of the last evaluation, [`Particles::moves`].
+    moves: u64,
     all_densities: bool,
     pair_sums_only: bool,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
@@ -29,6 +32,7 @@ impl Forces {
             model: model.clone(),
             kt,
             tally: Tally::default(),
+            moves: 0,
             all_densities: false,
             pair_sums_only: false,
             earlier_out_of_bounds: [0; 2],
@@ -44,6 +48,7 @@ impl Forces {
         step: Option<Step>,
         number: u64,
     ) -> Result<(), RunError> {
+        self.moves = particles.moves();
         let (state, force) = particles.forces_mut();
         if let Some(step) = step {
             if !(step.dt > 0.0 && step.dt.is_finite()) {
@@ -89,6 +94,18 @@ impl Forces {
     /// Adds the virial of thermostat impulses that are not part of the forces.
     pub fn add_thermostat_virial(&mut self, virial: [f64; 6]) {
         (0..6).for_each(|c| self.tally.thermostat_virial[c] += virial[c]);
+    }
+
+    /// Asks the next evaluation to list the pairs of a thermostat for a time `dt`.
+    pub fn ask_for_pairs(&mut self, pairs: &mut PairThermostat, dt: f64, virial: bool) {
+        pairs.ask(&mut self.engine, dt, virial);
+    }
+
+    /// Gives a thermostat the pairs that the last evaluation has listed, if it was at the positions of `particles`.
+    pub fn give_pairs(&mut self, pairs: &mut PairThermostat, particles: &Particles) {
+        if self.moves == particles.moves() {
+            pairs.take(&mut self.engine);
+        }
     }
 
     pub fn plan(&self) -> &Plan {

@@ -209,12 +209,28 @@ impl Simulation {
         }
     }
 
+    /// Announces that the thermostat will act where the next forces are computed.
+    pub(in crate::run) fn expect_heat(&mut self, heat: Heat, want: Want) {
+        let want = self.wants(want);
+        let Simulation { forces, thermostat, .. } = self;
+        // Updates pair by pair need the order of tags.
+        if heat.update == Update::Midpoint
+            && let Some(pairs) = thermostat.pairs.as_mut().filter(|_| thermostat.on)
+        {
+            forces.ask_for_pairs(pairs, heat.time, want.virial);
+            thermostat.found = None;
+        }
+    }
+
     /// Changes velocities by the thermostat, if it acts.
     pub(in crate::run) fn heat(&mut self, heat: Heat, want: Want, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let (want, recording) = (self.wants(want), self.is_recording());
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
         let what = (heat.time, want.virial, *number);
+        if let Some(pairs) = &mut thermostat.pairs {
+            forces.give_pairs(pairs, particles);
+        }
         let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
         let pool = forces.pool();
         pairs.draw(pool, *seed, *number, heat.stream, heat.noise);

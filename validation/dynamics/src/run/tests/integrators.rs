@@ -3,6 +3,7 @@
 use super::*;
 use crate::integrator::Coupling;
 use psidpd_core::engine::thermostat::Update;
+use psidpd_core::engine::{Precision, Settings};
 
 /// The integrators that conserve the Maxwell distribution of an ideal gas exactly, at any time step.
 fn exact() -> Vec<Integrator> {
@@ -260,5 +261,29 @@ fn noise_of_pairs_acts_at_every_kth_step() {
         let before = run.velocities().to_vec();
         run.step(0.01, integrator, Want::FORCES).unwrap();
         assert_eq!(run.velocities() != before, step % 4 == 0, "{step}");
+    }
+}
+
+/// Where the thermostat over all pairs acts at the positions of the last forces, these list its pairs in mixed precision. Steps
+/// whose virial is asked for have the same bits.
+#[test]
+fn forces_list_the_pairs_of_the_thermostat() {
+    let start = settled();
+    for precision in [Precision::Mixed, Precision::Double] {
+        for (name, integrator) in Integrator::ALL {
+            let [plain, asked] = [Want::FORCES, Want::TOTALS].map(|want| {
+                let mut run = simulation(SET6, start.clone());
+                run.set_settings(Settings { precision, ..run.settings() }).unwrap();
+                run.prepare_for(integrator, 0.01, want).unwrap();
+                (0..4).for_each(|_| run.step(0.01, integrator, want).unwrap());
+                run
+            });
+            assert!(plain.state() == asked.state(), "{name}");
+            let at_forces = ["aboba", "two-stage", "force-gradient"].contains(&name);
+            assert!(!at_forces || plain.effort().updates > 0, "{name}");
+            let expected =
+                if at_forces && precision == Precision::Mixed { plain.effort().updates } else { 0 };
+            assert_eq!([plain.effort().listed, asked.effort().listed], [expected; 2], "{name}");
+        }
     }
 }

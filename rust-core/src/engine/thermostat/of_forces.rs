@@ -1,0 +1,27 @@
+//! The pairs that an evaluation of forces lists on its way, where the thermostat acts at the same positions.
+//!
+//! A host asks for them before the evaluation, and gives them to the thermostat before its search, which then takes
+//! them instead. It may do so always: the search finds the pairs itself if the evaluation was no sweep, in double precision,
+//! with drag and noise among the forces or with excluded pairs, or if it was asked for another time. Listed particles of a cell
+//! are in the order of the host's arrays, instead of that of their tags.
+
+use super::PairThermostat;
+use super::listed::Listed;
+use crate::engine::facade::Engine;
+
+impl PairThermostat {
+    /// Asks the next evaluation of `engine`, which computes the same fluid, to list the pairs for a time `dt`, if it can.
+    pub fn ask(&mut self, engine: &mut Engine, dt: f64, virial: bool) {
+        // No search has so many particles: it needs what `take` takes.
+        self.listed = Some(Listed { dt, virial, particles: usize::MAX });
+        engine.sweep_mut().ask_for_pairs(Some(self.terms(dt, virial)));
+    }
+
+    /// Takes the pairs that the last evaluation of `engine` has listed, if it has, for the search that follows: at the
+    /// same positions, with the particles in the same order.
+    pub fn take(&mut self, engine: &mut Engine) {
+        let taken = engine.sweep_mut().take_pairs(&mut self.lists, &mut self.planes);
+        let particles = self.lists.place().len();
+        self.listed = self.listed.filter(|_| taken).map(|listed| Listed { particles, ..listed });
+    }
+}

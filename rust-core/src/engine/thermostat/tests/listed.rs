@@ -1,0 +1,93 @@
+//! Pairs that an evaluation of forces lists on its way.
+
+use super::*;
+use crate::engine::{Engine, Path, Request, SpecialPair, Want};
+
+pub fn engine(model: &str, precision: Precision, threads: usize) -> Engine {
+    let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
+    let threads = NonZeroUsize::new(threads).unwrap();
+    Engine::new(&fluid, Settings { precision, threads, ..Settings::default() }).unwrap()
+}
+
+/// Conservative forces of these particles.
+pub fn request(particles: Particles) -> Request {
+    Request { particles, v: &[], step: None, want: Want::FORCES }
+}
+
+fn compute_forces(engine: &mut Engine, cloud: &Cloud) {
+    let Cloud { x, tag, species, .. } = cloud;
+    let request = request(Particles { x, tag, kind: species, owned: x.len() });
+    engine.forces(&cloud.domain, &request, &mut vec![[0.0; 3]; x.len()], false).unwrap();
+}
+
+/// Velocities and virial after an action with listed pairs, and whether there were any.
+fn act_on_listed(model: &str, cloud: &Cloud, engine: &mut Engine) -> (Vec<[f64; 3]>, [f64; 6], bool) {
+    let pool = engine.pool().clone();
+    let mut thermostat = thermostat(model, 1.0, cloud.precision);
+    thermostat.ask(engine, DT, true);
+    compute_forces(engine, cloud);
+    thermostat.take(engine);
+    let listed = thermostat.listed.is_some();
+    thermostat.find_pairs(&pool, &cloud.bodies(), DT, true).unwrap();
+    thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
+    let mut v = cloud.v.clone();
+    let virial = thermostat.act(&pool, Update::Midpoint, &mut v);
+    (v, virial, listed)
+}
+
+#[test]
+fn listed_pairs_are_those_of_the_search() {
+    for (number, (model, cloud)) in clouds().into_iter().enumerate() {
+        let pool = pool(1);
+        let mut v = cloud.v.clone();
+        let virial = ready(model, 1.0, &cloud, &pool).act(&pool, Update::Midpoint, &mut v);
+        let [one, two, five] = [1, 2, 5].map(|threads| {
+            let mut engine = engine(model, cloud.precision, threads);
+            let done = act_on_listed(model, &cloud, &mut engine);
+            let expected = cloud.precision == Precision::Mixed && engine.path() == Some(Path::Sweep);
+            assert_eq!(done.2, expected, "cloud {number}");
+            done
+        });
+        assert!(one == two && one == five, "cloud {number}");
+        assert!(one.2 || cloud.precision == Precision::Double || number == 2, "cloud {number}");
+        let bound = rounding(&cloud);
+        for (a, b) in one.0.iter().flatten().zip(v.iter().flatten()) {
+            assert!((a - b).abs() < bound * (1.0 + b.abs()), "cloud {number}: {a} {b}");
+        }
+        let size = virial.iter().map(|w| w.abs()).fold(1.0, f64::max);
+        for (a, b) in one.1.iter().zip(virial) {
+            assert!((a - b).abs() < bound * size, "cloud {number}: {a} {b}");
+        }
+    }
+}
+
+/// The pairs of another evaluation, for another time or without excluded pairs would be wrong.
+#[test]
+fn only_the_pairs_that_were_asked_for_are_taken() {
+    let cloud = clouds().swap_remove(0).1;
+    let mut engine = engine(ONE, Precision::Mixed, 1);
+    assert!(act_on_listed(ONE, &cloud, &mut engine).2);
+    let mut thermostat = thermostat(ONE, 1.0, Precision::Mixed);
+    compute_forces(&mut engine, &cloud);
+    thermostat.take(&mut engine);
+    assert!(thermostat.listed.is_none(), "nobody asked");
+    thermostat.ask(&mut engine, DT, false);
+    compute_forces(&mut engine, &cloud);
+    compute_forces(&mut engine, &cloud);
+    thermostat.take(&mut engine);
+    assert!(thermostat.listed.is_none(), "another evaluation has followed");
+    for (dt, virial) in [(2.0 * DT, false), (DT, true)] {
+        thermostat.ask(&mut engine, DT, false);
+        compute_forces(&mut engine, &cloud);
+        thermostat.take(&mut engine);
+        let found = thermostat.listed.unwrap();
+        assert!(found.serves(Listed { dt: DT, virial: false, particles: cloud.x.len() }));
+        assert!(!found.serves(Listed { dt, virial, particles: cloud.x.len() }));
+    }
+    engine.set_special_pairs([SpecialPair { i: 0, j: 1, factor: 0.0 }]);
+    assert!(!act_on_listed(ONE, &cloud, &mut engine).2);
+    engine.set_special_pairs([]);
+    assert!(act_on_listed(ONE, &cloud, &mut engine).2);
+    engine.use_pair_sums_only(true);
+    assert!(!act_on_listed(ONE, &cloud, &mut engine).2);
+}
