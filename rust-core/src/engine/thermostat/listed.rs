@@ -1,3 +1,5 @@
+//! What an evaluation of forces was asked to list.
+
 /// The pairs of an evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct Listed {
