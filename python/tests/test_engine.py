@@ -115,7 +115,7 @@ def test_two_dimensions(points):
         ((numpy.zeros((2, 3)), 4.0, [0.0, 0.5]), "whole numbers"),
         ((numpy.zeros((2, 3)), 4.0, [0, 2**33]), "too large"),
         ((numpy.zeros((2, 3)), 4.0, ["F", "G"]), '"G" is not a species'),
-        ((numpy.zeros((2, 3)), 4.0, "F"), "a list: is the one text 'F'"),
+        ((numpy.zeros((2, 3)), 4.0, "F"), "the single text 'F'"),
         ((numpy.zeros((2, 3)), 4.0, numpy.array("F")), "whole numbers"),
         ((numpy.ma.masked_invalid([[0.0, 0.0, 0.0], [1.0, 1.0, numpy.nan]]), 4.0), "x is a masked array"),
         ((numpy.zeros((2, 3)), 4.0, numpy.ma.array([0, 0], mask=[0, 1])), "types is a masked array"),

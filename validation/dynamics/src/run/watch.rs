@@ -57,9 +57,12 @@ const FACES: f64 = 1.2;
 /// keeps velocities right at any time step, only this temperature reveals a step that is too long.
 const WORTH_A_LOOK: u64 = 1000;
 
-/// Bytes per particle of the pairs of a thermostat, and of an evaluation for a configurational temperature.
-const PAIRS: f64 = 540.0;
+/// Bytes per particle of the pairs of a thermostat, listed once, and of an evaluation for a configurational temperature.
+const PAIRS: f64 = 900.0;
 const EVALUATION: f64 = 2300.0;
+
+/// Bytes per particle of a thermostat apart from the forces, with its own list of pairs beside that of the forces.
+const APART: f64 = 2270.0;
 
 /// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -191,11 +194,15 @@ impl Configurational {
 /// pairs of the thermostat; where there are few particles, watch or advice evaluate forces with all their pairs too.
 pub fn bytes_per_particle(scene: &Scene) -> f64 {
     let particles: usize = scene.initial.parts().iter().map(|part| part.count).sum();
-    if particles <= MOST {
-        return PARTICLE + PAIRS + EVALUATION;
-    }
-    let watched = scene.stages.iter().any(|stage| stage.thermostat && stage.steps >= LEAST);
-    PARTICLE + if watched { PAIRS } else { 0.0 }
+    let heated = || scene.stages.iter().filter(|stage| stage.thermostat && stage.integrator.has_time());
+    let pairs = if heated().any(|stage| !stage.integrator.properties().drag_in_forces) {
+        APART
+    } else if particles <= MOST || heated().any(|stage| stage.steps >= LEAST) {
+        PAIRS
+    } else {
+        0.0
+    };
+    PARTICLE + pairs + if particles <= MOST { EVALUATION } else { 0.0 }
 }
 
 impl Watch {
