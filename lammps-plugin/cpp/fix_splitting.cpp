@@ -239,7 +239,7 @@ void FixSplitting::post_run()
     char text[200];
     snprintf(text, sizeof text, "Fix %s: the thermostat acted %llu times, with %.1f iterations on average, %zu at most\n", style,
              static_cast<unsigned long long>(updates), mean, static_cast<size_t>(now.most));
-    utils::logmesg(lmp, text);
+    utils::logmesg(lmp, std::string(text));
   }
 }
 
