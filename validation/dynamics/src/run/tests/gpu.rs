@@ -151,7 +151,7 @@ fn temperature_pressure_energy_and_tension_are_those_of_the_cpu() {
             "dt = 0.04\nintegrator = \"two-stage\"",
         ),
     ];
-    let count = 4 * cases.len();
+    let count = 3 * cases.len() + 1;
     for (model, lengths, density, initial, step) in cases {
         let text = format!(
             "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n{initial}\
@@ -164,7 +164,9 @@ fn temperature_pressure_energy_and_tension_are_those_of_the_cpu() {
         let gpu = means(&Scene { device: GPU, seed: 8, ..scene });
         let scales =
             [("T", 1.0), ("p", density), ("u", cpu[2].mean.abs().max(1.0)), ("tension", 4.0 * density)];
-        for ((name, scale), (a, b)) in scales.iter().zip(cpu.iter().zip(&gpu)) {
+        // Where the mixture separates, its stripes lie either way for a whole run.
+        let compared = if is_slab { 4 } else { 3 };
+        for ((name, scale), (a, b)) in scales[..compared].iter().zip(cpu.iter().zip(&gpu)) {
             let found = difference(a, b);
             println!("{lengths} {name}: {:.4}({:.4}) {:.4}({:.4})", a.mean, a.error, b.mean, b.error);
             assert!(!found.exceeds(count, FALSE_ALARM), "{step}: {name}: {a:?} {b:?}");
