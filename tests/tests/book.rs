@@ -126,7 +126,7 @@ fn every_picture_says_how_it_was_made() {
     for page in pages().iter().map(String::as_str).chain(BESIDE) {
         let text = std::fs::read_to_string(root().join(page)).unwrap();
         // A notebook is the program itself.
-        if text.contains("figures of this page are drawn by hand") || page.starts_with("docs/notebook-") {
+        if text.contains("drawings of this page was not kept") || page.starts_with("docs/notebook-") {
             continue;
         }
         let parts: Vec<&str> = text.split("\n\n").collect();

@@ -19,7 +19,8 @@ fn the_lammps_script_runs_in_the_checkout() {
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
-/// Each block of the page on LAMMPS behind its whole script replaces the lines of the README's script that give the same commands.
+/// Each block of the page on LAMMPS behind its whole script replaces the lines of the README's script that give the
+/// same commands.
 #[test]
 fn the_lines_of_the_page_on_lammps_run() {
     let folder = tempfile::tempdir().unwrap();

@@ -422,7 +422,8 @@ fn peak(here: &Path, scene: &str) -> f64 {
 }
 
 /// A run of Warren's liquid takes about the memory that `check` says, for which more than there is is refused: with many
-/// particles, with steps enough for the temperature to be watched, with a thermostat apart from the forces, and with so few particles that there is advice.
+/// particles, with steps enough for the temperature to be watched, with a thermostat apart from the forces, and with so few
+/// particles that there is advice.
 #[test]
 fn a_run_takes_the_memory_that_check_says() {
     let folder = with_a_run();

@@ -37,7 +37,7 @@ use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
-use psidpd_passes::plane::list::ListTerms;
+use psidpd_passes::plane::list::{ListTerms, PairList};
 use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::{Tally, Want};
 use region::{can_stretch, is_open, region};
@@ -310,6 +310,11 @@ impl Sweep {
     /// in mixed precision, without excluded pairs, and if drag and noise are not among the forces.
     pub(super) fn ask_for_pairs(&mut self, terms: Option<ListTerms>) {
         (self.asked, self.has_listed) = (terms, false);
+    }
+
+    /// Takes lists that nobody needs, for the memory of the pairs that the next evaluation lists.
+    pub(super) fn lend_lists(&mut self, lists: impl ExactSizeIterator<Item = PairList>) {
+        with!(&mut self.workspace, m => m.lend_lists(lists));
     }
 
     /// Moves the pairs that the last evaluation has listed, once; returns whether it has listed any. Particles of a cell

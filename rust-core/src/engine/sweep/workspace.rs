@@ -38,7 +38,7 @@ use psidpd_passes::noise::PairNoise;
 use psidpd_passes::pair_batch::inputs::PairInputs;
 use psidpd_passes::plane::data::PassData;
 use psidpd_passes::plane::list::{ListTerms, PairList};
-use psidpd_threads::Pool;
+use psidpd_threads::{Pool, part};
 use scheduler::{PassInput, Scheduler};
 use slopes::SlopeArrays;
 use sorted_particles::SharedParticles;
@@ -206,6 +206,14 @@ impl<P: PairPrecision> Workspace<P> {
     /// The order of the particles, and their flags of ghosts, if there are any.
     pub fn sorted(&self) -> (&CellOrder, &[bool]) {
         (&self.order, &self.particles.ghost)
+    }
+
+    /// Gives lists, in the order of planes, to the threads that will need their memory.
+    pub fn lend_lists(&mut self, mut lists: impl ExactSizeIterator<Item = PairList>) {
+        let (count, threads) = (lists.len(), self.threads.len());
+        for (number, state) in self.threads.iter_mut().enumerate() {
+            state.lists = lists.by_ref().take(part(count, number, threads).len()).collect();
+        }
     }
 
     /// Moves the pairs that the last evaluation has listed to the lists of the planes, whose memory it keeps for the next.

@@ -198,10 +198,10 @@ impl PairThermostat {
         }
         let order = self.lists.order();
         pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
-        let inertia =
-            self.inverse_mass.iter().map(|inverse| if *inverse > 0.0 { inverse.recip() } else { 0.0 });
-        self.inertia.clear();
-        self.inertia.extend(inertia);
+        pass::fill(pool, &mut self.inertia, order, |k| {
+            let m = mass(k);
+            if m.is_finite() { m } else { 0.0 }
+        });
         Ok(())
     }
 

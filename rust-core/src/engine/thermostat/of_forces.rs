@@ -14,7 +14,13 @@ impl PairThermostat {
     pub fn ask(&mut self, engine: &mut Engine, dt: f64, virial: bool) {
         // No search has so many particles: it needs what `take` takes.
         self.listed = Some(Listed { dt, virial, particles: usize::MAX });
-        engine.sweep_mut().ask_for_pairs(Some(self.terms(dt, virial)));
+        let terms = self.terms(dt, virial);
+        let sweep = engine.sweep_mut();
+        sweep.ask_for_pairs(Some(terms));
+        // The memory of lists goes to and fro, so that there is one list of all pairs, not two.
+        if self.are_listed {
+            sweep.lend_lists(self.planes.iter_mut().map(|plane| std::mem::take(&mut plane.found.list)));
+        }
     }
 
     /// Takes the pairs that the last evaluation of `engine` has listed, if it has, for the search that follows: at the

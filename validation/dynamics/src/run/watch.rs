@@ -61,8 +61,8 @@ const WORTH_A_LOOK: u64 = 1000;
 const PAIRS: f64 = 900.0;
 const EVALUATION: f64 = 2300.0;
 
-/// Bytes per particle of a thermostat apart from the forces, with its own list of pairs beside that of the forces.
-const APART: f64 = 2270.0;
+/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles.
+const APART: f64 = 1500.0;
 
 /// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

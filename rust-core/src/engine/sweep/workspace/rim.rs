@@ -4,8 +4,7 @@ use super::Workspace;
 use super::forces::ForceSink;
 use crate::engine::error::EngineError;
 use psidpd_passes::compiled::PairPrecision;
-use psidpd_threads::take;
-use psidpd_threads::{Pool, part};
+use psidpd_threads::{Pool, part, take};
 use std::ops::Range;
 
 /// Half of the virial of a pair with a ghost counts here; the rank of the ghost counts the other half.

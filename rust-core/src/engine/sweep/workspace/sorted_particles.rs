@@ -7,8 +7,7 @@ use super::input::VECTOR_PADDING;
 use psidpd_passes::cells::ghosts::{Ghosts, OwnedOfColumn};
 use psidpd_passes::ground::arithmetic::PackedParticle;
 use psidpd_passes::ground::fixed_point::FixedPoint16;
-use psidpd_threads::take;
-use psidpd_threads::{Pool, SharedSlice, part};
+use psidpd_threads::{Pool, SharedSlice, part, take};
 use std::ops::Range;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.

@@ -22,8 +22,16 @@ fn compute_forces(engine: &mut Engine, cloud: &Cloud) {
 
 /// Velocities and virial after an action with listed pairs, and whether there were any.
 fn act_on_listed(model: &str, cloud: &Cloud, engine: &mut Engine) -> (Vec<[f64; 3]>, [f64; 6], bool) {
+    act_again(&mut thermostat(model, 1.0, cloud.precision), cloud, engine)
+}
+
+/// The same with a thermostat that may have acted before.
+fn act_again(
+    thermostat: &mut PairThermostat,
+    cloud: &Cloud,
+    engine: &mut Engine,
+) -> (Vec<[f64; 3]>, [f64; 6], bool) {
     let pool = engine.pool().clone();
-    let mut thermostat = thermostat(model, 1.0, cloud.precision);
     thermostat.ask(engine, DT, true);
     compute_forces(engine, cloud);
     thermostat.take(engine);
@@ -57,6 +65,31 @@ fn listed_pairs_are_those_of_the_search() {
         let size = virial.iter().map(|w| w.abs()).fold(1.0, f64::max);
         for (a, b) in one.1.iter().zip(virial) {
             assert!((a - b).abs() < bound * size, "cloud {number}: {a} {b}");
+        }
+    }
+}
+
+/// The memory of lists goes from the thermostat to the forces and back, and what was in it does not matter: of more planes
+/// or fewer, of other threads, of a search.
+#[test]
+fn lists_that_are_used_again_are_as_new() {
+    for threads in [1, 5] {
+        let mut thermostat = thermostat(ONE, 1.0, Precision::Mixed);
+        let clouds = [[3.0, 4.1, 5.3], [3.0, 3.0, 3.0], [5.0, 4.0, 9.0]]
+            .map(|edges| Cloud::new(1, nalgebra::Matrix3::from_diagonal(&edges.into()), [true; 3], 6.0));
+        for number in [0, 0, 1, 2, 2, 0, 1] {
+            let cloud = &clouds[number];
+            let mut engine = engine(ONE, Precision::Mixed, threads);
+            assert!(act_again(&mut thermostat, cloud, &mut engine) == act_on_listed(ONE, cloud, &mut engine));
+        }
+        // One engine, and a search in between.
+        let mut engine = engine(ONE, Precision::Mixed, threads);
+        for number in [2, 2, 1, 0, 2] {
+            let expected = act_on_listed(ONE, &clouds[number], &mut engine);
+            assert!(act_again(&mut thermostat, &clouds[number], &mut engine) == expected);
+            let pool = engine.pool().clone();
+            thermostat.find_pairs(&pool, &clouds[number].bodies(), DT, false).unwrap();
+            assert!(act_again(&mut thermostat, &clouds[number], &mut engine) == expected);
         }
     }
 }
