@@ -55,7 +55,7 @@ fn what_is_carried_across_a_film_is_nothing() {
         simulation.record_flux(true);
         let (mut carried, mut conservative) = (Vec::new(), Vec::new());
         for _ in 0..16 {
-            let (mut sums, steps) = ([0.0; 2], 100);
+            let (mut sums, steps) = ([0.0; 2], 160);
             for _ in 0..steps {
                 simulation.step(DT, integrator, Want::TOTALS).unwrap();
                 let frame = Frame::new(simulation.view(0.0), &fluid);
