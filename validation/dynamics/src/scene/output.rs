@@ -2,7 +2,6 @@
 
 use psidpd_core::document::{FileError, Section};
 
-/// The output of a run beside its final state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
     /// Steps between rows of `thermo.csv`; 0 writes none.
