@@ -35,13 +35,10 @@ pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
     input == folder || input.parent() == Some(&folder) && own.contains(&name)
 }
 
-/// The file of observables.
 const OBSERVABLES: &str = "observables.json";
 
-/// The folder with the tables of observables.
 const TABLES: &str = "observables";
 
-/// The files that grow during a run.
 pub(super) struct Output {
     thermo: Option<ThermoFile>,
     dump: Option<GrowingFile>,
@@ -117,7 +114,6 @@ impl Output {
         self.files().map(|file| (file.name().to_owned(), file.written())).collect()
     }
 
-    /// Syncs all files to the disk.
     pub fn sync(&mut self) -> Result<(), RunError> {
         if let Some((path, file)) = &self.gsd {
             file.sync().map_err(RunError::output(path))?;
@@ -130,7 +126,6 @@ impl Output {
     }
 }
 
-/// Opens the GSD file of a scene that has one.
 fn open_gsd(
     scene: &Scene,
     folder: &Path,

@@ -22,11 +22,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 struct Present {
     position: Position,
     sums: Sums,
-    /// The last row of totals.
     last: Option<Thermo>,
 }
 
-/// A run in progress.
 pub(super) struct Run<'a> {
     scene: &'a Scene,
     folder: Folder,
@@ -35,7 +33,6 @@ pub(super) struct Run<'a> {
     output: Option<Output>,
     pub checkpoints: Checkpoints,
     present: Present,
-    /// Total steps of all stages.
     steps: u64,
     observers: Observers,
     /// The watch over the present stage since the start of this session.

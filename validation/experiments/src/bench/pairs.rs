@@ -2,7 +2,6 @@
 
 use psidpd_dynamics::run::State;
 
-/// Pairs closer than `range` per particle.
 pub fn pairs_per_particle(state: &State, range: f64) -> f64 {
     let lengths = state.domain.lengths();
     // At least three cells in each direction, or a neighbour would be met twice.

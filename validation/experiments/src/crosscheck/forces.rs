@@ -17,7 +17,6 @@ use psidpd_report::{Check, Item, Section, Table};
 use serde::Serialize;
 use serde_json::json;
 
-/// Seed of the configuration and of the noise.
 pub const SEED: u64 = 20_030_520;
 
 /// What a code says of a configuration.
@@ -45,7 +44,6 @@ impl Difference {
         [("force", self.force), ("energy", self.energy), ("virial", self.virial)]
     }
 
-    /// As cells of a table.
     pub fn cells(&self) -> [String; 3] {
         self.named().map(|(_, value)| format!("{value:.1e}"))
     }
@@ -158,7 +156,6 @@ fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64,
     Ok((energy(H)? - energy(-H)?) / (2.0 * H))
 }
 
-/// Values in the order of tags.
 pub(super) fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut ordered = vec![[f64::NAN; 3]; values.len()];
     for (tag, value) in tags.iter().zip(values) {

@@ -5,7 +5,6 @@ use crate::models::SET6;
 
 const GROUP: &str = "long runs";
 
-/// 10⁶ steps with `full`, else two thousand.
 pub fn cases(full: bool) -> Vec<Case> {
     let steps = if full { 1_000_000 } else { 2_000 };
     let run = |dt: f64, scene: &str| Inputs {

@@ -50,9 +50,6 @@ pub fn scene(
 }
 
 /// Carries out a case in `folder`, with a wrong engine if there is a `fault`.
-///
-/// # Errors
-/// Files cannot be written or read.
 pub fn carry_out(
     case: &Case,
     integrator: Integrator,

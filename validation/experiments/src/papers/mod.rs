@@ -19,7 +19,6 @@ use crate::ExperimentError;
 pub use case::{Compared, Reproduction, Rule};
 pub use context::{Context, Size};
 
-/// A figure or table.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
     /// `PAPER-figN`, `PAPER-tableN`, or another short name.

@@ -13,7 +13,6 @@ pub struct Tolerance {
     pub bound: f64,
 }
 
-/// A tolerance that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "expected NAME=BOUND, such as u=0.2% or rho_L=0.001; NAME is a kind ({kinds}) or a quantity ({quantities})",
@@ -60,7 +59,6 @@ pub fn by_name<S: Serializer>(tolerances: &[Tolerance], serializer: S) -> Result
     serializer.collect_map(tolerances.iter().map(|t| (&t.name, t.bound)))
 }
 
-/// An error compared with its bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worst {
     pub quantity: String,

@@ -45,7 +45,6 @@ struct Part {
     is_open: bool,
 }
 
-/// The place of the pair style.
 struct Place {
     part: usize,
     /// Where it begins in the new text.
@@ -309,7 +308,6 @@ impl Work<'_> {
         Some(command.with("read_data", &words))
     }
 
-    /// Converts an included file, once.
     fn include(&mut self, command: &Command, file: &str) -> Option<String> {
         if file.contains('$') {
             self.by_hand(command, "a variable has the included file: write its name, and convert again");
@@ -403,7 +401,6 @@ impl Work<'_> {
     }
 }
 
-/// Whether a word sets the density of atoms.
 fn is_density(word: &&str) -> bool {
     ["sph/rho", "meso/rho"].contains(word)
 }
