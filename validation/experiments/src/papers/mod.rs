@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn ids_are_unique_and_begin_with_their_paper() {
-        let mut ids: Vec<&str> = super::cases().iter().map(|case| case.id).collect();
+        let mut ids: Vec<String> = super::cases().into_iter().map(|case| case.id).collect();
         let papers = ["pagonabarraga-", "trofimov-", "warren-", "wang-", "berendsen-"];
         assert!(ids.iter().all(|id| papers.iter().any(|paper| id.starts_with(paper))), "{ids:?}");
         let count = ids.len();
