@@ -34,7 +34,7 @@ pub use arrangement::{Arrangement, Lattice};
 pub use composition::Composition;
 pub use edits::{Edit, edit_model};
 pub use initial::Initial;
-pub use output::Output;
+pub use output::{Output, every};
 pub use part::Part;
 pub use shape::Shape;
 pub use stage::Stage;

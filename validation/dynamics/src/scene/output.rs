@@ -27,6 +27,19 @@ impl Default for Output {
     }
 }
 
+impl Output {
+    /// Whether a file gets the particles at the end of a step.
+    pub fn writes_particles(&self, step: u64) -> bool {
+        let intervals = [self.dump, self.xyz, self.gsd, self.vtk, self.snapshot];
+        intervals.into_iter().any(|interval| every(interval, step))
+    }
+}
+
+/// Whether a step is a multiple of an interval, of which 0 means never.
+pub fn every(interval: u64, step: u64) -> bool {
+    interval > 0 && step.is_multiple_of(interval)
+}
+
 pub fn read(root: &Section) -> Result<Output, FileError> {
     let mut output = Output::default();
     let Some(value) = root.get("output") else { return Ok(output) };
