@@ -56,7 +56,7 @@ pub enum Found {
     },
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Inputs {
     pub model: String,
     pub kt: f64,
@@ -67,6 +67,19 @@ pub struct Inputs {
     pub dt: f64,
     /// Steps without measurement, and with.
     pub steps: [u64; 2],
+}
+
+impl Inputs {
+    /// Inputs without a data file.
+    pub fn new(
+        model: impl Into<String>,
+        kt: f64,
+        scene: impl Into<String>,
+        dt: f64,
+        steps: [u64; 2],
+    ) -> Inputs {
+        Inputs { model: model.into(), kt, scene: scene.into(), data: None, dt, steps }
+    }
 }
 
 #[derive(Debug, Clone)]
