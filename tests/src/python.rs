@@ -1,7 +1,6 @@
 //! A Python environment with the programs that read psidpd's files in tests.
 
 use psidpd::lammps::base_dir;
-use rustix::fs::{FlockOperation, flock};
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -21,7 +20,7 @@ pub fn python() -> &'static PathBuf {
         std::fs::create_dir_all(&base).expect("the folder for environments can be made");
         // Other tests may do this at the same time; the lock ends with this process at the latest.
         let lock = std::fs::File::create(base.join("readers.lock")).expect("the lock can be made");
-        flock(&lock, FlockOperation::LockExclusive).expect("the lock can be had");
+        lock.lock().expect("the lock can be had");
         let venv = base.join("readers");
         let python = venv.join("bin/python");
         let stamp = venv.join(STAMP);

@@ -45,7 +45,6 @@ impl fmt::Display for Device {
     }
 }
 
-/// The reason why a device cannot compute a run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceError {
@@ -55,10 +54,8 @@ pub enum DeviceError {
     NotFound,
     #[error("there is no device gpu:{asked}: the last that psidpd devices lists is gpu:{last}")]
     Number { asked: usize, last: usize },
-    /// The GPU does not compute this.
     #[error("not on a GPU: {0}")]
     Lacks(String),
-    /// The GPU or its driver failed.
     #[error("the GPU failed: {0}")]
     Failed(String),
 }

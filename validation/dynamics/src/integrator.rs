@@ -17,42 +17,23 @@ const TWO_STAGE: f64 = 0.21;
 /// λ and ξ with which the force-gradient step is of fourth order.
 const FORCE_GRADIENT: [f64; 2] = [1.0 / 6.0, 1.0 / 24.0];
 
-/// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Integrator {
     /// Velocity Verlet, as `fix nve` of LAMMPS: drag sees the half-step velocity.
     #[default]
     VelocityVerlet,
     /// The modified velocity Verlet of Groot and Warren: drag sees the velocity predicted with λ.
-    GrootWarren {
-        /// λ.
-        lambda: f64,
-    },
+    GrootWarren { lambda: f64 },
     /// Drag once more from the velocity at the end of the step.
-    DpdVv {
-        /// The noise.
-        noise: Law,
-    },
+    DpdVv { noise: Law },
     /// Drag from the velocity at the end of the step, which it makes.
-    SelfConsistent {
-        /// The noise.
-        noise: Law,
-    },
+    SelfConsistent { noise: Law },
     /// Pair by pair, half explicit and half implicit; then velocity Verlet.
-    ShardlowS1 {
-        /// The noise.
-        noise: Law,
-    },
+    ShardlowS1 { noise: Law },
     /// The same by halves, before and after.
-    ShardlowS2 {
-        /// The noise.
-        noise: Law,
-    },
+    ShardlowS2 { noise: Law },
     /// Velocity Verlet, then the Ornstein–Uhlenbeck process of each pair.
-    Peters {
-        /// The noise.
-        noise: Law,
-    },
+    Peters { noise: Law },
     /// Velocity Verlet, then new relative velocities for some pairs.
     LoweAndersen,
     /// Drift, kick, thermostat, kick, drift.
@@ -63,7 +44,6 @@ pub enum Integrator {
     TwoStage {
         /// Share of a step in the first kick and in the last.
         lambda: f64,
-        /// The thermostat.
         coupling: Coupling,
     },
     /// The same, its middle kick by forces at displaced positions.
@@ -72,7 +52,6 @@ pub enum Integrator {
         lambda: f64,
         /// ξ: the displacement is `ξ Δt² F/m`.
         gradient: f64,
-        /// The thermostat.
         coupling: Coupling,
     },
     /// Metropolis Monte Carlo: trial moves of single particles, no time.
@@ -87,15 +66,12 @@ pub enum Integrator {
 /// Which thermostat a splitting has, and how often.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
-    /// How velocities are changed.
     pub update: Update,
     /// It acts at every so many steps, for as many Δt.
     pub every: u64,
-    /// The law of its noise.
     pub noise: Law,
 }
 
-/// Names of the updates in scene files.
 pub const THERMOSTAT_STEPS: [(&str, Update); 2] =
     [("midpoint", Update::Midpoint), ("pairwise", Update::OrnsteinUhlenbeck)];
 
@@ -103,7 +79,6 @@ impl Coupling {
     /// The midpoint rule at every step.
     pub const DEFAULT: Coupling = Coupling { update: Update::Midpoint, every: 1, noise: Law::Gaussian };
 
-    /// The name of the update.
     pub fn name(&self) -> &'static str {
         THERMOSTAT_STEPS.iter().find(|(_, update)| *update == self.update).map_or("", |found| found.0)
     }
@@ -136,7 +111,6 @@ pub enum Counterpart {
     Nve,
     /// `fix dpd/splitting` of the plugin.
     Splitting,
-    /// Nothing.
     None,
 }
 
@@ -144,7 +118,6 @@ pub enum Counterpart {
 pub struct Settings<'a> {
     /// λ, and the range that is allowed.
     pub lambda: Option<(&'a mut f64, [f64; 2])>,
-    /// ξ.
     pub gradient: Option<&'a mut f64>,
     /// The thermostat of a splitting, with the law of its noise.
     pub coupling: Option<&'a mut Coupling>,
@@ -191,7 +164,6 @@ impl Integrator {
         ),
     ];
 
-    /// All names in scene files.
     pub const NAMED: [(&str, Integrator); Integrator::ALL.len() + 1] = {
         let monte_carlo = Integrator::MonteCarlo { sweeps: 1, max_move: None };
         let mut named = [("monte-carlo", monte_carlo); Integrator::ALL.len() + 1];
@@ -203,7 +175,6 @@ impl Integrator {
         named
     };
 
-    /// Its name.
     pub fn name(&self) -> &'static str {
         let kind = std::mem::discriminant(self);
         Integrator::NAMED
@@ -300,7 +271,6 @@ impl Integrator {
         }
     }
 
-    /// Whether its steps take time.
     pub fn has_time(&self) -> bool {
         !matches!(self, Integrator::MonteCarlo { .. })
     }

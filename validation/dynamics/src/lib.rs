@@ -6,11 +6,11 @@ extern crate self as psidpd_dynamics;
 pub mod checkpoint;
 pub mod device;
 pub mod integrator;
-#[cfg(test)]
-mod observed;
 pub mod particles;
 pub mod prediction;
 pub mod run;
 pub mod scene;
 #[cfg(test)]
 mod test_support;
+#[cfg(test)]
+mod tests;

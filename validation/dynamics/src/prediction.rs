@@ -17,7 +17,6 @@ pub struct Prediction {
     pub density: f64,
     /// Whether the caller gave the density.
     asked: bool,
-    /// Mean-field pressure at the density.
     pub pressure: f64,
     /// Mean local densities and pressure with correlations to first order; `None` where the theory does not apply.
     pub correlated: Option<Correlated>,

@@ -14,7 +14,6 @@ pub const IDEAL: &str =
 pub const IDEAL_MIXTURE: &str =
     "title = \"ideal gas\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 
-/// Standard DPD.
 pub const SOFT: &str = "title = \"soft\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\n\
                         range = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
 

@@ -16,17 +16,14 @@ pub struct Sampling {
     /// About how many particles; more if the box would be narrower than three times the longest range.
     pub particles: usize,
     pub dt: f64,
-    /// Steps without measurement.
     pub equilibrate: u64,
     pub steps: u64,
-    /// Steps between samples.
     pub every: u64,
     /// Seed of the start and of the noise.
     pub seed: u64,
     pub threads: NonZeroUsize,
 }
 
-/// A fluid at one temperature and density.
 #[derive(Debug)]
 pub struct Bulk<'a> {
     /// The fluid. Its file is there: a scene names it.
@@ -35,15 +32,11 @@ pub struct Bulk<'a> {
     pub densities: &'a [f64],
     /// Lines of `[observe]`, beside temperature and pressure.
     pub observe: &'a str,
-    /// Size and length.
     pub sampling: Sampling,
 }
 
 impl Bulk<'_> {
     /// The scene of the fluid: a lattice that melts, then the run.
-    ///
-    /// # Errors
-    /// The model does not hold at the temperature.
     pub fn scene(&self, model_file: &Path) -> Result<Scene, RunError> {
         let Sampling { particles, dt, equilibrate, steps, every, seed, .. } = self.sampling;
         let d = self.model.dimensions();
@@ -81,18 +74,12 @@ impl Bulk<'_> {
     }
 
     /// Runs the fluid in `folder`.
-    ///
-    /// # Errors
-    /// The run stops, or its files cannot be written.
     pub fn run(&self, model_file: &Path, folder: &Path) -> Result<Observed, RunError> {
         run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads)
     }
 }
 
 /// Runs a scene in `folder` and reads what it observed.
-///
-/// # Errors
-/// The run stops, or its files cannot be written or read.
 pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) -> Result<Observed, RunError> {
     run_with(scene, folder, begin, threads, None)
 }
@@ -121,9 +108,6 @@ pub struct Observed(pub Vec<Observation>);
 
 impl Observed {
     /// Reads what the run in a folder observed.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn read(folder: &Path) -> Result<Observed, RunError> {
         let path = folder.join("observables.json");
         let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };
@@ -140,12 +124,10 @@ impl Observed {
         self.get(name).and_then(|o| o.scalar(column)).unwrap_or(Measured::NONE)
     }
 
-    /// Kinetic temperature.
     pub fn temperature(&self) -> Measured {
         self.scalar("temperature", "kinetic")
     }
 
-    /// Pressure of the conservative forces.
     pub fn pressure(&self) -> Measured {
         self.scalar("pressure", "conservative")
     }

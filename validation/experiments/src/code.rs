@@ -46,7 +46,6 @@ pub enum Code {
 /// Accelerated versions of LAMMPS's `dpd`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Suffix {
-    /// `dpd` itself.
     None,
     /// `dpd/omp` on one thread.
     Omp,
@@ -69,9 +68,7 @@ impl Suffix {
 /// What pair styles are told of a fluid; each takes what it needs.
 #[derive(Debug, Clone)]
 pub struct Told {
-    /// Path of the model file.
     pub model: String,
-    /// Path of the tables for `eam/alloy`.
     pub tables: String,
     /// Names of the species, as `pair_coeff` wants them.
     pub species: String,
@@ -91,7 +88,6 @@ impl Code {
         }
     }
 
-    /// The name for people.
     pub fn label(self) -> String {
         match self {
             Code::Native => "native".into(),
@@ -104,7 +100,6 @@ impl Code {
         }
     }
 
-    /// The pair style; the native runner has none.
     pub fn style(self, told: Told) -> Option<PairStyle> {
         let Told { model, tables, species, pair, law, words } = told;
         Some(match self {

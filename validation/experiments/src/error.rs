@@ -40,10 +40,8 @@ pub enum ExperimentError {
     Theory(#[from] TheoryError),
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
-    /// A file that LAMMPS wrote is not as it should be.
     #[error("{path}: {problem}")]
     Output { path: PathBuf, problem: String },
-    /// What LAMMPS printed is not as it should be.
     #[error("{what}: {problem} in what LAMMPS printed")]
     Printed { what: String, problem: &'static str },
     #[error("{0} particles are too few: the box must be at least three ranges wide; take 170 or more")]
@@ -55,7 +53,6 @@ pub enum ExperimentError {
         "no stage of the scene has a thermostat and a fixed temperature, so there is nothing to compare with"
     )]
     NoStage,
-    /// The start or the reference stopped.
     #[error("{what}: {source}")]
     Stopped { what: String, source: Box<RunError> },
     #[error("the reference, {what}, is unstable: {why}; lower the dt of the scene")]

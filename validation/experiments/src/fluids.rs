@@ -34,7 +34,6 @@ pub const MDPD: Subject = Subject {
     dt: 0.01,
 };
 
-/// Standard DPD, pairs only.
 pub const DPD: Subject = Subject {
     name: "dpd",
     title: "DPD: the standard soft fluid",
@@ -75,9 +74,6 @@ pub const SUBJECTS: [Subject; 3] = [MDPD, DPD, FORMULA];
 
 impl Subject {
     /// The model.
-    ///
-    /// # Errors
-    /// The text is none: never, since a test reads it.
     pub fn model(&self) -> Result<Model, ExperimentError> {
         Ok(Model::parse(self.name, self.text)?)
     }
@@ -105,13 +101,10 @@ pub struct WarrenSet {
     pub b: f64,
     /// Error of the density of the liquid.
     pub liquid_error: f64,
-    /// Surface tension and its error.
     pub tension: (f64, f64),
-    /// Width of the interface and its error.
     pub width: (f64, f64),
 }
 
-/// Set 5: the lighter liquid.
 pub const SET5: WarrenSet = WarrenSet {
     name: "set 5",
     fluid: Subject {
@@ -127,7 +120,6 @@ pub const SET5: WarrenSet = WarrenSet {
     width: (0.78, 0.05),
 };
 
-/// Set 6: the denser liquid.
 pub const SET6: WarrenSet = WarrenSet {
     name: "set 6",
     fluid: MDPD,
@@ -137,11 +129,8 @@ pub const SET6: WarrenSet = WarrenSet {
     width: (0.66, 0.03),
 };
 
-/// `r_c`.
 pub const RC: f64 = 1.0;
-/// `r_d`.
 pub const RD: f64 = 0.75;
-/// `A`.
 pub const A: f64 = -40.0;
 /// γ of the runs with a thermostat: σ = 6 at kT = 1.
 pub const GAMMA: f64 = 18.0;
@@ -157,7 +146,6 @@ impl WarrenSet {
         Ok(warren_ab(&["F".to_owned()], &[Some(self.pair(gamma))], 3, law)?)
     }
 
-    /// The text of the same model file.
     pub fn model_text(&self, law: ForceLaw, gamma: f64) -> Result<String, ExperimentError> {
         Ok(warren_ab_text(&["F".to_owned()], &[Some(self.pair(gamma))], 3, law)?)
     }

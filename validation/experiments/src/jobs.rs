@@ -1,45 +1,43 @@
-//! Several runs at once, one to a core.
+//! Several runs at once.
 
 use psidpd_report::Bar;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
-pub type Job<'a, T> = Box<dyn FnOnce() -> T + Send + 'a>;
-
-/// Carries out `jobs` on as many threads as there are cores, but never more than two: the machine
-/// may have other work. The last begins first, so that the longest are best at the end. Results come in the order of the
-/// jobs.
-pub fn run<T: Send>(jobs: Vec<Job<'_, T>>) -> Vec<T> {
-    let workers = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
-    let count = jobs.len();
-    let queue = Mutex::new(jobs.into_iter().enumerate().rev());
-    let done: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));
-    std::thread::scope(|scope| {
-        for _ in 0..workers.min(count) {
-            scope.spawn(|| {
-                loop {
-                    let next = queue.lock().unwrap_or_else(|e| e.into_inner()).next();
-                    let Some((index, job)) = next else { return };
-                    let result = job();
-                    done.lock().unwrap_or_else(|e| e.into_inner()).push((index, result));
-                }
-            });
+/// Does `work` with numbered items on so many threads. Items are begun in their order; results come in the order of the numbers.
+pub fn on<I, T: Send>(
+    threads: usize,
+    items: impl Iterator<Item = (usize, I)> + Send,
+    work: impl Fn(I) -> T + Sync,
+) -> Vec<T> {
+    let (queue, done) = (Mutex::new(items), Mutex::new(Vec::new()));
+    let worker = || {
+        loop {
+            let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some((number, item)) = next else { return };
+            let result = work(item);
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((number, result));
         }
-    });
-    let mut done = done.into_inner().unwrap_or_else(|e| e.into_inner());
-    done.sort_by_key(|(index, _)| *index);
+    };
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(worker))));
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_by_key(|(number, _)| *number);
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// The same with a bar of the jobs that are done.
-pub fn counted<'a, T: Send + 'a>(jobs: Vec<Job<'a, T>>, bar: &'a Bar) -> Vec<T> {
-    let count = |job: Job<'a, T>| -> Job<'a, T> {
-        Box::new(move || {
-            let result = job();
-            bar.advance(1);
-            result
-        })
-    };
-    let results = run(jobs.into_iter().map(count).collect());
+/// Does `work` with items on as many threads as there are cores, but never more than two: the machine may have other work. The
+/// last item is begun first, so that the longest are best at the end. Results come in the order of the items.
+pub fn each<I: Send, T: Send>(items: Vec<I>, work: impl Fn(I) -> T + Sync) -> Vec<T> {
+    let workers = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
+    on(workers.min(items.len()), items.into_iter().enumerate().rev(), work)
+}
+
+/// The same with a bar of the items that are done.
+pub fn counted<I: Send, T: Send>(items: Vec<I>, bar: &Bar, work: impl Fn(I) -> T + Sync) -> Vec<T> {
+    let results = each(items, |item| {
+        let result = work(item);
+        bar.advance(1);
+        result
+    });
     bar.finish();
     results
 }
@@ -49,9 +47,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn results_keep_the_order_of_jobs() {
-        let jobs: Vec<Job<usize>> = (0..20usize).map(|k| Box::new(move || k * k) as Job<usize>).collect();
-        assert_eq!(run(jobs), (0..20).map(|k| k * k).collect::<Vec<_>>());
-        assert!(run(Vec::<Job<u8>>::new()).is_empty());
+    fn results_keep_the_order_of_items() {
+        assert_eq!(each((0..20).collect(), |k| k * k), (0..20).map(|k| k * k).collect::<Vec<_>>());
+        assert!(each(Vec::<u8>::new(), |_| ()).is_empty());
+    }
+
+    #[test]
+    fn the_last_item_is_begun_first() {
+        let begun = Mutex::new(Vec::new());
+        on(1, (0..3).enumerate().rev(), |k| begun.lock().unwrap().push(k));
+        assert_eq!(begun.into_inner().unwrap(), [2, 1, 0]);
     }
 }

@@ -3,7 +3,6 @@
 use crate::ExperimentError;
 use std::path::Path;
 
-/// The processor, where the system says.
 pub fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let model = std::fs::read_to_string("/proc/cpuinfo")
@@ -17,9 +16,6 @@ pub fn machine() -> String {
 }
 
 /// The most memory that this process ever had.
-///
-/// # Errors
-/// The system does not say.
 pub fn peak_kilobytes() -> Result<u64, ExperimentError> {
     let status = Path::new("/proc/self/status");
     let text = std::fs::read_to_string(status).map_err(ExperimentError::io(status))?;

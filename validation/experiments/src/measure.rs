@@ -8,7 +8,6 @@ use psidpd_report::{Headline, headline};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-/// Steps and time step of each run.
 #[derive(Debug, Clone, Copy)]
 pub struct Effort {
     /// Steps that are measured, after a third of them that are not.
@@ -16,13 +15,9 @@ pub struct Effort {
     pub dt: f64,
 }
 
-/// Particles in the homogeneous fluid.
 const PARTICLES: usize = 2000;
 
 /// The homogeneous fluid at a density.
-///
-/// # Errors
-/// The run stops, or cannot begin.
 pub fn homogeneous(
     model: &Model,
     file: &Path,
@@ -44,9 +39,6 @@ pub fn homogeneous(
 }
 
 /// A slab of liquid in its vapour, from a guess of the density of the liquid.
-///
-/// # Errors
-/// As [`homogeneous`].
 pub fn slab(model: &Model, file: &Path, kt: f64, liquid: f64, effort: Effort) -> Result<Headline, RunError> {
     let range = model.at(kt)?.cutoff().max(1e-6);
     let d = model.dimensions();

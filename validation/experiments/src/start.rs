@@ -20,31 +20,23 @@ pub struct Filling {
 }
 
 impl Filling {
-    /// A full cube.
     pub fn cube(edge: f64) -> Filling {
         Filling { lengths: [edge; 3], thickness: edge }
     }
 
     /// The cube that fluids of a size are timed in.
-    ///
-    /// # Errors
-    /// It is too narrow.
     pub fn of_size(size: usize) -> Result<Filling, ExperimentError> {
         let edge = Subject::edge(size);
         if edge < 3.0 { Err(ExperimentError::TooSmall(size)) } else { Ok(Filling::cube(edge)) }
     }
 }
 
-/// A box that is periodic in all directions.
 pub fn periodic(lengths: [f64; 3]) -> Result<PeriodicBox, ExperimentError> {
     let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true; 3]);
     Ok(domain.map_err(|e| RunError::State(e.to_string()))?)
 }
 
 /// These particles in the native runner; with a `fault`, in one that is wrong on purpose.
-///
-/// # Errors
-/// The particles do not suit the model, or the model is invalid at the temperature.
 pub fn simulation(
     model: &Model,
     kt: f64,

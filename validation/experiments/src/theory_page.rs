@@ -4,19 +4,15 @@ use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, composition_critical_point, critical_point_of_model};
 use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style};
 
-/// Points of a curve over temperatures.
 const TEMPERATURES: usize = 25;
 
-/// Labels of axes.
 const DENSITY: &str = "number density ρ [1/length^d]";
 const TEMPERATURE: &str = "kT [energy]";
 const TENSION: &str = "σ [energy/length^(d−1)]";
 
-/// Points of a curve over densities.
 const DENSITIES: usize = 200;
 
 pub struct Scope<'a> {
-    /// The temperatures of the isotherms.
     pub kts: &'a [f64],
     /// Total number density: of a mixture the density that is held, of one species the middle of the isotherms.
     pub density: f64,
@@ -29,9 +25,6 @@ pub struct Scope<'a> {
 }
 
 /// The page.
-///
-/// # Errors
-/// A plot cannot be drawn.
 pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     let species = model.species().len();
     let mut sections = Vec::new();

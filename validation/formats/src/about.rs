@@ -34,7 +34,6 @@ pub struct About {
     pub box_periodic: [bool; 3],
     pub stages: Vec<AboutStage>,
     pub units: String,
-    /// Columns of `thermo.csv`.
     pub thermo: Vec<Column>,
     /// Predictions of theory and published values for this fluid, to compare with the measured values.
     #[serde(default)]
@@ -142,9 +141,6 @@ impl About {
     }
 
     /// Reads `about.json` of a folder; `None` if the file does not exist.
-    ///
-    /// # Errors
-    /// The function fails if the file cannot be read or is not a description of a run.
     pub fn read(folder: &Path) -> Result<Option<About>, FormatError> {
         let path = folder.join("about.json");
         match std::fs::read_to_string(&path) {

@@ -14,7 +14,6 @@ pub struct Configuration {
     /// Names of the species. LAMMPS types are named by their numbers.
     pub names: Vec<String>,
     pub x: Vec<[f64; 3]>,
-    /// Velocities, if the file has them.
     pub v: Option<Vec<[f64; 3]>>,
     /// Species are counted from 0.
     pub species: Vec<i32>,
@@ -37,7 +36,6 @@ impl Configuration {
         self.dimensions = dimensions;
     }
 
-    /// Borrows the configuration as a frame.
     pub fn frame(&self) -> Frame<'_> {
         Frame {
             step: self.step.unwrap_or(0),

@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::FormatError;
-use super::text::{Problem, TextError, finite, shown, whole};
+use super::text::{Problem, TextError, finite, out_of_range, shown, whole};
 
 /// This text precedes the periodic directions in a title.
 const BOUNDARY: &str = "; boundary ";
@@ -286,12 +286,7 @@ impl<'a> Parser<'a> {
                     let lo = finite(words[0], words[2], n)?;
                     let hi = finite(words[1], words[3], n)?;
                     if lo >= hi {
-                        return Err(Problem::OutOfRange {
-                            what: words[3].into(),
-                            text: shown(words[1]),
-                            allowed: format!("above {}", words[2]),
-                        }
-                        .at(n));
+                        return Err(out_of_range(words[3], words[1], format!("above {}", words[2]), n));
                     }
                     sides[d].replace((lo, hi)).is_some()
                 }
@@ -408,12 +403,7 @@ impl<'a> Parser<'a> {
             let kind = whole(words[0], "the type", 1, types as i64, n)? as usize;
             let mass = finite(words[1], "the mass", n)?;
             if mass <= 0.0 {
-                return Err(Problem::OutOfRange {
-                    what: "the mass".into(),
-                    text: shown(words[1]),
-                    allowed: "positive".into(),
-                }
-                .at(n));
+                return Err(out_of_range("the mass", words[1], "positive", n));
             }
             Ok((n, kind, mass))
         })?;

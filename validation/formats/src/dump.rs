@@ -6,11 +6,9 @@ use std::path::Path;
 use super::FormatError;
 use super::text::{Problem, TextError, any_f64, finite, shown, whole};
 
-/// One frame of a dump.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
     pub step: i64,
-    /// The time, if the dump has it.
     pub time: Option<f64>,
     /// Lower corner of the box, not of the bounding box of a tilted box.
     pub boxlo: [f64; 3],
@@ -33,7 +31,6 @@ impl Frame {
         self.values.chunks_exact(self.columns.len().max(1))
     }
 
-    /// The number of the column with this name.
     pub fn column(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|c| c == name)
     }
@@ -240,7 +237,6 @@ impl<R: BufRead> Iterator for DumpReader<R> {
     }
 }
 
-/// The number of digits in a written dump.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Digits {
     /// Six significant digits, as LAMMPS writes by default.

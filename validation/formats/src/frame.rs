@@ -12,7 +12,6 @@ pub struct Frame<'a> {
     pub names: &'a [String],
     /// Positions are wrapped into the box.
     pub x: &'a [[f64; 3]],
-    /// Velocities, if the source has them.
     pub v: Option<&'a [[f64; 3]]>,
     /// Species are counted from 0.
     pub species: &'a [i32],

@@ -75,7 +75,6 @@ fn entries(frames: u64) -> u64 {
 #[derive(Debug)]
 pub struct GsdFile {
     file: File,
-    /// The number of frames in the file.
     frames: u64,
     /// The most frames that the index has room for.
     most: u64,
@@ -85,9 +84,6 @@ pub struct GsdFile {
 
 impl GsdFile {
     /// Creates a file without frames and with room for `most` of them.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn create(path: &Path, most: u64) -> io::Result<GsdFile> {
         let file = File::options().read(true).write(true).create(true).truncate(true).open(path)?;
         let end = INDEX + ENTRY * entries(most);
@@ -182,9 +178,6 @@ impl GsdFile {
     }
 
     /// Syncs the file to the disk.
-    ///
-    /// # Errors
-    /// The disk reports an error.
     pub fn sync(&self) -> io::Result<()> {
         self.file.sync_data()
     }

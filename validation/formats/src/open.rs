@@ -10,7 +10,6 @@ use psidpd_core::engine::PeriodicBox;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// The choice of a frame in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Which {
     /// The last complete frame.

@@ -29,15 +29,12 @@ pub struct Setfl<'a> {
     pub elements: &'a [Element],
     /// The number of densities in the table; the first density is 0.
     pub nrho: usize,
-    /// The spacing of the densities.
     pub drho: f64,
     /// The number of distances in the table; the first distance is 0.
     pub nr: usize,
-    /// The spacing of the distances.
     pub dr: f64,
     /// The force is zero beyond this distance.
     pub cutoff: f64,
-    /// The function F_a(ρ).
     pub embedding: OfOne<'a>,
     /// The function f_b(r): the contribution of an element to the density around it.
     pub density: OfOne<'a>,

@@ -48,6 +48,11 @@ pub fn shown(text: &str) -> String {
     s
 }
 
+/// A number that is not `allowed`.
+pub fn out_of_range(what: &str, text: &str, allowed: impl Into<String>, line: usize) -> TextError {
+    Problem::OutOfRange { what: what.into(), text: shown(text), allowed: allowed.into() }.at(line)
+}
+
 /// Reads any number, including nan and inf.
 pub fn any_f64(text: &str, what: &str, line: usize) -> Result<f64, TextError> {
     text.parse().map_err(|_| Problem::NotNumber { what: what.into(), text: shown(text) }.at(line))
@@ -55,11 +60,7 @@ pub fn any_f64(text: &str, what: &str, line: usize) -> Result<f64, TextError> {
 
 pub fn finite(text: &str, what: &str, line: usize) -> Result<f64, TextError> {
     let x = any_f64(text, what, line)?;
-    if x.is_finite() {
-        Ok(x)
-    } else {
-        Err(Problem::OutOfRange { what: what.into(), text: shown(text), allowed: "finite".into() }.at(line))
-    }
+    if x.is_finite() { Ok(x) } else { Err(out_of_range(what, text, "finite", line)) }
 }
 
 /// Reads a whole number from `min` to `max`.
@@ -68,11 +69,6 @@ pub fn whole(text: &str, what: &str, min: i64, max: i64, line: usize) -> Result<
     let n: i128 = text.parse().map_err(number)?;
     match i64::try_from(n) {
         Ok(n) if (min..=max).contains(&n) => Ok(n),
-        _ => Err(Problem::OutOfRange {
-            what: what.into(),
-            text: shown(text),
-            allowed: format!("between {min} and {max}"),
-        }
-        .at(line)),
+        _ => Err(out_of_range(what, text, format!("between {min} and {max}"), line)),
     }
 }

@@ -11,7 +11,6 @@ pub struct Grid {
     /// The first point.
     pub origin: [f64; 3],
     pub spacing: [f64; 3],
-    /// The numbers of points.
     pub size: [usize; 3],
     /// Names, and values at the points, x running fastest.
     pub fields: Vec<(String, Vec<f32>)>,
@@ -88,9 +87,6 @@ fn escaped(name: &str) -> String {
 }
 
 /// Writes the particles as PolyData: a vertex for each, with `species` counted from 0, `id`, and `velocity` if it is known.
-///
-/// # Errors
-/// Writing to `to` fails.
 pub fn write_vtp(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
     let count = frame.len();
     let mut file = Document::default();
@@ -114,9 +110,6 @@ pub fn write_vtp(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
 }
 
 /// Writes a grid as image data, with the time, step and species of a frame.
-///
-/// # Errors
-/// Writing to `to` fails.
 pub fn write_vti(grid: &Grid, frame: &Frame, to: &mut impl Write) -> io::Result<()> {
     let [origin, spacing] = [grid.origin, grid.spacing].map(|p| p.map(|x| format!("{x:?}")).join(" "));
     let extent = grid.size.map(|n| format!("0 {}", n.saturating_sub(1))).join(" ");

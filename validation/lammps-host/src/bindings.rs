@@ -2,369 +2,66 @@
 
 //! LAMMPS's C library interface, loaded at run time. Written by `tests/tests/bindings.rs`: do not edit.
 
-pub struct LammpsLibrary {
-    __library: ::libloading::Library,
-    pub lammps_open_no_mpi: Result<
-        unsafe extern "C" fn(
-            argc: ::std::os::raw::c_int,
-            argv: *mut *mut ::std::os::raw::c_char,
-            ptr: *mut *mut ::std::os::raw::c_void,
-        ) -> *mut ::std::os::raw::c_void,
-        ::libloading::Error,
-    >,
-    pub lammps_close: Result<unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void), ::libloading::Error>,
-    pub lammps_mpi_finalize: Result<unsafe extern "C" fn(), ::libloading::Error>,
-    pub lammps_command: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            cmd: *const ::std::os::raw::c_char,
-        ) -> *mut ::std::os::raw::c_char,
-        ::libloading::Error,
-    >,
-    pub lammps_get_natoms:
-        Result<unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void) -> f64, ::libloading::Error>,
-    pub lammps_get_thermo: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            keyword: *const ::std::os::raw::c_char,
-        ) -> f64,
-        ::libloading::Error,
-    >,
-    pub lammps_extract_box: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            boxlo: *mut f64,
-            boxhi: *mut f64,
-            xy: *mut f64,
-            yz: *mut f64,
-            xz: *mut f64,
-            pflags: *mut ::std::os::raw::c_int,
-            boxflag: *mut ::std::os::raw::c_int,
-        ),
-        ::libloading::Error,
-    >,
-    pub lammps_extract_setting: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            keyword: *const ::std::os::raw::c_char,
-        ) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-    pub lammps_extract_atom_datatype: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            name: *const ::std::os::raw::c_char,
-        ) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-    pub lammps_extract_atom_size: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            name: *const ::std::os::raw::c_char,
-            type_: ::std::os::raw::c_int,
-        ) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-    pub lammps_extract_compute: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            id: *const ::std::os::raw::c_char,
-            style: ::std::os::raw::c_int,
-            type_: ::std::os::raw::c_int,
-        ) -> *mut ::std::os::raw::c_void,
-        ::libloading::Error,
-    >,
-    pub lammps_extract_fix: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            id: *const ::std::os::raw::c_char,
-            style: ::std::os::raw::c_int,
-            type_: ::std::os::raw::c_int,
-            nrow: ::std::os::raw::c_int,
-            ncol: ::std::os::raw::c_int,
-        ) -> *mut ::std::os::raw::c_void,
-        ::libloading::Error,
-    >,
-    pub lammps_eval: Result<
-        unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void, expr: *const ::std::os::raw::c_char) -> f64,
-        ::libloading::Error,
-    >,
-    pub lammps_gather_atoms: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            name: *const ::std::os::raw::c_char,
-            type_: ::std::os::raw::c_int,
-            count: ::std::os::raw::c_int,
-            data: *mut ::std::os::raw::c_void,
-        ),
-        ::libloading::Error,
-    >,
-    pub lammps_scatter_atoms: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            name: *const ::std::os::raw::c_char,
-            type_: ::std::os::raw::c_int,
-            count: ::std::os::raw::c_int,
-            data: *mut ::std::os::raw::c_void,
-        ),
-        ::libloading::Error,
-    >,
-    pub lammps_gather: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            name: *const ::std::os::raw::c_char,
-            type_: ::std::os::raw::c_int,
-            count: ::std::os::raw::c_int,
-            data: *mut ::std::os::raw::c_void,
-        ),
-        ::libloading::Error,
-    >,
-    pub lammps_version: Result<
-        unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-    pub lammps_has_style: Result<
-        unsafe extern "C" fn(
-            arg1: *mut ::std::os::raw::c_void,
-            arg2: *const ::std::os::raw::c_char,
-            arg3: *const ::std::os::raw::c_char,
-        ) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-    pub lammps_free: Result<unsafe extern "C" fn(ptr: *mut ::std::os::raw::c_void), ::libloading::Error>,
-    pub lammps_has_error: Result<
-        unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-    pub lammps_get_last_error_message: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            buffer: *mut ::std::os::raw::c_char,
-            buf_size: ::std::os::raw::c_int,
-        ) -> ::std::os::raw::c_int,
-        ::libloading::Error,
-    >,
-}
-impl LammpsLibrary {
-    pub unsafe fn new<P>(path: P) -> Result<Self, ::libloading::Error>
-    where
-        P: AsRef<::std::ffi::OsStr>,
-    {
-        let path = path.as_ref();
-        let library = ::libloading::Library::new(path)?;
-        Self::from_library(library)
-    }
-    pub unsafe fn from_library<L>(library: L) -> Result<Self, ::libloading::Error>
-    where
-        L: Into<::libloading::Library>,
-    {
-        let __library = library.into();
-        let lammps_open_no_mpi = __library.get(b"lammps_open_no_mpi\0").map(|sym| *sym);
-        let lammps_close = __library.get(b"lammps_close\0").map(|sym| *sym);
-        let lammps_mpi_finalize = __library.get(b"lammps_mpi_finalize\0").map(|sym| *sym);
-        let lammps_command = __library.get(b"lammps_command\0").map(|sym| *sym);
-        let lammps_get_natoms = __library.get(b"lammps_get_natoms\0").map(|sym| *sym);
-        let lammps_get_thermo = __library.get(b"lammps_get_thermo\0").map(|sym| *sym);
-        let lammps_extract_box = __library.get(b"lammps_extract_box\0").map(|sym| *sym);
-        let lammps_extract_setting = __library.get(b"lammps_extract_setting\0").map(|sym| *sym);
-        let lammps_extract_atom_datatype = __library.get(b"lammps_extract_atom_datatype\0").map(|sym| *sym);
-        let lammps_extract_atom_size = __library.get(b"lammps_extract_atom_size\0").map(|sym| *sym);
-        let lammps_extract_compute = __library.get(b"lammps_extract_compute\0").map(|sym| *sym);
-        let lammps_extract_fix = __library.get(b"lammps_extract_fix\0").map(|sym| *sym);
-        let lammps_eval = __library.get(b"lammps_eval\0").map(|sym| *sym);
-        let lammps_gather_atoms = __library.get(b"lammps_gather_atoms\0").map(|sym| *sym);
-        let lammps_scatter_atoms = __library.get(b"lammps_scatter_atoms\0").map(|sym| *sym);
-        let lammps_gather = __library.get(b"lammps_gather\0").map(|sym| *sym);
-        let lammps_version = __library.get(b"lammps_version\0").map(|sym| *sym);
-        let lammps_has_style = __library.get(b"lammps_has_style\0").map(|sym| *sym);
-        let lammps_free = __library.get(b"lammps_free\0").map(|sym| *sym);
-        let lammps_has_error = __library.get(b"lammps_has_error\0").map(|sym| *sym);
-        let lammps_get_last_error_message = __library.get(b"lammps_get_last_error_message\0").map(|sym| *sym);
-        Ok(LammpsLibrary {
-            __library,
-            lammps_open_no_mpi,
-            lammps_close,
-            lammps_mpi_finalize,
-            lammps_command,
-            lammps_get_natoms,
-            lammps_get_thermo,
-            lammps_extract_box,
-            lammps_extract_setting,
-            lammps_extract_atom_datatype,
-            lammps_extract_atom_size,
-            lammps_extract_compute,
-            lammps_extract_fix,
-            lammps_eval,
-            lammps_gather_atoms,
-            lammps_scatter_atoms,
-            lammps_gather,
-            lammps_version,
-            lammps_has_style,
-            lammps_free,
-            lammps_has_error,
-            lammps_get_last_error_message,
-        })
-    }
-    pub unsafe fn lammps_open_no_mpi(
-        &self,
-        argc: ::std::os::raw::c_int,
-        argv: *mut *mut ::std::os::raw::c_char,
-        ptr: *mut *mut ::std::os::raw::c_void,
-    ) -> *mut ::std::os::raw::c_void {
-        (self.lammps_open_no_mpi.as_ref().expect("Expected function, got error."))(argc, argv, ptr)
-    }
-    pub unsafe fn lammps_close(&self, handle: *mut ::std::os::raw::c_void) {
-        (self.lammps_close.as_ref().expect("Expected function, got error."))(handle)
-    }
-    pub unsafe fn lammps_mpi_finalize(&self) {
-        (self.lammps_mpi_finalize.as_ref().expect("Expected function, got error."))()
-    }
-    pub unsafe fn lammps_command(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        cmd: *const ::std::os::raw::c_char,
-    ) -> *mut ::std::os::raw::c_char {
-        (self.lammps_command.as_ref().expect("Expected function, got error."))(handle, cmd)
-    }
-    pub unsafe fn lammps_get_natoms(&self, handle: *mut ::std::os::raw::c_void) -> f64 {
-        (self.lammps_get_natoms.as_ref().expect("Expected function, got error."))(handle)
-    }
-    pub unsafe fn lammps_get_thermo(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        keyword: *const ::std::os::raw::c_char,
-    ) -> f64 {
-        (self.lammps_get_thermo.as_ref().expect("Expected function, got error."))(handle, keyword)
-    }
-    pub unsafe fn lammps_extract_box(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
+use std::ffi::{c_char, c_int, c_void};
+
+library! {
+    pub fn lammps_open_no_mpi(argc: c_int, argv: *mut *mut c_char, ptr: *mut *mut c_void) -> *mut c_void;
+    pub fn lammps_close(handle: *mut c_void);
+    pub fn lammps_mpi_finalize();
+    pub fn lammps_command(handle: *mut c_void, cmd: *const c_char) -> *mut c_char;
+    pub fn lammps_get_natoms(handle: *mut c_void) -> f64;
+    pub fn lammps_get_thermo(handle: *mut c_void, keyword: *const c_char) -> f64;
+    pub fn lammps_extract_box(
+        handle: *mut c_void,
         boxlo: *mut f64,
         boxhi: *mut f64,
         xy: *mut f64,
         yz: *mut f64,
         xz: *mut f64,
-        pflags: *mut ::std::os::raw::c_int,
-        boxflag: *mut ::std::os::raw::c_int,
-    ) {
-        (self.lammps_extract_box.as_ref().expect("Expected function, got error."))(
-            handle, boxlo, boxhi, xy, yz, xz, pflags, boxflag,
-        )
-    }
-    pub unsafe fn lammps_extract_setting(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        keyword: *const ::std::os::raw::c_char,
-    ) -> ::std::os::raw::c_int {
-        (self.lammps_extract_setting.as_ref().expect("Expected function, got error."))(handle, keyword)
-    }
-    pub unsafe fn lammps_extract_atom_datatype(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        name: *const ::std::os::raw::c_char,
-    ) -> ::std::os::raw::c_int {
-        (self.lammps_extract_atom_datatype.as_ref().expect("Expected function, got error."))(handle, name)
-    }
-    pub unsafe fn lammps_extract_atom_size(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        name: *const ::std::os::raw::c_char,
-        type_: ::std::os::raw::c_int,
-    ) -> ::std::os::raw::c_int {
-        (self.lammps_extract_atom_size.as_ref().expect("Expected function, got error."))(handle, name, type_)
-    }
-    pub unsafe fn lammps_extract_compute(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        id: *const ::std::os::raw::c_char,
-        style: ::std::os::raw::c_int,
-        type_: ::std::os::raw::c_int,
-    ) -> *mut ::std::os::raw::c_void {
-        (self.lammps_extract_compute.as_ref().expect("Expected function, got error."))(
-            handle, id, style, type_,
-        )
-    }
-    pub unsafe fn lammps_extract_fix(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        id: *const ::std::os::raw::c_char,
-        style: ::std::os::raw::c_int,
-        type_: ::std::os::raw::c_int,
-        nrow: ::std::os::raw::c_int,
-        ncol: ::std::os::raw::c_int,
-    ) -> *mut ::std::os::raw::c_void {
-        (self.lammps_extract_fix.as_ref().expect("Expected function, got error."))(
-            handle, id, style, type_, nrow, ncol,
-        )
-    }
-    pub unsafe fn lammps_eval(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        expr: *const ::std::os::raw::c_char,
-    ) -> f64 {
-        (self.lammps_eval.as_ref().expect("Expected function, got error."))(handle, expr)
-    }
-    pub unsafe fn lammps_gather_atoms(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        name: *const ::std::os::raw::c_char,
-        type_: ::std::os::raw::c_int,
-        count: ::std::os::raw::c_int,
-        data: *mut ::std::os::raw::c_void,
-    ) {
-        (self.lammps_gather_atoms.as_ref().expect("Expected function, got error."))(
-            handle, name, type_, count, data,
-        )
-    }
-    pub unsafe fn lammps_scatter_atoms(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        name: *const ::std::os::raw::c_char,
-        type_: ::std::os::raw::c_int,
-        count: ::std::os::raw::c_int,
-        data: *mut ::std::os::raw::c_void,
-    ) {
-        (self.lammps_scatter_atoms.as_ref().expect("Expected function, got error."))(
-            handle, name, type_, count, data,
-        )
-    }
-    pub unsafe fn lammps_gather(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        name: *const ::std::os::raw::c_char,
-        type_: ::std::os::raw::c_int,
-        count: ::std::os::raw::c_int,
-        data: *mut ::std::os::raw::c_void,
-    ) {
-        (self.lammps_gather.as_ref().expect("Expected function, got error."))(
-            handle, name, type_, count, data,
-        )
-    }
-    pub unsafe fn lammps_version(&self, handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int {
-        (self.lammps_version.as_ref().expect("Expected function, got error."))(handle)
-    }
-    pub unsafe fn lammps_has_style(
-        &self,
-        arg1: *mut ::std::os::raw::c_void,
-        arg2: *const ::std::os::raw::c_char,
-        arg3: *const ::std::os::raw::c_char,
-    ) -> ::std::os::raw::c_int {
-        (self.lammps_has_style.as_ref().expect("Expected function, got error."))(arg1, arg2, arg3)
-    }
-    pub unsafe fn lammps_free(&self, ptr: *mut ::std::os::raw::c_void) {
-        (self.lammps_free.as_ref().expect("Expected function, got error."))(ptr)
-    }
-    pub unsafe fn lammps_has_error(&self, handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int {
-        (self.lammps_has_error.as_ref().expect("Expected function, got error."))(handle)
-    }
-    pub unsafe fn lammps_get_last_error_message(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-        buffer: *mut ::std::os::raw::c_char,
-        buf_size: ::std::os::raw::c_int,
-    ) -> ::std::os::raw::c_int {
-        (self.lammps_get_last_error_message.as_ref().expect("Expected function, got error."))(
-            handle, buffer, buf_size,
-        )
-    }
+        pflags: *mut c_int,
+        boxflag: *mut c_int,
+    );
+    pub fn lammps_extract_setting(handle: *mut c_void, keyword: *const c_char) -> c_int;
+    pub fn lammps_extract_atom_datatype(handle: *mut c_void, name: *const c_char) -> c_int;
+    pub fn lammps_extract_atom_size(handle: *mut c_void, name: *const c_char, type_: c_int) -> c_int;
+    pub fn lammps_extract_compute(
+        handle: *mut c_void,
+        id: *const c_char,
+        style: c_int,
+        type_: c_int,
+    ) -> *mut c_void;
+    pub fn lammps_extract_fix(
+        handle: *mut c_void,
+        id: *const c_char,
+        style: c_int,
+        type_: c_int,
+        nrow: c_int,
+        ncol: c_int,
+    ) -> *mut c_void;
+    pub fn lammps_eval(handle: *mut c_void, expr: *const c_char) -> f64;
+    pub fn lammps_gather_atoms(
+        handle: *mut c_void,
+        name: *const c_char,
+        type_: c_int,
+        count: c_int,
+        data: *mut c_void,
+    );
+    pub fn lammps_scatter_atoms(
+        handle: *mut c_void,
+        name: *const c_char,
+        type_: c_int,
+        count: c_int,
+        data: *mut c_void,
+    );
+    pub fn lammps_gather(
+        handle: *mut c_void,
+        name: *const c_char,
+        type_: c_int,
+        count: c_int,
+        data: *mut c_void,
+    );
+    pub fn lammps_version(handle: *mut c_void) -> c_int;
+    pub fn lammps_has_style(arg1: *mut c_void, arg2: *const c_char, arg3: *const c_char) -> c_int;
+    pub fn lammps_has_error(handle: *mut c_void) -> c_int;
+    pub fn lammps_get_last_error_message(handle: *mut c_void, buffer: *mut c_char, buf_size: c_int) -> c_int;
 }

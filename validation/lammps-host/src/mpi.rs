@@ -8,7 +8,6 @@ use super::error::LammpsError;
 
 #[derive(Debug)]
 pub(super) struct Mpi {
-    /// The folder with `mpi.h`.
     pub include: PathBuf,
     pub library: Option<PathBuf>,
     pub mpirun: Option<PathBuf>,

@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::error::ObserveError;
 use super::statistics::estimate;
 
-/// The straight-line drift of a series in time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Drift {
     /// Least-squares slope b = Σ (tᵢ − t̄)(xᵢ − x̄) / Σ (tᵢ − t̄)², in the units of the series per unit of time.

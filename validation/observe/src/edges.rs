@@ -18,7 +18,6 @@ pub struct Edges {
     pub steepest: f64,
 }
 
-/// The smallest number of bins in a flank.
 const FEWEST: usize = 6;
 
 /// The distance of a plateau from the interface, in 10–90 % widths. Layers near the surface of a liquid decay within

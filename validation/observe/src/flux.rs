@@ -30,7 +30,6 @@ pub enum Carrier {
     Pair,
 }
 
-/// The momentum transport in a step.
 #[derive(Debug, Clone, Default)]
 pub struct Flux {
     /// The paths of the particles.

@@ -31,7 +31,6 @@ pub struct View<'a> {
     pub tags: &'a [i32],
     /// True for particles that never move; empty if all particles move.
     pub frozen: &'a [bool],
-    /// The kinetic temperature as kT.
     pub temperature: f64,
     /// The kinetic energy `½ Σ m v²`.
     pub kinetic_energy: f64,
@@ -104,7 +103,6 @@ impl<'a> Frame<'a> {
         self.view.masses[self.view.species[particle] as usize]
     }
 
-    /// Returns false for frozen particles.
     pub fn moves(&self, particle: usize) -> bool {
         !self.view.frozen.get(particle).is_some_and(|frozen| *frozen)
     }

@@ -5,8 +5,8 @@ pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
 
 /// Declares keys in short, as the macro of models does. Constants go before a key: `use AXIS;`.
 macro_rules! keys {
-    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
-        &[$($($shared,)* $crate::keys::key($name, $value, $need, $about, $example)),*]
+    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*$(then $last:ident;)?) => {
+        &[$($($shared,)* $crate::keys::key($name, $value, $need, $about, $example),)* $($last)?]
     };
 }
 pub(crate) use keys;

@@ -53,7 +53,6 @@ pub fn slopes(
 struct Problem<'a, F> {
     at: DVector<f64>,
     steps: &'a [f64],
-    /// The number of residuals.
     count: usize,
     residuals: F,
 }

@@ -12,11 +12,8 @@ pub enum Kind {
     #[default]
     /// Single numbers: every column has one value, and there is no `x`.
     Scalar,
-    /// Values along a coordinate in space.
     Profile,
-    /// Values against any other quantity.
     Curve,
-    /// Values against time.
     Series,
     /// Values at points of space: the first columns are the coordinates, and there is no `x`.
     Field,
@@ -49,7 +46,7 @@ pub struct Column {
 }
 
 /// The result of an observable in one stage. A file may lack everything but the name: other programs write such files too.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Observation {
     /// The name, unique within a stage; letters, digits and underscores.
     pub name: String,
@@ -73,28 +70,16 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// An observation without columns.
     pub fn new(name: &str, title: &str, kind: Kind) -> Observation {
-        Observation {
-            name: name.into(),
-            title: title.into(),
-            stage: String::new(),
-            kind,
-            x: None,
-            columns: Vec::new(),
-            samples: 0,
-            note: String::new(),
-        }
+        Observation { name: name.into(), title: title.into(), kind, ..Observation::default() }
     }
 
-    /// Adds an abscissa.
     #[must_use]
     pub fn against(mut self, name: &str, unit: &str, values: Vec<f64>) -> Observation {
         self.x = Some(Abscissa { name: name.into(), unit: unit.into(), values });
         self
     }
 
-    /// Adds a column.
     #[must_use]
     pub fn column(
         mut self,
@@ -119,7 +104,6 @@ impl Observation {
         self
     }
 
-    /// Appends a sentence to the note.
     #[must_use]
     pub fn note(mut self, text: impl AsRef<str>) -> Observation {
         if !self.note.is_empty() && !text.as_ref().is_empty() {

@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Observers {
     observers: Vec<Observer>,
-    /// The present stage.
     stage: String,
     /// The step before the first step of the stage.
     start: u64,
@@ -31,7 +30,6 @@ struct Observer {
     stages: Vec<Sampled>,
 }
 
-/// One observable in one stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Sampled {
     stage: String,
@@ -145,7 +143,6 @@ impl Observers {
         if forgetful == self.observers { Ok(restored) } else { Err(ObserveError::OtherObservables) }
     }
 
-    /// The results of all observables.
     pub fn finish(&self) -> Vec<Observation> {
         let mut all = Vec::new();
         for sampled in self.observers.iter().flat_map(|o| &o.stages) {

@@ -3,6 +3,7 @@
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
+use std::fmt::Display;
 
 /// The names of the faces of a box: axis, and whether the face is the upper one.
 pub const FACES: [(&str, (usize, bool)); 6] = [
@@ -32,7 +33,6 @@ pub struct Place<'a> {
 pub struct Drive {
     /// The direction along which the force is reversed.
     pub across: usize,
-    /// The direction of the force.
     pub along: usize,
     /// The acceleration in the lower half of the box.
     pub acceleration: f64,
@@ -64,33 +64,18 @@ impl<'a> Options<'a> {
         self.section.as_ref()?.get(key)
     }
 
-    /// A number above zero.
     pub fn positive(&self, key: &str) -> Result<Option<f64>, FileError> {
         self.get(key).map(|value| value.positive()).transpose()
     }
 
-    /// A number from `low` to `high`.
     pub fn number(&self, key: &str, low: f64, high: f64) -> Result<Option<f64>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        let number = value.number()?.value;
-        if (low..=high).contains(&number) {
-            Ok(Some(number))
-        } else {
-            let message = format!("must be from {low} to {high}, is {number}");
-            Err(value.error(FileErrorKind::Value(message)))
-        }
+        within(&value, value.number()?.value, low, high).map(Some)
     }
 
-    /// A whole number from `low` to `high`.
     pub fn count(&self, key: &str, low: u64, high: u64) -> Result<Option<usize>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        let number = value.count()?.value;
-        if (low..=high).contains(&number) {
-            Ok(Some(number as usize))
-        } else {
-            let message = format!("must be from {low} to {high}, is {number}");
-            Err(value.error(FileErrorKind::Value(message)))
-        }
+        Ok(Some(within(&value, value.count()?.value, low, high)? as usize))
     }
 
     /// Two whole numbers from `low` to `high`.
@@ -98,14 +83,9 @@ impl<'a> Options<'a> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let items = value.array()?;
         let [a, b] = items.as_slice() else {
-            return Err(value.error(FileErrorKind::Value("expected two whole numbers".into())));
+            return Err(value.error("expected two whole numbers"));
         };
-        let read = |item: &Value| {
-            let number = item.count()?.value;
-            let message = format!("must be from {low} to {high}, is {number}");
-            let inside = (low..=high).contains(&number);
-            if inside { Ok(number as usize) } else { Err(item.error(FileErrorKind::Value(message))) }
-        };
+        let read = |item: &Value| Ok(within(item, item.count()?.value, low, high)? as usize);
         Ok(Some([read(a)?, read(b)?]))
     }
 
@@ -119,7 +99,6 @@ impl<'a> Options<'a> {
         self.get(key).map(|value| Ok(value.one_of("axis", names)?.value)).transpose()
     }
 
-    /// The index of a species of the model.
     pub fn species(&self, key: &str) -> Result<Option<usize>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let names: Vec<(&str, usize)> =
@@ -138,8 +117,49 @@ impl<'a> Options<'a> {
     }
 
     /// An error about a key, or about the observable if the key is not set.
-    pub fn error(&self, key: &str, message: impl Into<String>) -> FileError {
-        self.at(key).error(FileErrorKind::Value(message.into()))
+    pub fn error(&self, key: &str, kind: impl Into<FileErrorKind>) -> FileError {
+        self.at(key).error(kind)
+    }
+
+    /// A length up to half the box.
+    pub fn within_half_box(&self, key: &str) -> Result<Option<f64>, FileError> {
+        let (length, half) = (self.positive(key)?, self.half_box());
+        match length.filter(|length| *length > half * (1.0 + 1e-12)) {
+            Some(length) => {
+                Err(self.error(key, format!("must not exceed half the box, {half}, is {length}")))
+            }
+            None => Ok(length),
+        }
+    }
+
+    /// The key `bins`; if left out, as many bins as make them `width` wide, or a little less.
+    pub fn bins(&self, length: f64, width: f64, fewest: usize) -> Result<usize, FileError> {
+        let given = self.count("bins", fewest as u64, 10_000)?;
+        Ok(given.unwrap_or(((length / width).ceil() as usize).clamp(fewest, 10_000)))
+    }
+
+    /// The key `bins` of a plane; if left out, as many bins as make them 0.25 wide, or a little less.
+    pub fn bins_of_plane(&self, lengths: [f64; 2], fewest: usize) -> Result<[usize; 2], FileError> {
+        let given = self.counts("bins", fewest as u64, 2000)?;
+        Ok(given.unwrap_or(lengths.map(|l| ((l / 0.25).ceil() as usize).clamp(fewest, 2000))))
+    }
+
+    /// Refuses a tilted box, with an error about a key.
+    pub fn require_right_angles(&self, key: &str) -> Result<(), FileError> {
+        let (domain, lengths) = (self.place.domain, self.place.domain.lengths());
+        let tilted = |k| (domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k];
+        match (0..self.place.fluid.dimensions).any(tilted) {
+            true => Err(self.error(key, "the box must have right angles")),
+            false => Ok(()),
+        }
+    }
+
+    /// Refuses a box with walls.
+    pub fn require_periodic(&self) -> Result<(), FileError> {
+        match self.place.domain.periodic()[..self.place.fluid.dimensions].contains(&false) {
+            true => Err(self.error("", "the box must be periodic in every direction")),
+            false => Ok(()),
+        }
     }
 
     /// Half the smallest distance of two periodic faces of the box; of all faces if none is periodic.
@@ -148,5 +168,13 @@ impl<'a> Options<'a> {
         let periodic = domain.periodic();
         let any = periodic[..d].contains(&true);
         (0..d).filter(|k| periodic[*k] || !any).map(|k| 0.5 * domain.height(k)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Refuses a number outside a range, with an error about its value.
+fn within<T: PartialOrd + Display>(value: &Value, number: T, low: T, high: T) -> Result<T, FileError> {
+    match (&low..=&high).contains(&&number) {
+        true => Ok(number),
+        false => Err(value.error(format!("must be from {low} to {high}, is {number}"))),
     }
 }

@@ -191,9 +191,7 @@ pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
 /// The parameters that [`interface_width`] fits to a flank.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interface {
-    /// The density ρ_L.
     pub liquid: f64,
-    /// The density ρ_V.
     pub vapour: f64,
     /// The position s₀, from the centre.
     pub place: f64,

@@ -7,7 +7,6 @@ use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 
-/// The requested observables of a scene.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Observe {
     /// Requests are in the order of the reference.
@@ -19,7 +18,6 @@ pub struct Request {
     pub every: u64,
     /// The number of steps at the beginning of a stage without samples.
     pub skip: u64,
-    /// The sampled stages.
     pub stages: Vec<String>,
     /// The observable with its settings and no samples.
     pub meter: AnyMeter,
@@ -64,14 +62,13 @@ pub fn read(
             None => preset,
         };
         if kind.every_step && settings.every != 1 {
-            let message = "needs every step: every must be 1 or left out".to_owned();
-            return Err(options.at("every").error(FileErrorKind::Value(message)));
+            return Err(options.at("every").error("needs every step: every must be 1 or left out"));
         }
         let is_timeless = |stage: &String| place.stages.timeless.contains(&stage.as_str());
         if let Some(stage) = settings.stages.iter().find(|s| kind.of_motion && is_timeless(s)) {
             let message =
                 format!("needs motion in time, but the integrator of stage \"{stage}\" is monte-carlo");
-            let error = options.at("stages").error(FileErrorKind::Value(message));
+            let error = options.at("stages").error(message);
             return Err(error.with_help("observe a stage of an integrator with a time step"));
         }
         let meter = (kind.read)(&options)?;
@@ -100,7 +97,7 @@ impl Common {
         if let Some(value) = section.get("every") {
             common.every = value.count()?.value;
             if common.every == 0 {
-                return Err(value.error(FileErrorKind::Value("must be at least 1".into())));
+                return Err(value.error("must be at least 1"));
             }
         }
         if let Some(value) = section.get("skip") {
@@ -120,7 +117,7 @@ impl Common {
                 }
             }
             if common.stages.is_empty() {
-                return Err(value.error(FileErrorKind::Value("must name at least one stage".into())));
+                return Err(value.error("must name at least one stage"));
             }
         }
         Ok(common)

@@ -168,12 +168,10 @@ impl Series {
         self.rows().map(|row| row[k]).collect()
     }
 
-    /// The mean of component `k`.
     pub fn mean(&self, k: usize) -> Measured {
         Measured::mean(&self.channel(k))
     }
 
-    /// The means of all components.
     pub fn means(&self) -> Vec<f64> {
         self.means_of(0..self.len())
     }

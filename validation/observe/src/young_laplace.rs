@@ -20,9 +20,7 @@ const LONGEST: f64 = 30.0;
 /// A point of a contour. Lengths are in radii of the apex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// The distance from the axis.
     pub r: f64,
-    /// The height above the apex.
     pub z: f64,
     /// The angle between the contour and the horizontal.
     pub phi: f64,

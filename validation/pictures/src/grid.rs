@@ -81,9 +81,6 @@ pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
 
 /// Writes the particles and their density into the folder of VTK's files of a run, each file whole or not at all. The folder is
 /// created if it does not exist. A box with edges that are not along the axes gets no density.
-///
-/// # Errors
-/// A file cannot be written.
 pub fn write_vtk(folder: &Path, frame: &Frame, kernel: Option<Kernel>) -> Result<(), FormatError> {
     let folder = folder.join(VTK);
     std::fs::create_dir_all(&folder).map_err(|cause| WriteError { path: folder.clone(), cause })?;
@@ -109,9 +106,6 @@ pub fn write_vtk(folder: &Path, frame: &Frame, kernel: Option<Kernel>) -> Result
 }
 
 /// Removes VTK's files of an earlier run from the folder of a run.
-///
-/// # Errors
-/// A file cannot be removed.
 pub fn remove_vtk(folder: &Path) -> Result<(), FormatError> {
     let Ok(entries) = std::fs::read_dir(folder.join(VTK)) else { return Ok(()) };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {

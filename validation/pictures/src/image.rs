@@ -6,7 +6,6 @@ use base64::Engine as _;
 pub struct Image {
     /// The number of pixels in a row.
     pub width: usize,
-    /// The number of rows.
     pub height: usize,
     /// The slice has `width · height` colours.
     pub pixels: Vec<Rgb>,
@@ -55,18 +54,12 @@ impl Image {
     }
 
     /// Encodes the image as a PNG file.
-    ///
-    /// # Errors
-    /// The function fails for an image without pixels.
     pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
         Image::to_apng(std::slice::from_ref(self), 1)
     }
 
     /// Encodes an animated PNG file that repeats forever, with `per_second` frames in a second; one image gives a plain
     /// PNG. Programs that support only plain PNG show the first image.
-    ///
-    /// # Errors
-    /// The function fails for no images or for images of different sizes.
     pub fn to_apng(images: &[Image], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
         let wrong = |what: &str| {
             png::EncodingError::IoError(std::io::Error::new(

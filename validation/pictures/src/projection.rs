@@ -53,7 +53,6 @@ pub struct Projection {
     axes: [[f64; 3]; 3],
     /// The left and lower end of the picture, as lengths along the first two axes.
     low: [f64; 2],
-    /// The number of pixels in a unit of length.
     scale: f64,
     width: usize,
     height: usize,

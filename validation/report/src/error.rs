@@ -1,7 +1,6 @@
 use psidpd_formats::files::WriteError;
 use std::path::PathBuf;
 
-/// An error while a report is made or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     #[error("cannot draw the plot: {0}")]

@@ -107,9 +107,6 @@ impl Figure {
     }
 
     /// Makes the SVG document, without prolog, fit for embedding.
-    ///
-    /// # Errors
-    /// The function fails for a picture without pixels.
     pub fn render(&self) -> Result<String, ReportError> {
         let png = self.image.to_data_url().map_err(|e| ReportError::Plot(e.to_string()))?;
         let (w, h) = (self.image.width as f64, self.image.height as f64);

@@ -17,13 +17,10 @@ pub struct Report {
     /// Names and values at the top of the page: versions, machine, seeds.
     pub facts: Vec<(String, String)>,
     pub sections: Vec<Section>,
-    /// The number of passed checks.
     pub passed: usize,
-    /// The number of failed checks.
     pub failed: usize,
 }
 
-/// A heading with its content.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Section {
     pub heading: String,
@@ -36,7 +33,6 @@ impl Section {
     }
 }
 
-/// One item of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
     /// Text; blank lines separate paragraphs.
@@ -58,9 +54,6 @@ impl Item {
     }
 
     /// A plot with the text below it.
-    ///
-    /// # Errors
-    /// The function fails if plotters cannot draw the plot.
     pub fn figure(plot: &Plot, caption: impl Into<String>) -> Result<Item, ReportError> {
         Ok(Item::Figure { svg: plot.render()?, caption: caption.into() })
     }

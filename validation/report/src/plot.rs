@@ -10,7 +10,6 @@ use super::scale::Scale;
 use super::text::{fit, one_line, width};
 use psidpd_pictures::colour;
 
-/// The style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Style {
     /// A line; errors appear as a band.
@@ -24,7 +23,6 @@ pub enum Style {
     Faint,
 }
 
-/// One set of data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
     /// The name in the legend. A series without a name is not in the legend.
@@ -39,17 +37,12 @@ pub struct Series {
 /// A plot with linear or logarithmic axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plot {
-    /// The title above the plot; may be empty.
     pub title: String,
-    /// The label of the horizontal axis; may be empty.
     pub x_label: String,
-    /// The label of the vertical axis; may be empty.
     pub y_label: String,
     /// Series are drawn in this order.
     pub series: Vec<Series>,
-    /// True if the horizontal axis is logarithmic.
     pub log_x: bool,
-    /// True if the vertical axis is logarithmic.
     pub log_y: bool,
     /// Horizontal reference lines with labels.
     pub levels: Vec<(f64, String)>,
@@ -98,16 +91,12 @@ struct Shown {
 }
 
 impl Plot {
-    /// A plot with linear axes.
     pub fn new(title: impl Into<String>, labels: [impl Into<String>; 2], series: Vec<Series>) -> Plot {
         let [x_label, y_label] = labels.map(Into::into);
         Plot { title: title.into(), x_label, y_label, series, ..Plot::default() }
     }
 
     /// Draws the plot as an SVG document without prolog, fit for embedding.
-    ///
-    /// # Errors
-    /// The function fails if plotters cannot draw the plot.
     pub fn render(&self) -> Result<String, ReportError> {
         let [x, y] = &self.scales();
         let (legend, rows) = self.legend();

@@ -43,7 +43,6 @@ pub struct Overall {
 }
 
 impl Overall {
-    /// Adds `n` to the count.
     pub fn advance(&self, n: u64) {
         self.bar.advance(n);
         let made = n + self.made.fetch_add(n, Ordering::Relaxed);
@@ -153,12 +152,10 @@ impl Default for Progress {
 }
 
 impl Bar {
-    /// Adds `n` to the count.
     pub fn advance(&self, n: u64) {
         self.inner.inc(n);
     }
 
-    /// Sets the count to `n`.
     pub fn set(&self, n: u64) {
         self.inner.set_position(n);
     }

@@ -10,14 +10,13 @@ use super::ReportError;
 /// One check: the comparison of a number with a limit.
 ///
 /// JSON has no NaN or infinity: a non-finite float is written as `null`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Check {
     /// The short name, unique within the results.
     pub id: String,
     /// The heading under which the check is reported.
     pub section: String,
     pub description: String,
-    /// The measured value.
     pub value: f64,
     /// The standard error of `value`, if it has one.
     pub error: Option<f64>,
@@ -41,8 +40,9 @@ impl Check {
         value: f64,
         limit: f64,
     ) -> Self {
+        let (id, section, description) = (id.into(), section.into(), description.into());
         let passed = value.is_finite() && limit.is_finite() && value.abs() <= limit;
-        Self::judged(id.into(), section.into(), description.into(), value, limit, passed)
+        Self { id, section, description, value, limit, passed, ..Self::default() }
     }
 
     /// The check passes if `value >= limit`, signs included. A non-finite value or limit fails.
@@ -54,8 +54,7 @@ impl Check {
         limit: f64,
     ) -> Self {
         let passed = value.is_finite() && limit.is_finite() && value >= limit;
-        let check = Self::judged(id.into(), section.into(), description.into(), value, limit, passed);
-        Self { at_least: true, ..check }
+        Self { at_least: true, passed, ..Self::at_most(id, section, description, value, limit) }
     }
 
     /// The check passes if a difference is within `z_limit` standard errors of zero: `|delta| <= z_limit * error`.
@@ -86,38 +85,14 @@ impl Check {
         self.error = Some(error);
         self
     }
-
-    fn judged(
-        id: String,
-        section: String,
-        description: String,
-        value: f64,
-        limit: f64,
-        passed: bool,
-    ) -> Self {
-        Self {
-            id,
-            section,
-            description,
-            value,
-            error: None,
-            expected: None,
-            limit,
-            at_least: false,
-            passed,
-            note: String::new(),
-        }
-    }
 }
 
-/// The results of a run of checks.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Results {
     pub title: String,
     pub version: String,
     /// Circumstances: machine, versions, settings.
     pub facts: BTreeMap<String, String>,
-    /// Seeds of the random numbers.
     pub seeds: Vec<u64>,
     /// Checks are in the order in which they were made.
     pub checks: Vec<Check>,
@@ -130,18 +105,9 @@ pub struct Results {
 impl Results {
     /// Results without checks, which therefore have not passed.
     pub fn new(title: impl Into<String>, version: impl Into<String>) -> Self {
-        Self {
-            title: title.into(),
-            version: version.into(),
-            facts: BTreeMap::new(),
-            seeds: Vec::new(),
-            checks: Vec::new(),
-            values: BTreeMap::new(),
-            passed: false,
-        }
+        Self { title: title.into(), version: version.into(), ..Self::default() }
     }
 
-    /// Adds a check and updates the verdict.
     pub fn push(&mut self, check: Check) {
         self.checks.push(check);
         self.passed = self.failed_count() == 0;
@@ -153,12 +119,10 @@ impl Results {
         Ok(())
     }
 
-    /// The number of passed checks.
     pub fn passed_count(&self) -> usize {
         self.checks.iter().filter(|c| c.passed).count()
     }
 
-    /// The number of failed checks.
     pub fn failed_count(&self) -> usize {
         self.checks.len() - self.passed_count()
     }

@@ -4,24 +4,19 @@ use std::io::{IsTerminal, stdout};
 
 use super::text::{columns, one_line};
 
-/// The alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Align {
     /// To the right if every cell that is not blank looks like a number.
     #[default]
     Auto,
-    /// To the left.
     Left,
-    /// To the right, as for numbers.
     Right,
 }
 
 /// A table of text. Rows may be shorter or longer than the header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Table {
-    /// Names of the columns.
     pub header: Vec<String>,
-    /// The cells, row by row.
     pub rows: Vec<Vec<String>>,
     /// The alignment of each column; columns beyond its end are [`Align::Auto`].
     pub align: Vec<Align>,

@@ -21,7 +21,7 @@ pub struct Arguments {
     #[arg(long)]
     all: bool,
     /// Particles of the many-body fluid in the boxes [default: 6050,48400; with --full also 387200].
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
     sizes: Vec<NonZeroUsize>,
     /// Interleaved rounds [default: 3; with --all 5, with --full 7].
     #[arg(long, value_name = "N")]
@@ -40,7 +40,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = thread_count)]
     threads: Vec<NonZeroUsize>,
     /// Particles of the systems whose memory is measured [default: none; with --all 1000000; with --full also 3750000].
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
     memory: Vec<NonZeroUsize>,
     /// Time `pair_style dpd/psi` with these words behind the seed too, "precision double threads 2"; can be given
     /// several times.
@@ -59,10 +59,6 @@ pub struct Arguments {
     /// What the child process that measures memory is asked for.
     #[arg(long, hide = true)]
     measure_memory: Option<usize>,
-}
-
-fn at_least_one(text: &str) -> Result<NonZeroUsize, String> {
-    text.parse().map_err(|e| format!("{e}"))
 }
 
 fn positive(text: &str) -> Result<f64, String> {

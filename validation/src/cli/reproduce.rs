@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let chosen = choose(&arguments.ids)?;
     if arguments.list {
         let mut table = Table::new(["id", "what"]);
-        chosen.iter().for_each(|case| table.push([case.id, case.what]));
+        chosen.iter().for_each(|case| table.push([&case.id, case.what]));
         say::table(&table);
         let entry = |case: &Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
         write_json(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }))?;
@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let made = std::rc::Rc::default();
     for case in &chosen {
         say!("{}: {}", case.id, case.what);
-        let folder = arguments.out.join(if arguments.full { "full" } else { "quick" }).join(case.id);
+        let folder = arguments.out.join(if arguments.full { "full" } else { "quick" }).join(&case.id);
         let context = Context {
             size,
             folder: folder.clone(),
@@ -95,15 +95,15 @@ fn choose(ids: &[String]) -> Result<Vec<Case>, Failure> {
     }
     let mut chosen: Vec<Case> = Vec::new();
     for id in ids {
-        let is_whole = all.iter().any(|case| case.id == id);
+        let is_whole = all.iter().any(|case| case.id == *id);
         let prefix = format!("{id}-");
-        let is_meant = |case: &&Case| if is_whole { case.id == id } else { case.id.starts_with(&prefix) };
+        let is_meant = |case: &&Case| if is_whole { case.id == *id } else { case.id.starts_with(&prefix) };
         if !all.iter().any(|case| is_meant(&case)) {
             return Err(CliError::UnknownCase(id.clone()).into());
         }
         for case in all.iter().filter(is_meant) {
             if chosen.iter().all(|c| c.id != case.id) {
-                chosen.push(*case);
+                chosen.push(case.clone());
             }
         }
     }

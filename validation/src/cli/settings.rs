@@ -1,5 +1,5 @@
 use super::Failure;
-use psidpd_core::document::{Document, FileError, FileErrorKind, Source};
+use psidpd_core::document::{Document, FileError, Source};
 use psidpd_core::model::Model;
 use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use std::path::Path;
@@ -30,8 +30,8 @@ impl Settings {
         let text = edit_model(document.source().text(), &of_model)?;
         let model = Model::parse(&path.display().to_string(), &text)?;
         let wrong = |e: &&Edit| {
-            let kind = FileErrorKind::Value(format!("{e} of --set: {POSITIVE}"));
-            FileError::new(&Arc::new(Source::new("--set", "")), 0..0, "kT", kind)
+            let source = Arc::new(Source::new("--set", ""));
+            FileError::new(&source, 0..0, "kT", format!("{e} of --set: {POSITIVE}"))
         };
         let positive =
             |e: &&Edit| e.number().filter(|kt| *kt > 0.0 && kt.is_finite()).ok_or_else(|| wrong(e));

@@ -91,6 +91,18 @@ pub enum FileErrorKind {
     Value(String),
 }
 
+impl From<String> for FileErrorKind {
+    fn from(message: String) -> FileErrorKind {
+        FileErrorKind::Value(message)
+    }
+}
+
+impl From<&str> for FileErrorKind {
+    fn from(message: &str) -> FileErrorKind {
+        FileErrorKind::Value(message.to_owned())
+    }
+}
+
 /// An error in a file: its kind, its place, and advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileError {
@@ -103,7 +115,13 @@ pub struct FileError {
 
 impl FileError {
     /// An error at the bytes `span` of `source`, about `key` (dotted, may be empty).
-    pub fn new(source: &Arc<Source>, span: Range<usize>, key: &str, kind: FileErrorKind) -> FileError {
+    pub fn new(
+        source: &Arc<Source>,
+        span: Range<usize>,
+        key: &str,
+        kind: impl Into<FileErrorKind>,
+    ) -> FileError {
+        let kind = kind.into();
         let help = suggestion(key, &kind);
         FileError { source: Arc::clone(source), span, key: key.to_owned(), kind: Box::new(kind), help }
     }

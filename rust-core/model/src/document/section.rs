@@ -17,7 +17,7 @@ pub struct Located<T> {
 
 impl<T> Located<T> {
     /// An error about this value.
-    pub fn error(&self, source: &Arc<Source>, kind: FileErrorKind) -> FileError {
+    pub fn error(&self, source: &Arc<Source>, kind: impl Into<FileErrorKind>) -> FileError {
         FileError::new(source, self.span.clone(), &self.key, kind)
     }
 
@@ -69,7 +69,7 @@ impl<'a> Section<'a> {
     }
 
     /// An error about this section as a whole.
-    pub fn error(&self, kind: FileErrorKind) -> FileError {
+    pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
         FileError::new(self.source, self.span.clone(), &self.path, kind)
     }
 
@@ -130,7 +130,7 @@ impl<'a> Value<'a> {
     }
 
     /// An error about this value.
-    pub fn error(&self, kind: FileErrorKind) -> FileError {
+    pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
         FileError::new(self.source, self.span(), &self.key, kind)
     }
 

@@ -1,6 +1,5 @@
 use std::path::{Path, PathBuf};
 
-/// The reason why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
@@ -68,7 +67,6 @@ impl CheckpointError {
         move |source| CheckpointError::Unreadable { path: path.to_owned(), source }
     }
 
-    /// The error of a `folder` without a checkpoint.
     pub fn absent(folder: &Path) -> CheckpointError {
         let path = folder.join(super::NEWEST);
         let source = std::io::ErrorKind::NotFound.into();

@@ -11,7 +11,6 @@ pub const VERSION: u32 = 6;
 const MAGIC: [u8; 8] = *b"psidpdCK";
 const HEADER: usize = 24;
 
-/// Writes a checkpoint at the start of `to`.
 pub fn write<W: Write + Seek>(checkpoint: &Checkpoint, mut to: W) -> io::Result<()> {
     // The header holds the checksum and the length of the payload, so it is written last.
     to.write_all(&[0; HEADER])?;

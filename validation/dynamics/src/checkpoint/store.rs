@@ -29,12 +29,10 @@ impl Store {
         Store { folder: folder.to_owned() }
     }
 
-    /// The path of the newest checkpoint.
     pub fn path(&self) -> PathBuf {
         self.folder.join(NEWEST)
     }
 
-    /// Whether any checkpoint is there.
     pub fn exists(&self) -> bool {
         [NEWEST, BEFORE].iter().any(|name| self.folder.join(name).symlink_metadata().is_ok())
     }
@@ -110,7 +108,6 @@ impl Store {
         self.remove(&[UNFINISHED, BEFORE])
     }
 
-    /// Removes all checkpoint files.
     pub fn clear(&self) -> Result<(), WriteError> {
         self.remove(&Store::FILES)
     }

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One row of totals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Thermo {
     pub step: u64,
@@ -23,13 +22,10 @@ pub struct Thermo {
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Means {
-    /// Number of rows.
     pub rows: u64,
-    /// Mean kT.
     pub temperature: f64,
     pub potential: f64,
     pub pressure: f64,
-    /// Mean pressure of the conservative forces alone.
     pub conservative_pressure: f64,
 }
 
@@ -44,7 +40,6 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Adds a row.
     pub fn add(&mut self, t: &Thermo) {
         self.rows += 1;
         self.temperature += t.temperature;

@@ -9,7 +9,6 @@ use std::path::Path;
 /// The length and the CRC-32 of the bytes that a run has written to a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Written {
-    /// Number of bytes.
     pub length: u64,
     /// CRC-32 of the bytes. It reveals edits and damage, not forgery.
     pub checksum: u32,
@@ -17,9 +16,6 @@ pub struct Written {
 
 impl Written {
     /// The record of the first `length` bytes of a file, or of all its bytes if there are fewer.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn of(path: &Path, length: u64) -> io::Result<Written> {
         let mut file = File::open(path)?.take(length);
         let mut written = Written::default();

@@ -19,7 +19,6 @@ pub struct BodyForce {
 }
 
 impl BodyForce {
-    /// Whether the body force acts on a particle.
     pub fn acts_on(&self, species: i32, tag: i32) -> bool {
         (self.species.is_empty() || self.species.contains(&species)) && self.tags.contain(tag)
     }

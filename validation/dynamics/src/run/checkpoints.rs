@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 /// Wall time between checkpoints of scenes without a step interval.
 const INTERVAL: Duration = Duration::from_secs(600);
 
-/// The checkpoints of a run in progress.
 pub(super) struct Checkpoints {
     pub store: Store,
     /// The last good state, which a failed run saves.
@@ -28,7 +27,6 @@ impl Checkpoints {
         self.written.elapsed() >= self.interval
     }
 
-    /// Writes the last good state.
     pub fn write(&mut self) -> Result<(), RunError> {
         self.store.write(&self.good)?;
         self.stored = Some(self.good.step);

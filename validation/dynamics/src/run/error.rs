@@ -8,7 +8,6 @@ use psidpd_formats::files::WriteError;
 use psidpd_formats::memory::MemoryError;
 use std::path::{Path, PathBuf};
 
-/// The reason why a run did not start or stopped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {

@@ -1,6 +1,5 @@
 use super::error::RunError;
-use rustix::fs::{FlockOperation, flock};
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// The folder of a run, locked against other runs. The lock ends with the process, even if that is killed.
@@ -14,8 +13,8 @@ impl Folder {
     pub fn open(path: &Path) -> Result<Folder, RunError> {
         std::fs::create_dir_all(path).map_err(RunError::output(path))?;
         let lock = File::open(path).map_err(RunError::output(path))?;
-        match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
-            Err(rustix::io::Errno::WOULDBLOCK) => Err(RunError::Busy { folder: path.to_owned() }),
+        match lock.try_lock() {
+            Err(TryLockError::WouldBlock) => Err(RunError::Busy { folder: path.to_owned() }),
             // Some file systems have no locks; a run there has none.
             _ => Ok(Folder { path: path.to_owned(), _lock: lock }),
         }

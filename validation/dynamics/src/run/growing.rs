@@ -14,7 +14,6 @@ pub(super) struct GrowingFile {
 }
 
 impl GrowingFile {
-    /// Creates an empty file `name` in `folder`.
     pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, RunError> {
         let path = folder.join(name);
         let file = File::create(&path).map_err(RunError::output(&path))?;

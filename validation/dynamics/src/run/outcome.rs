@@ -6,13 +6,10 @@ use super::timing::Timing;
 use super::watch::Deviation;
 use crate::checkpoint::Thermo;
 
-/// The progress of a run after a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
     pub stage: &'a str,
-    /// Completed steps of all stages.
     pub step: u64,
-    /// Total steps of all stages.
     pub steps: u64,
     /// The totals, if the step computed them.
     pub thermo: Option<&'a Thermo>,
@@ -22,7 +19,6 @@ pub struct Progress<'a> {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// The run has completed all steps.
     Finished {
         summary: Box<Summary>,
         timing: Timing,
@@ -33,9 +29,7 @@ pub enum Outcome {
     Interrupted {
         /// The value of the stop request.
         stop: usize,
-        /// Completed steps.
         step: u64,
-        /// Total steps.
         steps: u64,
     },
 }

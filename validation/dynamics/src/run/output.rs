@@ -5,11 +5,11 @@ use super::error::RunError;
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
 use crate::checkpoint::{Checkpoint, Store, Thermo, Written};
-use crate::scene::Scene;
+use crate::scene::{Scene, every};
 use psidpd_formats::files::remove_if_there;
 use psidpd_formats::{Frame, GsdFile, write_xyz};
 use psidpd_observe::{Observation, write_csv, write_json};
-use psidpd_pictures::{remove_snapshots, remove_vtk};
+use psidpd_pictures::{remove_snapshots, remove_vtk, write_snapshot, write_vtk};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, ErrorKind};
@@ -35,13 +35,10 @@ pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
     input == folder || input.parent() == Some(&folder) && own.contains(&name)
 }
 
-/// The file of observables.
 const OBSERVABLES: &str = "observables.json";
 
-/// The folder with the tables of observables.
 const TABLES: &str = "observables";
 
-/// The files that grow during a run.
 pub(super) struct Output {
     thermo: Option<ThermoFile>,
     dump: Option<GrowingFile>,
@@ -91,25 +88,26 @@ impl Output {
         }
     }
 
-    pub fn frame(&mut self, frame: &Frame) -> Result<(), RunError> {
-        match &mut self.dump {
-            None => Ok(()),
-            Some(file) => file.attempt(|file| write_frame(frame, file)),
+    /// Writes the particles to the files that are due after a step.
+    pub fn particles(&mut self, scene: &Scene, folder: &Path, frame: &Frame) -> Result<(), RunError> {
+        let (step, intervals) = (frame.step, &scene.output);
+        if let Some(file) = self.dump.as_mut().filter(|_| every(intervals.dump, step)) {
+            file.attempt(|file| write_frame(frame, file))?;
         }
-    }
-
-    pub fn xyz_frame(&mut self, frame: &Frame) -> Result<(), RunError> {
-        match &mut self.xyz {
-            None => Ok(()),
-            Some(file) => file.attempt(|file| write_xyz(frame, file)),
+        if let Some(file) = self.xyz.as_mut().filter(|_| every(intervals.xyz, step)) {
+            file.attempt(|file| write_xyz(frame, file))?;
         }
-    }
-
-    pub fn gsd_frame(&mut self, frame: &Frame, masses: &[f64]) -> Result<(), RunError> {
-        match &mut self.gsd {
-            None => Ok(()),
-            Some((path, file)) => file.write(frame, masses).map_err(RunError::output(path)),
+        if let Some((path, file)) = self.gsd.as_mut().filter(|_| every(intervals.gsd, step)) {
+            file.write(frame, &scene.mass).map_err(RunError::output(path))?;
         }
+        if every(intervals.vtk, step) {
+            let kernel = scene.model.at(scene.kt)?.densities.first().map(|d| d.kernel);
+            write_vtk(folder, frame, kernel)?;
+        }
+        if every(intervals.snapshot, step) {
+            write_snapshot(folder, frame)?;
+        }
+        Ok(())
     }
 
     /// The record of each file that grows at its end alone.
@@ -117,7 +115,6 @@ impl Output {
         self.files().map(|file| (file.name().to_owned(), file.written())).collect()
     }
 
-    /// Syncs all files to the disk.
     pub fn sync(&mut self) -> Result<(), RunError> {
         if let Some((path, file)) = &self.gsd {
             file.sync().map_err(RunError::output(path))?;
@@ -130,7 +127,6 @@ impl Output {
     }
 }
 
-/// Opens the GSD file of a scene that has one.
 fn open_gsd(
     scene: &Scene,
     folder: &Path,

@@ -35,13 +35,11 @@ pub enum Begin {
     Resume,
 }
 
-/// The start of a run.
 #[derive(Debug)]
 pub enum Start {
     New,
     /// The state of a checkpoint.
     Resumed {
-        /// The step of the checkpoint.
         step: u64,
         /// The version of the program that wrote the checkpoint, if it differs from this program: later steps
         /// can differ in rounding.
@@ -222,9 +220,6 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes the remaining steps without interruption.
-    ///
-    /// # Errors
-    /// As [`Runner::run`].
     pub fn run_to_end(&mut self, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
         loop {
             if let Outcome::Finished { summary, .. } = self.run(&AtomicUsize::new(0), progress)? {

@@ -45,9 +45,6 @@ impl Scene {
 
     /// Sets the temperature, thermostat and body forces of a stage. The caller must then compute the forces
     /// of the present step anew.
-    ///
-    /// # Errors
-    /// The model is invalid at the temperature.
     pub fn enter(&self, stage: &Stage, simulation: &mut Simulation) -> Result<(), RunError> {
         simulation.set_temperature(stage.kt)?;
         simulation.set_thermostat(stage.thermostat);

@@ -9,13 +9,10 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub title: String,
-    /// Number of particles.
     pub particles: usize,
-    /// Completed steps of all stages.
     pub steps: u64,
     /// Number of evaluations of ψ at a density below and above its bounds.
     pub out_of_bounds: [u64; 2],
-    /// Totals after the last step.
     pub last: Thermo,
     /// Plain means over the thermo rows of the last stage, without error bars; `None` without rows.
     pub means: Option<Means>,
@@ -33,7 +30,6 @@ impl Summary {
     }
 }
 
-/// Formats the summary for a terminal.
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {} particles, {} steps", self.title, self.particles, self.steps)?;

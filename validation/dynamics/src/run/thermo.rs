@@ -23,7 +23,6 @@ impl Thermo {
     }
 }
 
-/// The file of totals.
 pub(super) struct ThermoFile(GrowingFile);
 
 impl ThermoFile {

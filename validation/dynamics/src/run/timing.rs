@@ -13,7 +13,6 @@ pub struct Timing {
     pub sessions: Vec<Session>,
 }
 
-/// An uninterrupted part of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// The step after which the session began.
@@ -35,7 +34,6 @@ pub struct Session {
 /// Iterations of the updates of an implicit thermostat.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iterations {
-    /// Mean of all updates.
     pub mean: f64,
     /// `None` from a GPU, which does not count them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -51,9 +49,7 @@ impl Iterations {
     }
 }
 
-/// The clock of the present session.
 pub(super) struct Clock {
-    /// Earlier sessions.
     pub earlier: Timing,
     from_step: u64,
     since: Instant,
@@ -64,7 +60,6 @@ impl Clock {
         Clock { earlier, from_step, since: Instant::now() }
     }
 
-    /// Begins the session anew.
     pub fn restart(&mut self, from_step: u64) {
         (self.from_step, self.since) = (from_step, Instant::now());
     }

@@ -11,10 +11,9 @@ use super::timing::{Clock, Timing};
 use super::watch::Watch;
 use crate::checkpoint::{CheckpointError, Position, Sums, Thermo};
 use crate::particles::write_data;
-use crate::scene::{Scene, Stage};
+use crate::scene::{Scene, Stage, every};
 use psidpd_core::engine::Want;
 use psidpd_observe::Observers;
-use psidpd_pictures::{write_snapshot, write_vtk};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The place of a run in its scene, and the totals of the stage so far.
@@ -22,11 +21,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 struct Present {
     position: Position,
     sums: Sums,
-    /// The last row of totals.
     last: Option<Thermo>,
 }
 
-/// A run in progress.
 pub(super) struct Run<'a> {
     scene: &'a Scene,
     folder: Folder,
@@ -35,7 +32,6 @@ pub(super) struct Run<'a> {
     output: Option<Output>,
     pub checkpoints: Checkpoints,
     present: Present,
-    /// Total steps of all stages.
     steps: u64,
     observers: Observers,
     /// The watch over the present stage since the start of this session.
@@ -155,10 +151,10 @@ impl<'a> Run<'a> {
             self.watch.sample(&mut self.simulation, stage, self.present.position.done + 1)?;
         }
         let sampled = self.observers.may_sample(number, &stage.name);
-        if is_last || totals || sampled || self.writes(number) {
+        if is_last || totals || sampled || self.scene.output.writes_particles(number) {
             self.simulation.end_step()?;
             self.simulation.refresh(want)?;
-            if is_last || sampled || self.writes(number) {
+            if is_last || sampled || self.scene.output.writes_particles(number) {
                 self.simulation.fetch()?;
             }
         }
@@ -181,12 +177,6 @@ impl<'a> Run<'a> {
         every(self.scene.output.thermo, step) || step == self.steps
     }
 
-    /// Whether the particles at the end of a step are written to a file.
-    fn writes(&self, step: u64) -> bool {
-        let due = &self.scene.output;
-        [due.dump, due.xyz, due.gsd, due.vtk, due.snapshot].into_iter().any(|interval| every(interval, step))
-    }
-
     /// Writes the output due after a step.
     fn report(
         &mut self,
@@ -204,31 +194,13 @@ impl<'a> Run<'a> {
                     self.present.sums.add(thermo);
                 }
             }
-            let due = &self.scene.output;
-            let [dump, xyz, gsd, vtk, snapshot] =
-                [due.dump, due.xyz, due.gsd, due.vtk, due.snapshot].map(|interval| every(interval, step));
-            if dump || xyz || gsd || vtk || snapshot {
+            if self.scene.output.writes_particles(step) {
                 let sorted = ByTag::of(&self.simulation);
                 let frame = match &sorted {
                     Some(sorted) => sorted.frame(&self.simulation, self.present.position.time),
                     None => self.simulation.frame(self.present.position.time),
                 };
-                if dump {
-                    output.frame(&frame)?;
-                }
-                if xyz {
-                    output.xyz_frame(&frame)?;
-                }
-                if gsd {
-                    output.gsd_frame(&frame, &self.scene.mass)?;
-                }
-                if vtk {
-                    let kernel = self.scene.model.at(self.scene.kt)?.densities.first().map(|d| d.kernel);
-                    write_vtk(self.folder.path(), &frame, kernel)?;
-                }
-                if snapshot {
-                    write_snapshot(self.folder.path(), &frame)?;
-                }
+                output.particles(self.scene, self.folder.path(), &frame)?;
             }
         }
         // Totals alone do not bring the particles from a device.
@@ -353,8 +325,4 @@ impl<'a> Run<'a> {
             means: self.present.sums.means(),
         }
     }
-}
-
-fn every(interval: u64, step: u64) -> bool {
-    interval > 0 && step.is_multiple_of(interval)
 }

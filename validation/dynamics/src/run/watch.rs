@@ -64,12 +64,9 @@ const EVALUATION: f64 = 2300.0;
 /// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles.
 const APART: f64 = 1500.0;
 
-/// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
-    /// From relative velocities of pairs.
     Kinetic,
-    /// From forces.
     Configurational,
 }
 
@@ -80,7 +77,6 @@ pub struct Deviation {
     pub thermometer: Thermometer,
     /// Mean over the last two thirds of the stage, in units of kT.
     pub mean: f64,
-    /// Standard error of the mean.
     pub error: f64,
     /// Whether the temperature was still falling at the end of the stage.
     pub falls: bool,
@@ -128,7 +124,6 @@ pub(super) struct Watch {
 /// Consecutive samples that were too hot.
 #[derive(Debug, Clone, Copy)]
 struct Hot {
-    /// The step of the first hot sample.
     since: u64,
     count: u64,
     /// The lowest temperature among the samples, and its step.

@@ -1,6 +1,6 @@
 //! `lattice` and `min_distance`: the arrangement of particles in a region.
 
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrangement {
@@ -17,20 +17,14 @@ pub enum Arrangement {
 /// Surplus sites are vacancies, spread evenly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lattice {
-    /// Simple cubic; square in two dimensions.
     Simple,
-    /// Body-centred cubic.
     Bcc,
-    /// Face-centred cubic.
     Fcc,
-    /// Hexagonal, in two dimensions.
     Hexagonal,
 }
 
-/// Names of lattices in three dimensions.
 pub const LATTICES: [(&str, Lattice); 3] =
     [("sc", Lattice::Simple), ("bcc", Lattice::Bcc), ("fcc", Lattice::Fcc)];
-/// Names of lattices in two dimensions.
 pub const FLAT_LATTICES: [(&str, Lattice); 2] =
     [("square", Lattice::Simple), ("hexagonal", Lattice::Hexagonal)];
 
@@ -43,12 +37,8 @@ impl Arrangement {
             (None, None) => Ok(Arrangement::Random { min_distance: 0.0 }),
             (None, Some(value)) => Ok(Arrangement::Random { min_distance: value.positive()? }),
             (Some(lattice), None) => Ok(Arrangement::Lattice(lattice.value)),
-            (Some(_), Some(value)) => {
-                let message =
-                    "a lattice is given too, which sets the distances of its sites: give one of them"
-                        .to_owned();
-                Err(value.error(FileErrorKind::Value(message)))
-            }
+            (Some(_), Some(value)) => Err(value
+                .error("a lattice is given too, which sets the distances of its sites: give one of them")),
         }
     }
 }

@@ -23,8 +23,7 @@ fn read_one(section: &Section, model: &Model, initial: &Initial) -> Result<BodyF
     let acceleration = vector(&value, dimensions)?;
     let reversed_along = section.get("reversed_along").map(|v| axis(&v, dimensions)).transpose()?;
     if reversed_along.is_some_and(|k| acceleration[k] != 0.0) {
-        let message = "must not be along the direction in which it is reversed".to_owned();
-        return Err(value.error(FileErrorKind::Value(message)));
+        return Err(value.error("must not be along the direction in which it is reversed"));
     }
     Ok(BodyForce {
         acceleration,
@@ -47,7 +46,7 @@ fn read_species(section: &Section, model: &Model) -> Result<Vec<i32>, FileError>
     });
     let species: Vec<i32> = species.collect::<Result<_, _>>()?;
     if species.is_empty() {
-        return Err(value.error(FileErrorKind::Value("names no species".into())));
+        return Err(value.error("names no species"));
     }
     Ok(species)
 }
@@ -63,13 +62,12 @@ fn read_parts(section: &Section, initial: &Initial) -> Result<Tags, FileError> {
             return Err(item.error(FileErrorKind::UnknownName { what: "part", name, known }));
         };
         if part.frozen {
-            let message = format!("\"{name}\" is frozen: no force moves it");
-            return Err(item.error(FileErrorKind::Value(message)));
+            return Err(item.error(format!("\"{name}\" is frozen: no force moves it")));
         }
         wanted.push(name);
     }
     if wanted.is_empty() {
-        return Err(value.error(FileErrorKind::Value("names no part".into())));
+        return Err(value.error("names no part"));
     }
     Ok(initial.tags_of(|part| wanted.contains(&part.name)))
 }

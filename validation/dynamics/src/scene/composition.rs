@@ -16,8 +16,7 @@ impl Composition {
                 return Err(value.error(unknown_species(&name, species)));
             };
             if let Some(both) = initial.get("composition") {
-                let message = "species is given too: give one of them".to_owned();
-                return Err(both.error(FileErrorKind::Value(message)));
+                return Err(both.error("species is given too: give one of them"));
             }
             let mut fractions = vec![0.0; count];
             fractions[index] = 1.0;
@@ -34,14 +33,13 @@ impl Composition {
             };
             let fraction = value.number()?.value;
             if !(0.0..=1.0).contains(&fraction) {
-                return Err(value.error(FileErrorKind::Value(format!("must be from 0 to 1, is {fraction}"))));
+                return Err(value.error(format!("must be from 0 to 1, is {fraction}")));
             }
             fractions[index] = fraction;
         }
         let sum: f64 = fractions.iter().sum();
         if (sum - 1.0).abs() > 1e-6 {
-            let message = format!("the fractions add up to {sum}, not to 1");
-            return Err(value.error(FileErrorKind::Value(message)));
+            return Err(value.error(format!("the fractions add up to {sum}, not to 1")));
         }
         Ok(Composition(fractions))
     }

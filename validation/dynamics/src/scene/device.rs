@@ -2,12 +2,12 @@
 
 use super::{Scene, stage};
 use crate::device::{Device, DeviceError, refused_step};
-use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Value};
+use psidpd_core::document::{Document, FileError, Section, Value};
 use psidpd_core::engine::Precision;
 
 pub fn read(value: &Value) -> Result<Device, FileError> {
     let name = value.string()?.value;
-    name.parse().map_err(|message| value.error(FileErrorKind::Value(message)))
+    name.parse().map_err(|message| value.error(message))
 }
 
 impl Scene {
@@ -36,7 +36,7 @@ impl Scene {
         let at = document.as_ref().and_then(|document| {
             let root = document.root();
             let value = find(&root).or_else(|| root.get("device"))?;
-            let found = value.error(FileErrorKind::Value(error.to_string()));
+            let found = value.error(error.to_string());
             Some(error.help().map_or(found.clone(), |help| found.with_help(help)))
         });
         (error, at)

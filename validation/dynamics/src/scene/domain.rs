@@ -1,6 +1,6 @@
 //! `[box]`, or `box = …`: the lengths and boundaries of the box.
 
-use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::document::{FileError, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 
 /// The names of boundaries, and whether they are periodic.
@@ -21,9 +21,9 @@ pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError>
 pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
     let Some(value) = root.get("box") else { return Ok(None) };
     let message = || "the initial file gives the box: remove the lengths".to_owned();
-    let section = value.as_section().ok_or_else(|| value.error(FileErrorKind::Value(message())))?;
+    let section = value.as_section().ok_or_else(|| value.error(message()))?;
     if let Some(lengths) = section.get("lengths") {
-        return Err(lengths.error(FileErrorKind::Value(message())));
+        return Err(lengths.error(message()));
     }
     let periodic = read_boundary(&section, dimensions)?;
     Ok(periodic)
@@ -32,11 +32,10 @@ pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[
 fn build(value: &Value, dimensions: usize, periodic: [bool; 3]) -> Result<PeriodicBox, FileError> {
     let lengths = read_lengths(value, dimensions)?;
     if let Some(length) = lengths.iter().find(|l| **l <= 0.0) {
-        return Err(value.error(FileErrorKind::Value(format!("must be positive, is {length}"))));
+        return Err(value.error(format!("must be positive, is {length}")));
     }
     let origin = if dimensions == 2 { [0.0, 0.0, -0.5] } else { [0.0; 3] };
-    PeriodicBox::orthogonal(origin, lengths, periodic)
-        .map_err(|e| value.error(FileErrorKind::Value(e.to_string())))
+    PeriodicBox::orthogonal(origin, lengths, periodic).map_err(|e| value.error(e.to_string()))
 }
 
 /// Reads one length for each direction, or one for all.
@@ -63,8 +62,8 @@ fn read_boundary(section: &Section, dimensions: usize) -> Result<Option<[bool; 3
             }
         }
         Some(items) => {
-            let message = format!("expected one for each of {dimensions} directions, found {}", items.len());
-            return Err(value.error(FileErrorKind::Value(message)));
+            return Err(value
+                .error(format!("expected one for each of {dimensions} directions, found {}", items.len())));
         }
     }
     Ok(Some(periodic))
@@ -90,12 +89,13 @@ pub fn check_width(
         Some(value) => value,
         None => root.require("initial")?.section()?.require("file")?,
     };
-    let message = format!(
-        "a length of {length} is less than twice the range {range} of the thermostat: two images of a \
+    Err(value
+        .error(format!(
+            "a length of {length} is less than twice the range {range} of the thermostat: two images of a \
          particle would be in reach of one neighbour, and both pairs would share their noise"
-    );
-    Err(value.error(FileErrorKind::Value(message)).with_help(format!(
-        "make the box at least {} long, or set thermostat = false in every stage",
-        2.0 * range
-    )))
+        ))
+        .with_help(format!(
+            "make the box at least {} long, or set thermostat = false in every stage",
+            2.0 * range
+        )))
 }

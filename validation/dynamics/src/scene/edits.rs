@@ -1,7 +1,7 @@
 //! Replacement values for keys of a scene or model, as `--set KEY=VALUE` gives them.
 
 use super::keys::TABLES;
-use psidpd_core::document::{FileError, FileErrorKind, Source};
+use psidpd_core::document::{FileError, Source};
 use psidpd_core::model::keys as model_keys;
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -42,12 +42,10 @@ impl std::fmt::Display for Edit {
 }
 
 impl Edit {
-    /// The key as the user wrote it.
     pub fn key(&self) -> &str {
         self.text.split('=').next().unwrap_or_default()
     }
 
-    /// The value as the user wrote it.
     pub fn value(&self) -> &str {
         &self.value
     }
@@ -63,7 +61,7 @@ impl Edit {
 
     fn error(&self, message: String) -> FileError {
         let source = Arc::new(Source::new("--set", &self.text));
-        FileError::new(&source, 0..self.key().len(), "", FileErrorKind::Value(message))
+        FileError::new(&source, 0..self.key().len(), "", message)
     }
 }
 

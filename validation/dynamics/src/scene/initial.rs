@@ -71,14 +71,11 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
     let key = section.require("kind")?;
     let kind = key.string()?.value;
     if let Some(other) = root.get("part") {
-        let message = "there is an [initial] too: give one of them".to_owned();
-        return Err(other.error(FileErrorKind::Value(message)));
+        return Err(other.error("there is an [initial] too: give one of them"));
     }
     let initial = if let Some(format) = saved::Format::of(&kind) {
         if let Some(value) = root.get("density") {
-            return Err(value.error(FileErrorKind::Value(
-                "the initial file gives the particles: remove the density".into(),
-            )));
+            return Err(value.error("the initial file gives the particles: remove the density"));
         }
         let periodic = domain::read_boundary_alone(root, dimensions)?;
         let saved::Saved { path, state, velocities, frozen } =
@@ -100,7 +97,7 @@ fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox),
     let density = root.get("density");
     if parts.is_none() && density.is_none() {
         let message = "the scene gives no particles".to_owned();
-        let error = root.error(FileErrorKind::Value(message));
+        let error = root.error(message);
         return Err(error.with_help("give a density, [initial] or [[part]]"));
     }
     let domain = domain::read(root, model.dimensions())?;
@@ -128,8 +125,7 @@ fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Resu
     let mut part = common.fill(section, WHOLE.to_owned(), shape)?;
     if kind == "lattice" && section.get("lattice").is_none() {
         if let Some(value) = section.get("min_distance") {
-            let message = "a lattice sets the distances of its sites: remove min_distance".to_owned();
-            return Err(value.error(FileErrorKind::Value(message)));
+            return Err(value.error("a lattice sets the distances of its sites: remove min_distance"));
         }
         part.arrangement = Arrangement::Lattice(Lattice::Simple);
     }

@@ -34,7 +34,7 @@ pub use arrangement::{Arrangement, Lattice};
 pub use composition::Composition;
 pub use edits::{Edit, edit_model};
 pub use initial::Initial;
-pub use output::Output;
+pub use output::{Output, every};
 pub use part::Part;
 pub use shape::Shape;
 pub use stage::Stage;
@@ -65,16 +65,13 @@ pub struct Scene {
     /// The processor that computes a run.
     pub device: Device,
     pub domain: PeriodicBox,
-    /// Mass of each species, in the order of the model.
     pub mass: Vec<f64>,
     pub initial: Initial,
     pub frozen: Tags,
     /// Body forces; they act in the stages that enable them.
     pub body_forces: Vec<BodyForce>,
-    /// The stages in the order of the run.
     pub stages: Vec<Stage>,
     pub output: Output,
-    /// The requested observables.
     pub observe: Observe,
     pub source: Arc<Source>,
     /// The folder from which paths in the file start.
@@ -239,7 +236,7 @@ impl Scene {
             crowded.placed,
             self.initial.parts()[crowded.part].count
         );
-        let error = section.require("min_distance")?.error(FileErrorKind::Value(message));
+        let error = section.require("min_distance")?.error(message);
         Err(error.with_help("use a smaller distance, or a lattice"))
     }
 
@@ -249,8 +246,7 @@ impl Scene {
         self.model.at(self.kt)?;
         for stage in &self.stages {
             let fluid = self.model.at(stage.kt)?;
-            let plan =
-                Plan::new(&fluid).map_err(|e| root.error(FileErrorKind::Value(format!("the model: {e}"))))?;
+            let plan = Plan::new(&fluid).map_err(|e| root.error(format!("the model: {e}")))?;
             let has_noise = stage.thermostat && stage.integrator.has_time();
             let Some(range) = plan.noise_range().filter(|_| has_noise) else { continue };
             domain::check_width(root, &self.domain, self.model.dimensions(), range)?;
@@ -262,9 +258,8 @@ impl Scene {
     fn check_trials(&self, root: &Section) -> Result<(), FileError> {
         for stage in self.stages.iter().filter(|stage| !stage.integrator.has_time()) {
             let refuse = |message: String| {
-                let kind = FileErrorKind::Value(message);
                 stage::place_of_integrator(root, &stage.name)
-                    .map_or_else(|| root.error(kind.clone()), |v| v.error(kind.clone()))
+                    .map_or_else(|| root.error(message.as_str()), |v| v.error(message.as_str()))
             };
             if let Err(reason) = LocalEnergy::new(&self.model.at(stage.kt)?) {
                 return Err(refuse(format!("monte-carlo needs an energy: {reason}")));
@@ -290,9 +285,8 @@ fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Mo
         Ok(model) => Ok((path, model)),
         Err(error) => match error.kind() {
             FileErrorKind::Unreadable(why) => {
-                let kind =
-                    FileErrorKind::Value(format!("the model file {} cannot be read: {why}", path.display()));
-                Err(value.error(kind).with_help("the path is relative to the scene file"))
+                let message = format!("the model file {} cannot be read: {why}", path.display());
+                Err(value.error(message).with_help("the path is relative to the scene file"))
             }
             _ => Err(error),
         },

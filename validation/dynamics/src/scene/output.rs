@@ -2,7 +2,6 @@
 
 use psidpd_core::document::{FileError, Section};
 
-/// The output of a run beside its final state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
     /// Steps between rows of `thermo.csv`; 0 writes none.
@@ -26,6 +25,19 @@ impl Default for Output {
     fn default() -> Output {
         Output { thermo: 100, dump: 0, xyz: 0, gsd: 0, vtk: 0, snapshot: 0, checkpoint: None }
     }
+}
+
+impl Output {
+    /// Whether a file gets the particles at the end of a step.
+    pub fn writes_particles(&self, step: u64) -> bool {
+        let intervals = [self.dump, self.xyz, self.gsd, self.vtk, self.snapshot];
+        intervals.into_iter().any(|interval| every(interval, step))
+    }
+}
+
+/// Whether a step is a multiple of an interval, of which 0 means never.
+pub fn every(interval: u64, step: u64) -> bool {
+    interval > 0 && step.is_multiple_of(interval)
 }
 
 pub fn read(root: &Section) -> Result<Output, FileError> {

@@ -5,11 +5,10 @@ use super::composition::Composition;
 use super::number::vector;
 use super::shape::{Shape, Shapes};
 use super::velocities::Velocities;
-use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::document::{FileError, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 
-/// Largest number of particles of a scene.
 const MOST_PARTICLES: f64 = 1e8;
 
 /// The name of the part that fills a box without parts.
@@ -26,9 +25,7 @@ pub struct Part {
     pub arrangement: Arrangement,
     /// The velocities of particles relative to the part.
     pub velocities: Velocities,
-    /// The velocity of the part.
     pub velocity: [f64; 3],
-    /// Whether the particles never move.
     pub frozen: bool,
 }
 
@@ -72,7 +69,7 @@ impl<'a> Common<'a> {
             name: WHOLE.to_owned(),
             shape,
             normal: None,
-            count: check_count(count, |kind| value.error(kind))?,
+            count: check_count(count, |why| value.error(why))?,
             composition: Composition::equal(self.model.species().len()),
             arrangement: Arrangement::Random { min_distance: 0.0 },
             velocities: Velocities::default(),
@@ -83,25 +80,17 @@ impl<'a> Common<'a> {
 
     fn count(&self, section: &Section, volume: f64) -> Result<usize, FileError> {
         match (section.get("density"), section.get("count"), self.density) {
-            (Some(_), Some(count), _) => {
-                let message = "density is given too: give one of them".to_owned();
-                Err(count.error(FileErrorKind::Value(message)))
-            }
+            (Some(_), Some(count), _) => Err(count.error("density is given too: give one of them")),
             (Some(density), None, _) => {
                 let count = (density.positive()? * volume).round();
-                check_count(count, |kind| density.error(kind))
+                check_count(count, |why| density.error(why))
             }
-            (None, Some(count), _) => check_count(count.count()?.value as f64, |kind| count.error(kind)),
-            (None, None, Some(density)) => {
-                check_count((density * volume).round(), |kind| section.error(kind))
-            }
-            (None, None, None) => {
-                Err(section.error(FileErrorKind::Value("needs a density or a count".into())))
-            }
+            (None, Some(count), _) => check_count(count.count()?.value as f64, |why| count.error(why)),
+            (None, None, Some(density)) => check_count((density * volume).round(), |why| section.error(why)),
+            (None, None, None) => Err(section.error("needs a density or a count")),
         }
     }
 
-    /// Reads all `[[part]]` tables.
     pub fn parts(&self, value: &Value) -> Result<Vec<Part>, FileError> {
         let sections: Vec<Section> = value.array()?.iter().map(Value::section).collect::<Result<_, _>>()?;
         let keys: Vec<Value> = sections.iter().map(|s| s.require("shape")).collect::<Result<_, _>>()?;
@@ -116,17 +105,16 @@ impl<'a> Common<'a> {
             let part = self.part(&section, k, shape)?;
             if parts.iter().any(|p| p.name == part.name) {
                 let message = format!("\"{}\" names two parts", part.name);
-                let kind = FileErrorKind::Value(message);
                 return Err(match section.get("name") {
-                    Some(name) => name.error(kind),
-                    None => section.error(kind),
+                    Some(name) => name.error(message),
+                    None => section.error(message),
                 });
             }
             parts.push(part);
         }
-        check_count(parts.iter().map(|p| p.count as f64).sum(), |kind| value.error(kind))?;
+        check_count(parts.iter().map(|p| p.count as f64).sum(), |why| value.error(why))?;
         if parts.iter().all(|p| p.frozen) {
-            return Err(value.error(FileErrorKind::Value("every part is frozen: nothing would move".into())));
+            return Err(value.error("every part is frozen: nothing would move"));
         }
         Ok(parts)
     }
@@ -139,8 +127,7 @@ impl<'a> Common<'a> {
         let frozen = section.get("frozen").map_or(Ok(false), |v| v.boolean().map(|b| b.value))?;
         let moves = ["velocity", "velocities"].iter().find_map(|key| section.get(key));
         if let Some(value) = moves.filter(|_| frozen) {
-            let message = "the part is frozen, and does not move".to_owned();
-            return Err(value.error(FileErrorKind::Value(message)));
+            return Err(value.error("the part is frozen, and does not move"));
         }
         Ok(Part { frozen, ..self.fill(section, name, shape)? })
     }
@@ -148,8 +135,7 @@ impl<'a> Common<'a> {
     fn check_overlaps(&self, keys: &[Value], shapes: &[Shape]) -> Result<(), FileError> {
         for (k, shape) in shapes.iter().enumerate() {
             if let Some(other) = (0..k).find(|o| shape.overlaps(&shapes[*o], self.shapes.dimensions)) {
-                let message = format!("overlaps with part {}", other + 1);
-                return Err(keys[k].error(FileErrorKind::Value(message)).with_help(
+                return Err(keys[k].error(format!("overlaps with part {}", other + 1)).with_help(
                     "move or shrink one of them; shape = \"rest\" is what the other parts leave of the box",
                 ));
             }
@@ -163,8 +149,9 @@ impl<'a> Common<'a> {
         let mut rests = (0..shapes.len()).filter(|k| is_rest(&shapes[*k]));
         let Some(first) = rests.next() else { return Ok(()) };
         if let Some(second) = rests.next() {
-            let message = format!("part {} is the rest already: a scene has one rest", first + 1);
-            return Err(keys[second].error(FileErrorKind::Value(message)));
+            return Err(
+                keys[second].error(format!("part {} is the rest already: a scene has one rest", first + 1))
+            );
         }
         let all: Vec<Shape> = shapes.iter().filter(|s| !is_rest(s)).cloned().collect();
         if let Shape::Rest { others, .. } = &mut shapes[first] {
@@ -173,21 +160,19 @@ impl<'a> Common<'a> {
         let (rest, whole) =
             (shapes[first].volume(self.shapes.dimensions), self.shapes.domain.volume(self.shapes.dimensions));
         if rest <= 1e-9 * whole {
-            let message = "the other parts fill the box and leave no rest".to_owned();
-            return Err(keys[first].error(FileErrorKind::Value(message)));
+            return Err(keys[first].error("the other parts fill the box and leave no rest"));
         }
         Ok(())
     }
 }
 
 /// Checks that a number of particles is at least one and at most the limit.
-fn check_count(count: f64, error: impl Fn(FileErrorKind) -> FileError) -> Result<usize, FileError> {
+fn check_count(count: f64, error: impl Fn(String) -> FileError) -> Result<usize, FileError> {
     if count < 1.0 {
-        return Err(error(FileErrorKind::Value("gives less than one particle".into())));
+        return Err(error("gives less than one particle".into()));
     }
     if count > MOST_PARTICLES {
-        let message = format!("{count:.3e} particles are too many: at most {MOST_PARTICLES:.0e}");
-        return Err(error(FileErrorKind::Value(message)));
+        return Err(error(format!("{count:.3e} particles are too many: at most {MOST_PARTICLES:.0e}")));
     }
     Ok(count as usize)
 }

@@ -3,11 +3,9 @@
 //! Each level is a stage of its own, because ψ may depend on kT: forces are computed again at its start, and a
 //! LAMMPS input has a `run` for it.
 
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, Section};
 
-/// Number of levels of a ramp without `levels`.
 const DEFAULT_LEVELS: u64 = 20;
-/// Largest number of levels.
 const MOST_LEVELS: u64 = 1000;
 
 #[derive(Debug, Clone, Copy)]
@@ -26,16 +24,18 @@ pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, 
     let levels = section.get("levels");
     let Some(ends) = ramp else {
         if let Some(levels) = levels {
-            let message = "only a ramp has levels, and kT is one temperature".to_owned();
-            return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] is a ramp"));
+            return Err(levels
+                .error("only a ramp has levels, and kT is one temperature")
+                .with_help("kT = [from, to] is a ramp"));
         }
         let kt = value.map_or(Ok(scene_kt), |value| value.positive())?;
         return Ok(vec![Level { number: None, steps, kt }]);
     };
     let ends: Vec<f64> = ends.iter().map(|end| end.positive()).collect::<Result<_, _>>()?;
     let [from, to] = ends[..] else {
-        let message = format!("expected a temperature, or two of a ramp, found {}", ends.len());
-        return Err(section.require("kT")?.error(FileErrorKind::Value(message)));
+        return Err(section
+            .require("kT")?
+            .error(format!("expected a temperature, or two of a ramp, found {}", ends.len())));
     };
     let levels = match levels {
         None => DEFAULT_LEVELS.min(steps),
@@ -43,7 +43,7 @@ pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, 
             n if (1..=MOST_LEVELS.min(steps)).contains(&n) => n,
             n => {
                 let most = MOST_LEVELS.min(steps);
-                return Err(value.error(FileErrorKind::Value(format!("must be from 1 to {most}, is {n}"))));
+                return Err(value.error(format!("must be from 1 to {most}, is {n}")));
             }
         },
     };

@@ -4,7 +4,7 @@ use super::velocities::Velocities;
 use crate::checkpoint;
 use crate::particles::{State, Tags};
 use nalgebra::{Matrix3, Vector3};
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use psidpd_formats::data::DataFile;
@@ -78,9 +78,8 @@ pub fn read(
 ) -> Result<Saved, FileError> {
     let value = section.require("file")?;
     let path = base.join(value.string()?.value);
-    let state = open(format, &path, model, periodic).map_err(|why| {
-        value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
-    })?;
+    let state = open(format, &path, model, periodic)
+        .map_err(|why| value.error(why).with_help("the path is relative to the scene file"))?;
     Ok(Saved {
         velocities: Velocities::read_or_keep(section, format == Format::Checkpoint)?,
         frozen: read_frozen(section, &state)?,
@@ -91,7 +90,7 @@ pub fn read(
 
 fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
     let Some(value) = section.get("frozen_ids") else { return Ok(Tags::none()) };
-    let wrong = |message: String| value.error(FileErrorKind::Value(message));
+    let wrong = |message: String| value.error(message);
     let ids: Vec<u64> =
         value.array()?.iter().map(|v| v.count().map(|c| c.value)).collect::<Result<_, _>>()?;
     let [first, last] = ids[..] else {

@@ -2,7 +2,7 @@
 
 use super::ramp;
 use crate::integrator::{Integrator, Settings, THERMOSTAT_STEPS};
-use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::document::{FileError, Section, Value};
 use psidpd_core::engine::noise::Law;
 
 /// A part of a run at constant settings.
@@ -13,7 +13,6 @@ pub struct Stage {
     /// Number of the level in a ramp, from 1, and number of levels; `None` without a ramp.
     pub level: Option<[u64; 2]>,
     pub steps: u64,
-    /// The time step Δt.
     pub dt: f64,
     pub integrator: Integrator,
     pub kt: f64,
@@ -64,17 +63,15 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
     let (steps, equilibrate) = (root.get("steps"), root.get("equilibrate"));
     let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, defaults) };
     if let Some(other) = steps.or(equilibrate) {
-        let message = "the scene has [[stage]] tables too: keep one of the two".to_owned();
-        return Err(other.error(FileErrorKind::Value(message)));
+        return Err(other.error("the scene has [[stage]] tables too: keep one of the two"));
     }
     let mut stages: Vec<Stage> = Vec::new();
     let mut total = 0u64;
     for item in value.array()? {
         let section = item.section()?;
         let levels = read_one(&section, defaults)?;
-        let wrong = |key: &str, message: String| {
-            section.require(key).map(|v| v.error(FileErrorKind::Value(message))).unwrap_or_else(|e| e)
-        };
+        let wrong =
+            |key: &str, message: String| section.require(key).map(|v| v.error(message)).unwrap_or_else(|e| e);
         if let Some(stage) = levels.iter().find(|l| stages.iter().any(|s| s.name == l.name)) {
             return Err(wrong("name", format!("\"{}\" names two stages", stage.name)));
         }
@@ -87,7 +84,7 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
         }
     }
     if stages.is_empty() {
-        return Err(value.error(FileErrorKind::Value("needs at least one stage".into())));
+        return Err(value.error("needs at least one stage"));
     }
     Ok(stages)
 }
@@ -103,7 +100,7 @@ fn read_short(
         Some(value) => value,
         None if equilibrate.is_some() => root.require("steps")?,
         None => {
-            let error = root.error(FileErrorKind::Value("the scene gives no number of steps".into()));
+            let error = root.error("the scene gives no number of steps");
             return Err(error.with_help("give steps, or [[stage]] tables"));
         }
     };
@@ -126,11 +123,9 @@ fn read_short(
 
 fn read_steps(value: &Value) -> Result<u64, FileError> {
     match value.count()?.value {
-        0 => Err(value.error(FileErrorKind::Value("must be at least 1".into()))),
+        0 => Err(value.error("must be at least 1")),
         // Each of two stages may have half of the largest number of steps.
-        steps if steps > MOST_STEPS / 2 => {
-            Err(value.error(FileErrorKind::Value(format!("more than {MOST_STEPS} steps in all"))))
-        }
+        steps if steps > MOST_STEPS / 2 => Err(value.error(format!("more than {MOST_STEPS} steps in all"))),
         steps => Ok(steps),
     }
 }
@@ -190,8 +185,7 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     {
         *lambda = value.number()?.value;
         if !(low..=high).contains(lambda) {
-            let message = format!("must be from {low} to {high}, is {lambda}");
-            return Err(value.error(FileErrorKind::Value(message)));
+            return Err(value.error(format!("must be from {low} to {high}, is {lambda}")));
         }
     }
     if let (Some(value), Some(gradient)) =
@@ -199,7 +193,7 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     {
         *gradient = value.number()?.value;
         if !(0.0..=1.0).contains(gradient) {
-            return Err(value.error(FileErrorKind::Value(format!("must be from 0 to 1, is {gradient}"))));
+            return Err(value.error(format!("must be from 0 to 1, is {gradient}")));
         }
     }
     let couples = |other: &mut Integrator| other.settings().coupling.is_some();
@@ -236,7 +230,7 @@ pub fn place_of_integrator<'a>(root: &Section<'a>, stage: &str) -> Option<Value<
 
 /// The error of a time setting in a Monte Carlo stage.
 fn no_time(value: &Value, what: &str) -> FileError {
-    value.error(FileErrorKind::Value(format!("monte-carlo has {what}")))
+    value.error(format!("monte-carlo has {what}"))
 }
 
 /// The error of a key that an integrator does not have; its help lists the integrators that have it.
@@ -244,6 +238,6 @@ fn has_none(value: &Value, name: &str, key: &str, has: fn(&mut Integrator) -> bo
     let mut owners = Vec::from(Integrator::NAMED);
     owners.retain_mut(|(_, integrator)| has(integrator));
     let owners: Vec<String> = owners.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-    let error = value.error(FileErrorKind::Value(format!("{name} has no {key}")));
+    let error = value.error(format!("{name} has no {key}"));
     error.with_help(format!("integrator = {}", owners.join(", ")))
 }

@@ -5,12 +5,10 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Template {
     pub name: &'static str,
-    /// A description in one line.
     pub about: &'static str,
     /// The text of the scene file, which names its model as a file beside it.
     pub scene: &'static str,
     pub model_name: &'static str,
-    /// The text of the model file.
     pub model: &'static str,
 }
 
@@ -36,7 +34,6 @@ pub const TEMPLATES: &[Template] = &[
     template!("channel", "standard-dpd", "a flow between walls of frozen particles"),
 ];
 
-/// The reason why a template was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TemplateError {

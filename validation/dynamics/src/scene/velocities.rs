@@ -4,13 +4,11 @@ use crate::particles::thermal_velocities;
 use chacha20::ChaCha8Rng;
 use psidpd_core::document::{FileError, Section};
 
-/// The distribution of the initial velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {
     /// Maxwell's distribution at the temperature of the scene, with zero total momentum of the part.
     #[default]
     Thermal,
-    /// All particles at rest.
     Zero,
 }
 

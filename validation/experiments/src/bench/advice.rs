@@ -18,7 +18,6 @@ const REACH: f64 = 1.3;
 /// Time that the messages of a step take besides the work on ghosts, in times of one particle: some ten microseconds.
 const MESSAGES: f64 = 150.0;
 
-/// A number of ranks, and of threads of each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     pub ranks: usize,

@@ -1,6 +1,5 @@
 //! The clock that cycles are counted by.
 
-/// How long it is measured.
 #[cfg(target_arch = "x86_64")]
 const WHILE: std::time::Duration = std::time::Duration::from_millis(20);
 

@@ -9,33 +9,27 @@ use std::num::NonZeroUsize;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contender {
     pub code: Code,
-    /// Settings of [`Code::Native`].
     pub settings: Settings,
     /// Words behind the seed of [`Code::Psi`].
     pub words: String,
-    /// MPI ranks; 1 for the native runner.
     pub ranks: usize,
     /// Whether the box is repeated along x as often as there are ranks: weak scaling.
     pub weak: bool,
 }
 
 impl Contender {
-    /// On one rank.
     pub fn alone(code: Code) -> Contender {
         Contender { code, settings: Settings::default(), words: String::new(), ranks: 1, weak: false }
     }
 
-    /// The native runner with these settings.
     pub fn native(settings: Settings) -> Contender {
         Contender { settings, ..Contender::alone(Code::Native) }
     }
 
-    /// The plugin on one rank with these words.
     pub fn plugin(words: impl Into<String>) -> Contender {
         Contender { words: words.into(), ..Contender::alone(Code::Psi) }
     }
 
-    /// The name in results.
     pub fn id(&self) -> String {
         let mut id = self.code.label().to_lowercase();
         if let Some(s) = self.settings() {
@@ -62,12 +56,10 @@ impl Contender {
         self.code == Code::Psi && self.ranks == 1
     }
 
-    /// The settings of the native runner.
     pub fn settings(&self) -> Option<Settings> {
         (self.code == Code::Native).then_some(self.settings)
     }
 
-    /// Threads of each rank.
     pub fn threads(&self) -> usize {
         let words = word_after(&self.words, "threads").and_then(|n| n.parse().ok());
         self.settings().map_or(words.unwrap_or(1), |settings| settings.threads.get())
@@ -102,10 +94,8 @@ pub fn reference(subject: &Subject) -> Option<Contender> {
 
 /// The words of the plugin's fastest setting on one thread, which is timed on several ranks.
 pub const MIXED: &str = "precision mixed";
-/// Those of its default.
 const DOUBLE: &str = "precision double";
 
-/// What a LAMMPS has, and what is asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Choice {
     /// Whether the host has `mdpd`.
@@ -126,7 +116,6 @@ pub struct Choice {
 /// and more seconds for the fewest steps, for each of its styles.
 pub const FEW_ABOVE: usize = 100_000;
 
-/// Which contenders a size is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
     Everyone,
@@ -172,7 +161,6 @@ impl Field {
     }
 }
 
-/// Who is timed with a fluid at a size.
 pub fn contenders(subject: &Subject, choice: &Choice, field: Field) -> Vec<Contender> {
     let mut all = everyone(subject, choice);
     all.retain(|contender| field.has(subject, contender, choice));

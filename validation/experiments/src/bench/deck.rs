@@ -19,7 +19,6 @@ use std::time::Duration;
 /// Longest time that one run may take.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// LAMMPS with the plugin, and a folder for decks.
 #[derive(Debug, Clone)]
 pub struct Place {
     pub lammps: PluginHost,

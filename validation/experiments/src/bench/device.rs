@@ -21,23 +21,19 @@ use std::time::Instant;
 const WARM_UP: u64 = 5;
 const TIMED: u64 = 10;
 
-/// What is asked for.
 #[derive(Debug, Clone)]
 pub struct Options<'a> {
     pub device: Device,
     pub sizes: &'a [usize],
     pub rounds: usize,
-    /// Seconds of a round.
     pub seconds: f64,
     pub out: &'a Path,
 }
 
-/// The speed of one fluid at one size.
 #[derive(Debug, Clone, Serialize)]
 pub struct Speed {
     pub fluid: &'static str,
     pub particles: usize,
-    /// Steps of velocity Verlet in a round.
     pub steps: u64,
     pub particle_steps_per_second: Spread,
     pub bytes_per_particle: f64,
@@ -54,9 +50,6 @@ pub struct Outcome {
 }
 
 /// Times a GPU.
-///
-/// # Errors
-/// There is no such GPU, or it fails.
 pub fn run(options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let name = options.device.to_string();
     let found = gpus().map_err(RunError::from)?.into_iter().find(|found| found.device == name);
@@ -157,7 +150,6 @@ impl Outcome {
         table
     }
 
-    /// Nanoseconds per particle and step.
     pub fn kernels(&self) -> Table {
         let mut table = Table::new(["fluid", "particles", "kernel", "ns"]);
         for s in &self.speeds {

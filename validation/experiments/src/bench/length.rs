@@ -34,7 +34,6 @@ impl Length {
         Length::of((fit.min(MOST) / cycle * cycle).max(FEWEST.next_multiple_of(cycle)))
     }
 
-    /// With the warm-up.
     pub fn all(self) -> u64 {
         self.warm_up + self.steps
     }

@@ -10,13 +10,11 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::process::Command;
 
-/// What a child process tells of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Child {
     pub particles: usize,
     /// The most memory that the process ever had, in bytes.
     pub peak_bytes: u64,
-    /// Bytes in the arrays of the engine at the end.
     pub engine_bytes: u64,
 }
 
@@ -27,7 +25,6 @@ pub struct Memory {
     pub peak_bytes: u64,
     /// That per particle: state, forces, arrays of the engine, allocator's losses.
     pub bytes_per_particle: f64,
-    /// Of these in arrays of the engine.
     pub engine_bytes_per_particle: f64,
 }
 
@@ -35,9 +32,6 @@ pub struct Memory {
 const SMALL: usize = 1000;
 
 /// The work of the child: some steps of the many-body fluid in mixed precision from random positions.
-///
-/// # Errors
-/// The system does not say how much memory a process has.
 pub fn child(particles: usize) -> Result<Child, ExperimentError> {
     let state = random(&MDPD, Filling::of_size(particles)?, SEED)?;
     let mut simulation = Simulation::new(&MDPD.model()?, 1.0, state, SEED)?;
@@ -63,9 +57,6 @@ fn in_child(program: &Path, particles: usize) -> Result<Child, ExperimentError> 
 }
 
 /// Measures each size with `program`, which is psidpd.
-///
-/// # Errors
-/// The child fails.
 pub fn measure(program: &Path, sizes: &[usize]) -> Result<Vec<Memory>, ExperimentError> {
     let small = in_child(program, SMALL)?;
     sizes

@@ -43,19 +43,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// What `psidpd bench` is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
     pub asked: Asked,
     /// Particles of the systems whose memory is measured.
     pub memory: Vec<usize>,
-    /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
     /// More words behind the seed of `pair_style dpd/psi`, each a contender.
     pub words: Vec<String>,
     /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
     pub lammps: Option<PathBuf>,
-    /// Folder for results, starts and decks.
     pub out: PathBuf,
 }
 
@@ -86,7 +83,6 @@ impl Entry {
         self.step.map_or(1.0, |step| begin + step * self.length.all() as f64)
     }
 
-    /// Particles that a step moves, copies included.
     fn particles(&self) -> f64 {
         (self.subject.particles(self.size) * self.contender.copies()) as f64
     }
@@ -101,9 +97,6 @@ type Cases = BTreeMap<(&'static str, usize), Case>;
 
 /// Runs the benchmark and writes `bench.json` and `report.html`. `program` is psidpd itself, which is
 /// started to measure memory.
-///
-/// # Errors
-/// Something could not be run or written.
 pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
     let out = files::absolute_folder(&options.out)?;
@@ -331,7 +324,6 @@ fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), Experi
     Ok(())
 }
 
-/// The median; 0 of nothing.
 fn median(values: &[f64]) -> f64 {
     Spread::of(values).map_or(0.0, |s| s.median)
 }

@@ -5,7 +5,6 @@ use super::spread::Spread;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// All of `bench.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Benchmark {
     /// Changes when fields change their meaning.
@@ -17,7 +16,6 @@ pub struct Benchmark {
     pub fluids: Vec<FluidFacts>,
     /// Every contender with every fluid and size.
     pub runs: Vec<Timed>,
-    /// Two ranks against one.
     pub scaling: Vec<Scaling>,
     pub memory: Vec<Memory>,
     /// Whether results are the same on 1, 2 and 3 threads, to the last bit: by fluid and precision.
@@ -60,7 +58,6 @@ pub struct Asked {
     pub few_above: usize,
     /// Whether every code is timed in boxes up to that, not only those of a user.
     pub every_code: bool,
-    /// Of starts and noise.
     pub seed: u64,
 }
 
@@ -74,7 +71,6 @@ pub struct FluidFacts {
     pub slope_width: usize,
 }
 
-/// One contender with one fluid at one size.
 #[derive(Debug, Clone, Serialize)]
 pub struct Timed {
     pub fluid: &'static str,
@@ -88,7 +84,6 @@ pub struct Timed {
     pub threads: usize,
     /// Of the native runner, and of the plugin where it was told.
     pub precision: Option<String>,
-    /// Of the native runner.
     pub instructions: Option<String>,
     /// Of LAMMPS: the fastest of those tried.
     pub skin: Option<f64>,
@@ -119,7 +114,6 @@ impl Timed {
     }
 }
 
-/// Two ranks against one.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scaling {
     pub code: String,
@@ -128,9 +122,7 @@ pub struct Scaling {
     /// Particles of the box of one rank.
     pub size: usize,
     pub ranks: usize,
-    /// Rate over that of one rank.
     pub speed_up: Spread,
-    /// The same over the number of ranks.
     pub efficiency: Spread,
     /// Ghosts of a rank.
     pub ghosts: f64,

@@ -11,7 +11,6 @@ fn shown(spread: &Spread) -> String {
     format!("{:.2} ({:.2}–{:.2})", spread.median, spread.min, spread.max)
 }
 
-/// Speed of every contender, a row for each.
 pub fn speeds(outcome: &Benchmark) -> Table {
     let mut table =
         Table::new(["fluid", "particles", "code", "10⁶ particle-steps/s", "against built-in", "ns per pair"]);
@@ -88,7 +87,6 @@ pub fn plugin_parts(outcome: &Benchmark) -> Table {
 const NATIVE_PARTS: [&str; 6] = ["sort", "pairs", "psi", "many-body", "forces", "integrate"];
 const LAMMPS_PARTS: [&str; 6] = ["pair", "neigh", "comm", "output", "modify", "other"];
 
-/// What the cycles of the tables are, in words.
 pub fn cycles(machine: &Machine) -> String {
     machine.gigahertz.map_or_else(
         || "no counter of cycles on this machine".into(),
@@ -185,9 +183,6 @@ fn plot(outcome: &Benchmark, fluid: &'static str, title: &str) -> Plot {
 }
 
 /// `report.html`.
-///
-/// # Errors
-/// A plot or the page cannot be drawn.
 pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
     let rounds = outcome.options.rounds;
     let mut speed = vec![Item::Prose(format!(

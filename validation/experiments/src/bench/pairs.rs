@@ -1,38 +1,11 @@
 //! How many pairs a step meets: what the cost of forces is proportional to.
 
+use psidpd_core::engine::pair_sums::for_each_pair;
 use psidpd_dynamics::run::State;
 
-/// Pairs closer than `range` per particle.
 pub fn pairs_per_particle(state: &State, range: f64) -> f64 {
-    let lengths = state.domain.lengths();
-    // At least three cells in each direction, or a neighbour would be met twice.
-    let cells = lengths.map(|l| (l / range).floor().max(3.0) as usize);
-    let cell_of = |x: &[f64; 3]| -> [usize; 3] {
-        let s = state.domain.fraction(*x);
-        std::array::from_fn(|k| ((s[k].rem_euclid(1.0) * cells[k] as f64) as usize).min(cells[k] - 1))
-    };
-    let index = |c: [usize; 3]| (c[2] * cells[1] + c[1]) * cells[0] + c[0];
-    let mut members = vec![Vec::new(); cells.iter().product()];
-    for (k, x) in state.x.iter().enumerate() {
-        members[index(cell_of(x))].push(k);
-    }
     let mut pairs = 0u64;
-    for (i, x) in state.x.iter().enumerate() {
-        let here = cell_of(x);
-        for shift in 0..27 {
-            let offset = [shift % 3, shift / 3 % 3, shift / 9];
-            let there = std::array::from_fn(|k| (here[k] + offset[k] + cells[k] - 1) % cells[k]);
-            for &j in &members[index(there)] {
-                let square: f64 = (0..3)
-                    .map(|k| {
-                        let d = state.x[j][k] - x[k];
-                        (d - lengths[k] * (d / lengths[k]).round()).powi(2)
-                    })
-                    .sum();
-                pairs += u64::from(j > i && square < range * range);
-            }
-        }
-    }
+    for_each_pair(&state.x, &state.domain, 3, range, |_| pairs += 1);
     pairs as f64 / state.len() as f64
 }
 

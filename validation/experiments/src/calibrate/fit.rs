@@ -16,7 +16,6 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// As the model has it.
     pub fn polynomial(&self) -> Polynomial {
         Polynomial(self.coefficients.clone())
     }

@@ -36,9 +36,7 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 pub struct Options {
     pub kt: f64,
-    /// Total number densities.
     pub densities: Vec<f64>,
-    /// Share of each species.
     pub composition: Vec<f64>,
     /// Which density, if there are several.
     pub name: Option<String>,
@@ -47,19 +45,15 @@ pub struct Options {
     pub sampling: Sampling,
 }
 
-/// One density, at the end.
 #[derive(Debug, Clone, Serialize)]
 pub struct Residual {
-    /// Total number density.
     pub density: f64,
-    /// Kinetic temperature.
     pub temperature: Measured,
     /// ⟨n⟩ for each (β at α).
     pub mean: Vec<Measured>,
     /// ⟨ρ̃⟩ for each (β at α).
     pub corrected: Vec<Measured>,
     pub wanted: f64,
-    /// The pressure that was measured.
     pub pressure: Measured,
     /// |p − p_wanted| over max(|p_wanted|, 0.1 ρ ∂p/∂ρ).
     pub deviation: f64,
@@ -69,7 +63,6 @@ pub struct Residual {
 pub struct Calibration {
     pub title: String,
     pub kt: f64,
-    /// The density whose correction it is.
     pub density: String,
     /// Its (α, β): the density of β felt by α, as `"β|α"`, in the order of the coefficients.
     pub pairs: Vec<String>,
@@ -85,7 +78,6 @@ pub struct Calibration {
     pub failed: Vec<Failed>,
     /// Wanted and measured under it.
     pub residuals: Vec<Residual>,
-    /// The model file with it.
     #[serde(skip)]
     pub text: String,
 }
@@ -101,9 +93,6 @@ impl Calibration {
 const SLOPE_SHARE: f64 = 0.1;
 
 /// Calibrates the model in the file `path`; `command` goes into its comment.
-///
-/// # Errors
-/// See [`ExperimentError`].
 pub fn calibrate(
     path: &Path,
     options: &Options,

@@ -4,7 +4,6 @@ use psidpd_observe::Measured;
 
 #[derive(Debug, Clone)]
 pub struct Point {
-    /// Total number density.
     pub total: f64,
     /// For each (β at α), row-major: the number density of β.
     pub own: Vec<f64>,
@@ -12,9 +11,7 @@ pub struct Point {
     pub means: Vec<Measured>,
     /// For one species: ⟨(n − ⟨n⟩)²⟩ and ⟨(n − ⟨n⟩)³⟩.
     pub spread: Option<[f64; 2]>,
-    /// Kinetic temperature.
     pub temperature: Measured,
-    /// Pressure of the conservative forces.
     pub pressure: Measured,
 }
 

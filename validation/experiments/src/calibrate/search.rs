@@ -16,7 +16,6 @@ pub enum Trial<'a> {
 /// A density whose run stopped, and why: left out of fits and residuals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failed {
-    /// Total number density.
     pub density: f64,
     pub why: String,
 }
@@ -45,7 +44,6 @@ impl Batch {
 /// ρ̃′ of the first guess ρ̃ = ρ (Trofimov, Nies and Michels, section IV B).
 pub const DUMMY_SLOPE: f64 = 1.05;
 
-/// What a fit was made to meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Goal {
@@ -57,7 +55,6 @@ pub enum Goal {
 /// A correction that was tried, and what came out.
 #[derive(Debug, Clone, Serialize)]
 pub struct Round {
-    /// Degree of the polynomials.
     pub degree: usize,
     /// What they were fitted to.
     pub goal: Goal,
@@ -113,9 +110,6 @@ pub const HIGHEST_DEGREE: usize = 3;
 /// Looks for corrections from `first`, what was measured with [`Trial::Constant`]. The last round is the one that meets the
 /// wish, if it is met. A density that stops is left out of the round. Where too few are left, the correction is moved halfway
 /// back to the last one that ran, or to ρ̃ = n; if that does not help either, the rounds so far are all there are.
-///
-/// # Errors
-/// Those of `measure`.
 pub fn search<E>(
     first: Batch,
     wish: &Wish,

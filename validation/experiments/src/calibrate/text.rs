@@ -5,9 +5,6 @@ use psidpd_core::model::Polynomial;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
 
 /// The file with the correction of one density; `note` becomes a comment above it.
-///
-/// # Errors
-/// The text is no model file with that density.
 pub fn with_correction(
     text: &str,
     density: &str,
@@ -43,9 +40,6 @@ pub fn with_correction(
 }
 
 /// The file with ψ linear in every density: `ψ_α = Σ_v slopes[α][v] · variable v`.
-///
-/// # Errors
-/// The text is no TOML.
 pub fn with_slopes(
     text: &str,
     species: &[String],

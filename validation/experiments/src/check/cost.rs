@@ -12,7 +12,6 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
     pub particles: usize,
-    /// Steps of all stages.
     pub steps: u64,
     /// Memory, roughly.
     pub bytes: f64,
@@ -23,16 +22,11 @@ pub struct Cost {
 /// Above so many particles a small box of the fluid is tried instead.
 const LARGE: usize = 300_000;
 
-/// Particles of that box.
 const SAMPLE: usize = 20_000;
 
-/// How long a trial takes.
 const TRIAL: Duration = Duration::from_millis(250);
 
 /// The cost of a scene.
-///
-/// # Errors
-/// It cannot be begun.
 pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
     let particles = match scene.initial.parts() {
         [] => scene.initial_state().len(),

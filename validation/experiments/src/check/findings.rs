@@ -7,16 +7,12 @@ use serde::Serialize;
 pub struct Findings {
     pub title: String,
     pub reference: Option<String>,
-    /// What will be computed.
     pub plan: String,
     pub kt: f64,
-    /// Number densities of the species.
     pub densities: Option<Vec<f64>>,
-    /// Mean-field pressure there.
     pub pressure: Option<f64>,
     /// Mean-field `∂p/∂ρ` at fixed composition.
     pub pressure_slope: Option<f64>,
-    /// Mean-field stability there.
     pub stability: Option<Waves>,
     /// Time steps of a scene and their errors; estimates, and none for a model alone.
     pub steps: Vec<StepEstimate>,
@@ -33,11 +29,9 @@ pub struct Findings {
 pub struct Waves {
     /// Stable at every wave number.
     pub stable: bool,
-    /// Unstable as `k → 0`.
     pub spinodal: bool,
     /// Where `S(k)⁻¹` is smallest, if not at 0.
     pub k_star: Option<f64>,
-    /// Its smallest value.
     pub min_inverse_s: f64,
 }
 
@@ -50,15 +44,11 @@ impl From<Stability> for Waves {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Good to know.
     Note,
-    /// May not do what is meant.
     Warning,
-    /// Cannot work.
     Error,
 }
 
-/// One thing to know before a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Warning {
     /// A short name that does not change.

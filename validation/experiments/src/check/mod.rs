@@ -17,7 +17,6 @@ use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
 use psidpd_dynamics::prediction;
 
-/// The state at which a model is looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditions {
     pub kt: f64,
@@ -26,9 +25,6 @@ pub struct Conditions {
 }
 
 /// Looks at `model` under `conditions`.
-///
-/// # Errors
-/// See [`ExperimentError`]; what is found is in the [`Findings`].
 pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, ExperimentError> {
     let fluid: Fluid = model.at(conditions.kt)?;
     if let Some(densities) = &conditions.densities

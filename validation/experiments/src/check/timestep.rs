@@ -37,7 +37,6 @@ const SETTLE: u64 = 300;
 const SAMPLES: usize = 6;
 const BETWEEN: u64 = 20;
 
-/// What is estimated of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepEstimate {
     pub stage: String,
@@ -58,9 +57,6 @@ pub struct StepEstimate {
 }
 
 /// Of each stage with conditions of its own; empty if there is no temperature of configurations, or no density.
-///
-/// # Errors
-/// The model does not hold at a temperature.
 pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
     let mut found: Vec<StepEstimate> = Vec::new();
     let mut known: Vec<(f64, Option<Sample>)> = Vec::new();
@@ -119,7 +115,6 @@ struct Sample {
     resistance: Option<f64>,
 }
 
-/// By how much the second sample is denser.
 const DENSER: f64 = 1.04;
 
 /// The fluid of a scene where it is densest.
@@ -178,7 +173,6 @@ fn at_densities(scene: &Scene, kt: f64, densities: &[f64]) -> Result<Option<[f64
     Ok(Some([(square / samples).max(0.0).sqrt(), drag / samples, pressure / samples]))
 }
 
-/// Particles at random, with thermal velocities.
 fn start(scene: &Scene, domain: PeriodicBox, densities: &[f64], kt: f64, dimensions: usize) -> State {
     let volume = domain.volume(dimensions);
     let species: Vec<i32> = (0..)

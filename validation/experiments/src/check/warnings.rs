@@ -14,7 +14,6 @@ use std::f64::consts::TAU;
 
 /// What mean field says of the fluid, as far as it applies.
 pub struct State<'a> {
-    /// Number densities of the species.
     pub densities: Option<&'a [f64]>,
     pub pressure: Option<f64>,
     pub stability: Option<&'a Stability>,

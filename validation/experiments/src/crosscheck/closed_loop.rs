@@ -16,7 +16,6 @@ use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
 use std::f64::consts::TAU;
 
-/// Points on the circle.
 const POINTS: usize = 96;
 const RADIUS: f64 = 0.2;
 /// Off the line half-way between the two: mirror symmetry would make the work vanish.
@@ -50,7 +49,6 @@ fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ExperimentError>) -> Re
     Ok(sum)
 }
 
-/// The work in the native engine.
 pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ExperimentError> {
     let model = SET6.model(law, 0.0)?;
     around(|angle| {

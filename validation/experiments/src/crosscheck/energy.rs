@@ -2,12 +2,12 @@
 
 use super::closed_loop;
 use super::setup::Setup;
-use super::trace::{Length, Trace, run as run_code};
+use super::trace::{Length, run as run_code};
 use super::{Context, Part};
 use crate::ExperimentError;
 use crate::code::Code;
 use crate::fluids::SET6;
-use crate::jobs::{self, Job};
+use crate::jobs;
 use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::Precision::{Double, Mixed};
 use psidpd_core::model::ForceLaw;
@@ -40,21 +40,15 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let law = if code == Code::Mdpd { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
         Setup { precision, ..Setup::new(code, &SET6, law) }
     });
-    let state = &state;
-    let jobs: Vec<Job<Result<Trace, ExperimentError>>> = setups
-        .iter()
-        .map(|setup| {
-            let bar = context.progress.bar(&format!("NVE: {}", setup.label()), length.steps);
-            let job = move || {
-                let name = format!("nve-{}", setup.slug());
-                let trace = run_code(context, setup, state, length, &name, &|s| bar.set(s));
-                bar.finish();
-                trace
-            };
-            Box::new(job) as Job<_>
-        })
-        .collect();
-    let traces = jobs::run(jobs).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let bar = |setup: &Setup| context.progress.bar(&format!("NVE: {}", setup.label()), length.steps);
+    let runs = setups.iter().map(|setup| (setup, bar(setup))).collect();
+    let traces = jobs::each(runs, |(setup, bar)| {
+        let name = format!("nve-{}", setup.slug());
+        let trace = run_code(context, setup, &state, length, &name, &|s| bar.set(s));
+        bar.finish();
+        trace
+    });
+    let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut part = Part::default();
     let mut table = Table::new([
         "code",

@@ -7,7 +7,7 @@ use super::{Context, Part};
 use crate::ExperimentError;
 use crate::code::Code;
 use crate::fluids::{GAMMA, SET5, SET6, WarrenSet};
-use crate::jobs::{self, Job};
+use crate::jobs;
 use crate::start::{Filling, equilibrated};
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width, tension_series};
@@ -45,7 +45,6 @@ fn runs(set: &WarrenSet, full: bool) -> &'static [Slot] {
     if full || set.name == SET6.name { &RUNS } else { &RUNS[..=BUILT_IN] }
 }
 
-/// What is compared, with error bars.
 struct Slab {
     temperature: Estimate,
     pressure: Estimate,
@@ -80,29 +79,28 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     }
     let count: usize = sets.iter().map(|set| runs(set, context.full).len()).sum();
     let made = context.progress.overall("equilibrium", steps * count as u64);
-    let made = &made;
-    let mut jobs: Vec<Job<Result<Trace, ExperimentError>>> = Vec::new();
+    let mut slots = Vec::new();
     for (k, set) in sets.iter().enumerate() {
         for (n, &(code, law, _)) in runs(set, context.full).iter().enumerate() {
-            let state = &starts[k];
+            let seed = SEED + (10 * k + n) as u64;
+            let setup = Setup { gamma: GAMMA, seed, ..Setup::new(code, set, law) };
+            let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), setup.slug());
             let bar = context.progress.bar(&format!("NVT {}: {}", set.name, name(code, law)), steps);
-            jobs.push(Box::new(move || {
-                let seed = SEED + (10 * k + n) as u64;
-                let setup = Setup { gamma: GAMMA, seed, ..Setup::new(code, set, law) };
-                let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), setup.slug());
-                let before = AtomicU64::new(0);
-                let advance = |step: u64| {
-                    bar.set(step);
-                    made.advance(step.saturating_sub(before.fetch_max(step, Ordering::Relaxed)));
-                };
-                let trace = run_code(context, &setup, state, length, &folder, &advance);
-                advance(steps);
-                bar.finish();
-                trace
-            }));
+            slots.push((setup, &starts[k], folder, bar));
         }
     }
-    let traces = jobs::run(jobs).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let traces = jobs::each(slots, |(setup, state, folder, bar)| {
+        let before = AtomicU64::new(0);
+        let advance = |step: u64| {
+            bar.set(step);
+            made.advance(step.saturating_sub(before.fetch_max(step, Ordering::Relaxed)));
+        };
+        let trace = run_code(context, &setup, state, length, &folder, &advance);
+        advance(steps);
+        bar.finish();
+        trace
+    });
+    let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut traces = traces.iter();
     let mut part = Part {
         section: Section::new(
@@ -298,7 +296,6 @@ fn report_set(
     Ok(())
 }
 
-/// The temperature of a run against kT.
 fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Slab) -> Check {
     Check::at_most(
         format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), Setup::new(code, set, law).slug()),

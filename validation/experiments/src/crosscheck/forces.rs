@@ -17,7 +17,6 @@ use psidpd_report::{Check, Item, Section, Table};
 use serde::Serialize;
 use serde_json::json;
 
-/// Seed of the configuration and of the noise.
 pub const SEED: u64 = 20_030_520;
 
 /// What a code says of a configuration.
@@ -45,7 +44,6 @@ impl Difference {
         [("force", self.force), ("energy", self.energy), ("virial", self.virial)]
     }
 
-    /// As cells of a table.
     pub fn cells(&self) -> [String; 3] {
         self.named().map(|(_, value)| format!("{value:.1e}"))
     }
@@ -158,7 +156,6 @@ fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64,
     Ok((energy(H)? - energy(-H)?) / (2.0 * H))
 }
 
-/// Values in the order of tags.
 pub(super) fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut ordered = vec![[f64::NAN; 3]; values.len()];
     for (tag, value) in tags.iter().zip(values) {
@@ -217,74 +214,37 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             part.values.push((id, json!(found)));
             Ok::<(), ExperimentError>(())
         };
-    let setup = |code, law, gamma, newton| Setup {
-        gamma,
-        seed: SEED,
-        newton,
-        spacing: FINE,
-        ..Setup::new(code, &SET6, law)
-    };
-
+    let setup = |code, law| Setup { seed: SEED, spacing: FINE, ..Setup::new(code, &SET6, law) };
     // These sums go over every pair and its images.
     let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
     against_plain(&mut part, &equilibrated(&SET6.fluid, small, 500, SEED)?, context.fault)?;
     use ForceLaw::{Conservative, LucyLammps};
     let truth = native(context, &SET6.model(Conservative, 0.0)?, &state, None)?;
     let tight = [1e-12; 3];
-    compare(&mut part, setup(Code::Psi, Conservative, 0.0, true), "psi", &truth, tight, "native")?;
-    compare(
-        &mut part,
-        setup(Code::Psi, Conservative, 0.0, false),
-        "psi-newton-off",
-        &truth,
-        tight,
-        "native",
-    )?;
-    compare(&mut part, setup(Code::MdpdPsi, Conservative, 0.0, true), "mdpd-psi", &truth, tight, "native")?;
-    compare(&mut part, setup(Code::Eam, Conservative, 0.0, true), "eam", &truth, [1e-6; 3], "native")?;
-
+    let plugin = setup(Code::Psi, Conservative);
+    compare(&mut part, plugin, "psi", &truth, tight, "native")?;
+    compare(&mut part, Setup { newton: false, ..plugin }, "psi-newton-off", &truth, tight, "native")?;
+    compare(&mut part, setup(Code::MdpdPsi, Conservative), "mdpd-psi", &truth, tight, "native")?;
+    compare(&mut part, setup(Code::Eam, Conservative), "eam", &truth, [1e-6; 3], "native")?;
     // The largest error of a force is near 2e-6 of the rms force.
     let loose = [2e-5, 1e-6, 1e-5];
-    let mixed = Setup { precision: Mixed, ..setup(Code::Psi, Conservative, 0.0, true) };
-    compare(&mut part, mixed, "psi-mixed", &truth, loose, "native")?;
+    compare(&mut part, Setup { precision: Mixed, ..plugin }, "psi-mixed", &truth, loose, "native")?;
     let model = SET6.model(Conservative, 0.0)?;
     let mixed = point_of(simulation(&model, 1.0, &state, SEED, Mixed, context.fault)?, None)?.against(&truth);
     let of = "native in mixed precision";
     part.bound(("forces", "forces.native-mixed"), of, "double precision", &mixed, loose);
     part.values.push(("forces.native-mixed".into(), json!(mixed)));
-
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
     let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
-    compare(
-        &mut part,
-        setup(Code::Psi, Conservative, GAMMA, true),
-        "psi-noise",
-        &noisy,
-        tight,
-        "native, noise on",
-    )?;
-
+    compare(&mut part, Setup { gamma: GAMMA, ..plugin }, "psi-noise", &noisy, tight, "native, noise on")?;
     let lucy = native(context, &SET6.model(LucyLammps, 0.0)?, &state, None)?;
-    compare(&mut part, setup(Code::MdpdPsi, LucyLammps, 0.0, true), "mdpd-psi-lucy", &lucy, tight, "native")?;
+    compare(&mut part, setup(Code::MdpdPsi, LucyLammps), "mdpd-psi-lucy", &lucy, tight, "native")?;
+    let built_in = setup(Code::Mdpd, LucyLammps);
     // The energy that mdpd tallies is not that of any potential: see the report.
-    let built_in = [1e-10, f64::INFINITY, 1e-10];
-    compare(
-        &mut part,
-        setup(Code::Mdpd, LucyLammps, 0.0, true),
-        "mdpd",
-        &lucy,
-        built_in,
-        "native, same law",
-    )?;
+    let but_energy = [1e-10, f64::INFINITY, 1e-10];
+    compare(&mut part, built_in, "mdpd", &lucy, but_energy, "native, same law")?;
     let unlike = [f64::INFINITY; 3];
-    compare(
-        &mut part,
-        setup(Code::Mdpd, LucyLammps, 0.0, true),
-        "mdpd-conservative",
-        &truth,
-        unlike,
-        "native, conservative law",
-    )?;
+    compare(&mut part, built_in, "mdpd-conservative", &truth, unlike, "native, conservative law")?;
 
     part.section.items.push(Item::Table(table));
     part.section.items.push(Item::prose(

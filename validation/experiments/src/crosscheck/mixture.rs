@@ -15,7 +15,6 @@ use psidpd_report::{Item, Section, Table};
 use rand::{RngExt, SeedableRng};
 use serde_json::json;
 
-/// Seed of the positions.
 pub const SEED: u64 = 20_011_022;
 
 /// Every pair of species has a strength of its own, and each species its ψ of the density of both.

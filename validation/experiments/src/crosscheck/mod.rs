@@ -32,10 +32,8 @@ use psidpd_report::{Check, Progress, Section};
 use std::path::PathBuf;
 pub use validate::{Options, check_table, validate};
 
-/// What LAMMPS writes beside the results of a run.
 const LOG: &str = "log.lammps";
 
-/// What every part of the validation works with.
 #[derive(Debug)]
 pub struct Context<'a> {
     pub lammps: &'a PluginHost,

@@ -19,12 +19,10 @@ use std::time::Duration;
 /// Seed of velocities and noise.
 pub const SEED: u64 = 19_640_612;
 
-/// Steps between configurations.
 const EVERY: u64 = 10;
 /// Configurations after the first.
 const FRAMES: u64 = 40;
 const DT: f64 = 0.02;
-/// Of g(r).
 const RANGE: f64 = 2.0;
 const BINS: usize = 40;
 /// Largest relative difference. A pair that is counted in another shell makes 10⁻⁵.
@@ -79,7 +77,6 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     Ok(part)
 }
 
-/// The fluid, its start, and the observables.
 fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     let model = folder.join("model.toml");
     std::fs::write(&model, models::STANDARD).map_err(ExperimentError::io(&model))?;

@@ -20,9 +20,7 @@ pub struct Setup<'a> {
     pub law: ForceLaw,
     /// Friction; 0 leaves drag and noise out.
     pub gamma: f64,
-    /// Seed of the noise.
     pub seed: u64,
-    /// `newton on`?
     pub newton: bool,
     /// Spacing in r of the tables of [`Code::Eam`].
     pub spacing: f64,
@@ -47,7 +45,6 @@ impl<'a> Setup<'a> {
         self.code.label() + if self.is_mixed() { ", mixed precision" } else { "" }
     }
 
-    /// The name in results.
     pub fn slug(&self) -> String {
         let slug = match self.code {
             Code::Eam => "eam".to_owned(),

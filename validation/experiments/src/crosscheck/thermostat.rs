@@ -26,11 +26,9 @@ const DT: f64 = 0.01;
 /// Pairs along each edge of the lattice of pairs, which are out of each other's reach.
 const PAIRS: usize = 12;
 const APART: f64 = 2.5;
-/// Distances of the two of a pair.
 const DISTANCES: [f64; 3] = [0.2, 0.5, 0.8];
 /// How often the noise of every pair is drawn.
 const DRAWS: u64 = 60;
-/// γ, kT and Δt of the noise.
 const SETTINGS: [[f64; 3]; 2] = [[4.5, 1.0, 0.01], [18.0, 0.5, 0.04]];
 /// Chance that any comparison of variances fails although nothing is wrong.
 const FALSE_ALARM: f64 = 1e-3;
@@ -96,7 +94,6 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     Ok(part)
 }
 
-/// The variances of the noise of both codes.
 fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
     let state = pairs()?;
     let mut table = Table::new(["γ", "kT", "Δt", "r", "native", "LAMMPS dpd"]);

@@ -14,7 +14,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long a run is and what is kept of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Length {
     pub dt: f64,
@@ -31,9 +30,7 @@ pub struct Length {
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     pub time: Vec<f64>,
-    /// Kinetic temperature.
     pub temperature: Vec<f64>,
-    /// Kinetic energy.
     pub kinetic: Vec<f64>,
     /// Potential energy, as the code reports it.
     pub potential: Vec<f64>,
@@ -61,7 +58,6 @@ impl Trace {
         (0..xx.len()).map(|k| (xx[k] + yy[k] + zz[k]) / 3.0).collect()
     }
 
-    /// Total energy per particle.
     pub fn energy_per_particle(&self) -> Vec<f64> {
         self.kinetic.iter().zip(&self.potential).map(|(k, u)| (k + u) / self.particles as f64).collect()
     }

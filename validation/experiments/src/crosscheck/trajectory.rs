@@ -17,7 +17,6 @@ use psidpd_report::{Check, Item, Section, Table};
 use serde_json::json;
 use std::time::Duration;
 
-/// Seed of start and noise.
 pub const SEED: u64 = 20_170_401;
 
 const STEPS: u64 = 50;
@@ -73,7 +72,6 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     Ok(part)
 }
 
-/// Positions by tag.
 fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ExperimentError> {
     let model = SET6.model(ForceLaw::Conservative, GAMMA)?;
     let mut simulation = context.simulation(&model, 1.0, state, SEED)?;

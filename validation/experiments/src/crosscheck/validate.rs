@@ -11,7 +11,6 @@ use psidpd_report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What `psidpd validate` is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Larger systems and longer runs: hours instead of minutes.
@@ -31,9 +30,6 @@ pub struct Validation {
 }
 
 /// Installs what is missing, builds the plugin, runs every comparison and writes the report.
-///
-/// # Errors
-/// Something could not be run or written; checks that fail are in the results.
 pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, ExperimentError> {
     let start = Instant::now();
     let out = files::absolute_folder(&options.out)?;

@@ -14,25 +14,18 @@ pub struct Liquid {
     pub pressure: f64,
     /// Isothermal, 1/Pa.
     pub compressibility: f64,
-    /// Surface tension, N/m.
     pub tension: f64,
     /// Density and pressure of the compressed liquid at the same temperature, ascending.
     pub compressed: Vec<(f64, f64)>,
 }
 
 /// The saturated liquid of a substance at a temperature in K.
-///
-/// # Errors
-/// There is none, or the feature is off.
 #[cfg(not(feature = "eos"))]
 pub fn liquid(_: &Substance, _: f64) -> Result<Liquid, ExperimentError> {
     Err(ExperimentError::NotBuilt)
 }
 
 /// The saturated liquid of a substance at a temperature in K.
-///
-/// # Errors
-/// There is none, or the feature is off.
 #[cfg(feature = "eos")]
 pub fn liquid(substance: &Substance, temperature: f64) -> Result<Liquid, ExperimentError> {
     use feos::core::parameter::PureRecord;

@@ -35,9 +35,6 @@ pub fn coefficients(
 }
 
 /// The model file, without corrected density.
-///
-/// # Errors
-/// The equation of state has no pressures to fit.
 pub fn model(
     substance: &Substance,
     liquid: &Liquid,

@@ -41,10 +41,8 @@ pub struct Options {
     pub sampling: Sampling,
 }
 
-/// A strength of the attraction that was tried.
 #[derive(Debug, Clone, Serialize)]
 pub struct Trial {
-    /// A.
     pub attraction: f64,
     /// Tension of the slab, in kT/r_c².
     pub tension: Measured,
@@ -57,13 +55,10 @@ pub struct Trial {
 pub struct Property {
     /// What it is, with its unit.
     pub name: &'static str,
-    /// By the equation of state.
     pub wanted: f64,
-    /// Of the model.
     pub measured: Measured,
 }
 
-/// The model, and how it compares.
 #[derive(Debug, Clone, Serialize)]
 pub struct Found {
     pub substance: String,
@@ -82,13 +77,9 @@ pub struct Found {
     pub text: String,
 }
 
-/// Strengths that are tried at most.
 const TRIALS: usize = 5;
 
 /// Makes a model of `substance`.
-///
-/// # Errors
-/// See [`ExperimentError`]; a tolerance that is not met is none.
 pub fn from_eos(
     substance: &Substance,
     options: &Options,

@@ -8,16 +8,11 @@ use std::path::Path;
 
 /// What a slab of liquid in its vapour has.
 pub struct Slab {
-    /// Density of the liquid.
     pub liquid: Measured,
-    /// Surface tension.
     pub tension: Measured,
 }
 
 /// Runs a slab of the model in the file `path`.
-///
-/// # Errors
-/// The run stops.
 pub fn measure(path: &Path, options: &Options, folder: &Path) -> Result<Slab, ExperimentError> {
     let dt = options.sampling.dt;
     let text = format!(

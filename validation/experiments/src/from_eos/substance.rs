@@ -6,11 +6,9 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct Substance {
     pub name: String,
-    /// Where the parameters are from.
     pub source: String,
     /// kg/mol.
     pub molar_mass: f64,
-    /// Segments of a molecule.
     pub m: f64,
     /// Diameter of a segment, in 10⁻¹⁰ m.
     pub sigma: f64,
@@ -38,9 +36,6 @@ pub fn names() -> String {
 
 impl Substance {
     /// The substance of this name.
-    ///
-    /// # Errors
-    /// There is none.
     pub fn find(name: &str) -> Result<Substance, ExperimentError> {
         all()
             .into_iter()

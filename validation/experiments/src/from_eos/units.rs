@@ -12,7 +12,6 @@ pub struct Units {
     pub length: f64,
     /// kT, J.
     pub energy: f64,
-    /// Mass of a particle, kg.
     pub mass: f64,
     /// r_c √(m/kT), s.
     pub time: f64,

@@ -11,7 +11,6 @@ pub enum Must {
     RightOrSaid(f64),
     /// It ends, and has counted the evaluations beyond the bounds of a density.
     Counted,
-    /// It stops and names the step and a particle.
     Stops,
     /// It is refused before its first step, with a reason.
     Refused,
@@ -43,12 +42,10 @@ pub enum Found {
         temperatures: Vec<[f64; 2]>,
         /// |Σ m v| over Σ m |v|.
         momentum: f64,
-        /// Evaluations of ψ below and above bounds.
         counted: [u64; 2],
         warnings: Vec<String>,
     },
     Stopped(String),
-    /// It did not begin.
     Refused(String),
     /// Largest difference of a force, over the largest force.
     Differs(f64),
@@ -59,7 +56,7 @@ pub enum Found {
     },
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Inputs {
     pub model: String,
     pub kt: f64,
@@ -70,6 +67,19 @@ pub struct Inputs {
     pub dt: f64,
     /// Steps without measurement, and with.
     pub steps: [u64; 2],
+}
+
+impl Inputs {
+    /// Inputs without a data file.
+    pub fn new(
+        model: impl Into<String>,
+        kt: f64,
+        scene: impl Into<String>,
+        dt: f64,
+        steps: [u64; 2],
+    ) -> Inputs {
+        Inputs { model: model.into(), kt, scene: scene.into(), data: None, dt, steps }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -100,9 +110,6 @@ const ROUNDING: f64 = 1e-5;
 const SINGLE: f64 = 2e-5;
 
 /// Says what is wrong, if something is.
-///
-/// # Errors
-/// What did not happen that must.
 pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
     let right = |part: f64| match found {
         Found::Ended { warnings, .. } if !warnings.is_empty() => Err(warnings.join("; ")),
@@ -145,7 +152,6 @@ pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
     }
 }
 
-/// What happened, in words.
 pub fn said(found: &Found) -> String {
     match found {
         Found::Ended { temperatures, momentum, counted, warnings } => {

@@ -7,17 +7,11 @@ use crate::models::{SET6, STANDARD};
 const GROUP: &str = "forces";
 
 pub fn cases() -> Vec<Case> {
+    let scene = "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"zero\"\n";
     let case = |name, model: &str, x: &[[f64; 3]], edge: f64| Case {
         group: GROUP,
         name,
-        run: Inputs {
-            model: model.into(),
-            kt: 1.0,
-            scene: "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"zero\"\n".into(),
-            data: Some(data(x, edge)),
-            dt: 0.01,
-            steps: [1, 1],
-        },
+        run: Inputs { data: Some(data(x, edge)), ..Inputs::new(model, 1.0, scene, 0.01, [1, 1]) },
         must: Must::Agrees(1e-11),
         exact: None,
     };

@@ -5,22 +5,12 @@ use crate::models::SET6;
 
 const GROUP: &str = "long runs";
 
-/// 10⁶ steps with `full`, else two thousand.
 pub fn cases(full: bool) -> Vec<Case> {
     let steps = if full { 1_000_000 } else { 2_000 };
-    let run = |dt: f64, scene: &str| Inputs {
-        model: SET6.into(),
-        kt: 1.0,
-        scene: scene.into(),
-        data: None,
-        dt,
-        steps: [500, steps],
-    };
-    let liquid = "box = 3.0\ndensity = 6.05\n";
     vec![Case {
         group: GROUP,
         name: if full { "10^6 steps without thermostat" } else { "2000 steps without thermostat" },
-        run: run(0.002, liquid),
+        run: Inputs::new(SET6, 1.0, "box = 3.0\ndensity = 6.05\n", 0.002, [500, steps]),
         must: Must::Conserves(0.02),
         exact: None,
     }]

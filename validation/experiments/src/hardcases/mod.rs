@@ -15,20 +15,18 @@ mod steps;
 
 use crate::ExperimentError;
 use crate::code::Host;
-use crate::jobs::{self, Job};
+use crate::jobs;
 use crate::lammps::host::PluginHost;
-use case::{Case, Found, Must};
+use case::{Case, Must};
 use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_report::{Progress, Table};
 use serde::Serialize;
-use std::path::Path;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     /// The integrators that are recommended, in mixed precision, and velocity Verlet in double.
     Quick,
-    /// All integrators in both precisions.
     All,
     /// That, and 10⁶ steps.
     Full,
@@ -38,7 +36,6 @@ pub enum Extent {
 pub struct Verdict {
     pub group: &'static str,
     pub case: &'static str,
-    /// The native runner or the plugin.
     pub host: Host,
     pub integrator: &'static str,
     pub precision: String,
@@ -58,7 +55,6 @@ fn cases(extent: Extent) -> Vec<Case> {
     all
 }
 
-/// The settings in which cases are carried out.
 fn settings(extent: Extent) -> Vec<(Integrator, Precision)> {
     let quick = ["velocity-verlet", "shardlow-s1", "aboba", "two-stage"];
     let mut found = Vec::new();
@@ -74,9 +70,6 @@ fn settings(extent: Extent) -> Vec<(Integrator, Precision)> {
 }
 
 /// Carries out all cases; in LAMMPS too, if `lammps` is set. With a `fault` the native engine is wrong on purpose.
-///
-/// # Errors
-/// Files cannot be written or read, or LAMMPS is asked for and missing.
 pub fn run(
     extent: Extent,
     lammps: bool,
@@ -88,7 +81,7 @@ pub fn run(
     let lammps = lammps.then(|| PluginHost::find(&|line| progress.note(line))).transpose()?;
     let mut cases = cases(extent);
     cases.retain(|case| only.is_none_or(|words| case.name.contains(words) || case.group.contains(words)));
-    let mut jobs: Vec<Job<Result<Verdict, ExperimentError>>> = Vec::new();
+    let mut runs = Vec::new();
     for (k, case) in cases.iter().enumerate() {
         let mut settings = settings(extent);
         if let Must::Agrees(_) = case.must {
@@ -97,58 +90,35 @@ pub fn run(
         }
         for (integrator, precision) in settings {
             let place = folder.path().join(format!("{k}-{}-{precision}", integrator.name()));
-            jobs.push(Box::new(move || {
-                within(&place, || {
-                    let found = native::carry_out(case, integrator, precision, &place, fault)?;
-                    Ok(verdict(case, Host::Native, integrator, precision, case.must(integrator), &found))
-                })
-            }));
+            runs.push((case, None, integrator, precision, case.must(integrator), place));
         }
         if let Some((lammps, must)) = lammps.as_ref().zip(plugin::must(case)) {
             for precision in [Precision::Mixed, Precision::Double] {
                 let place = folder.path().join(format!("{k}-plugin-{precision}"));
-                jobs.push(Box::new(move || {
-                    within(&place, || {
-                        let found = plugin::carry_out(lammps, case, precision, &place)?;
-                        Ok(verdict(case, Host::Plugin, Integrator::VelocityVerlet, precision, must, &found))
-                    })
-                }));
+                runs.push((case, Some(lammps), Integrator::VelocityVerlet, precision, must, place));
             }
         }
     }
-    let bar = progress.bar("hard cases", jobs.len() as u64);
-    jobs::counted(jobs, &bar).into_iter().collect()
-}
-
-/// Makes a folder for a case, and removes it after `carry_out`.
-fn within<T>(
-    place: &Path,
-    carry_out: impl FnOnce() -> Result<T, ExperimentError>,
-) -> Result<T, ExperimentError> {
-    std::fs::create_dir_all(place).map_err(ExperimentError::io(place))?;
-    let made = carry_out()?;
-    let _ = std::fs::remove_dir_all(place);
-    Ok(made)
-}
-
-fn verdict(
-    case: &Case,
-    host: Host,
-    integrator: Integrator,
-    precision: Precision,
-    must: Must,
-    found: &Found,
-) -> Verdict {
-    Verdict {
-        group: case.group,
-        case: case.name,
-        host,
-        integrator: integrator.name(),
-        precision: precision.to_string(),
-        must: must.words(),
-        did: case::said(found),
-        wrong: case::judge(must, found, precision == Precision::Mixed).err(),
-    }
+    let bar = progress.bar("hard cases", runs.len() as u64);
+    let verdicts = jobs::counted(runs, &bar, |(case, lammps, integrator, precision, must, place)| {
+        std::fs::create_dir_all(&place).map_err(ExperimentError::io(&place))?;
+        let (host, found) = match lammps {
+            None => (Host::Native, native::carry_out(case, integrator, precision, &place, fault)?),
+            Some(lammps) => (Host::Plugin, plugin::carry_out(lammps, case, precision, &place)?),
+        };
+        let _ = std::fs::remove_dir_all(&place);
+        Ok(Verdict {
+            group: case.group,
+            case: case.name,
+            host,
+            integrator: integrator.name(),
+            precision: precision.to_string(),
+            must: must.words(),
+            did: case::said(&found),
+            wrong: case::judge(must, &found, precision == Precision::Mixed).err(),
+        })
+    });
+    verdicts.into_iter().collect()
 }
 
 pub fn table(results: &[Verdict]) -> Table {

@@ -50,9 +50,6 @@ pub fn scene(
 }
 
 /// Carries out a case in `folder`, with a wrong engine if there is a `fault`.
-///
-/// # Errors
-/// Files cannot be written or read.
 pub fn carry_out(
     case: &Case,
     integrator: Integrator,
@@ -196,14 +193,7 @@ mod tests {
             "[[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.0]\nhigh = [4.0, 4.0, 4.0]\ndensity = 3.0\n";
         let must = super::super::case::Must::Right(0.04);
         let judged = |drift: &str| {
-            let run = Inputs {
-                model: IDEAL.into(),
-                kt: 1.0,
-                scene: format!("box = 4.0\n{part}{drift}"),
-                data: None,
-                dt: 0.02,
-                steps: [200, 2000],
-            };
+            let run = Inputs::new(IDEAL, 1.0, format!("box = 4.0\n{part}{drift}"), 0.02, [200, 2000]);
             let case = Case { group: "tests", name: "drift", run, must, exact: None };
             let folder = tempfile::tempdir().unwrap();
             let integrator = Integrator::VelocityVerlet;

@@ -7,14 +7,7 @@ const GROUP: &str = "phases";
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
-    let run = |model: String, kt: f64, scene: &str, dt: f64| Inputs {
-        model,
-        kt,
-        scene: scene.into(),
-        data: None,
-        dt,
-        steps: [200, 400],
-    };
+    let run = |model: String, kt, scene: &str, dt| Inputs::new(model, kt, scene, dt, [200, 400]);
     // What separates or freezes is hot until it has.
     let long = |run: Inputs| Inputs { steps: [1000, 800], ..run };
     let bell = SET6.replace("kernel = \"quadratic\"", "kernel = \"bell\"");

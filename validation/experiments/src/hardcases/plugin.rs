@@ -24,9 +24,6 @@ pub fn must(case: &Case) -> Option<Must> {
 }
 
 /// Carries out a case in `folder`.
-///
-/// # Errors
-/// Files cannot be written or read, or LAMMPS takes too long.
 pub fn carry_out(
     lammps: &PluginHost,
     case: &Case,

@@ -15,35 +15,18 @@ fn logarithm(bounds: &str) -> String {
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
-    let flat = |model: String| Inputs {
-        model,
-        kt: 2.5,
-        // b n is 1.3 on average.
-        scene: "box = 3.0\ndensity = 80.0\n".into(),
-        data: None,
-        dt: 0.002,
-        steps: [50, 150],
-    };
+    // b n is 1.3 on average.
+    let flat = |model: String| Inputs::new(model, 2.5, "box = 3.0\ndensity = 80.0\n", 0.002, [50, 150]);
     let unbounded: String = VAN_DER_WAALS
         .lines()
         .filter(|l| !l.starts_with("bounds"))
         .fold(String::new(), |all, l| all + l + "\n");
     // Two particles in a large box, out of each other's reach.
-    let thin = |bounds: &str| Inputs {
-        model: logarithm(bounds),
-        kt: 1.0,
-        scene: "box = 20.0\n[initial]\nkind = \"lattice\"\ncount = 2\n".into(),
-        data: None,
-        dt: 0.01,
-        steps: [20, 40],
-    };
-    let huggins = |composition: &str, scene: &str| Inputs {
-        model: HUGGINS.into(),
-        kt: 1.0,
-        scene: format!("{scene}[initial]\nkind = \"lattice\"\n{composition}\n"),
-        data: None,
-        dt: 0.01,
-        steps: [1000, 2000],
+    let lone = "box = 20.0\n[initial]\nkind = \"lattice\"\ncount = 2\n";
+    let thin = |bounds: &str| Inputs::new(logarithm(bounds), 1.0, lone, 0.01, [20, 40]);
+    let huggins = |composition: &str, scene: &str| {
+        let scene = format!("{scene}[initial]\nkind = \"lattice\"\n{composition}\n");
+        Inputs::new(HUGGINS, 1.0, scene, 0.01, [1000, 2000])
     };
     vec![
         case("bn beyond 1 where psi has a pole, no bounds", flat(unbounded), Must::Stops),

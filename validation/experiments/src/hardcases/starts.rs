@@ -7,22 +7,14 @@ use crate::models::{SET6, STANDARD};
 const GROUP: &str = "starts and boxes";
 
 pub fn cases() -> Vec<Case> {
-    let set6 = |scene: &str| Inputs {
-        model: SET6.into(),
-        kt: 1.0,
-        scene: scene.into(),
-        data: None,
-        dt: 0.005,
-        steps: [200, 400],
-    };
+    let set6 = |scene: &str| Inputs::new(SET6, 1.0, scene, 0.005, [200, 400]);
     let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
-    let from_data = |run: Inputs, x: &[[f64; 3]], edge: f64| Inputs {
-        data: Some(data(x, edge)),
-        scene: "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"thermal\"\n".into(),
-        ..run
-    };
     // Temperatures of few particles need many samples.
-    let dpd = Inputs { model: STANDARD.into(), dt: 0.02, steps: [200, 2000], ..set6("") };
+    let dpd = |scene: &str| Inputs::new(STANDARD, 1.0, scene, 0.02, [200, 2000]);
+    let from_data = |x: &[[f64; 3]]| Inputs {
+        data: Some(data(x, 4.2)),
+        ..dpd("[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"thermal\"\n")
+    };
     // Every site of a lattice twice: 216 particles on 108 places.
     let mut twice = Vec::new();
     for k in 0..216usize {
@@ -38,16 +30,8 @@ pub fn cases() -> Vec<Case> {
         faces.push([at(a), at(b), at(c)]);
     }
     vec![
-        case(
-            "coincident particles: every place taken twice",
-            from_data(dpd.clone(), &twice, 4.2),
-            Must::Right(0.06),
-        ),
-        case(
-            "particles exactly on faces, edges and corners",
-            from_data(dpd.clone(), &faces, 4.2),
-            Must::Right(0.06),
-        ),
+        case("coincident particles: every place taken twice", from_data(&twice), Must::Right(0.06)),
+        case("particles exactly on faces, edges and corners", from_data(&faces), Must::Right(0.06)),
         case(
             "random overlapping start at three times the density of the liquid",
             set6("box = 3.0\ndensity = 18.0\n"),
@@ -55,14 +39,10 @@ pub fn cases() -> Vec<Case> {
         ),
         case(
             "a box barely two cut-offs wide",
-            Inputs { scene: "box = 2.02\ndensity = 3.0\n".into(), steps: [200, 12_000], ..dpd.clone() },
+            Inputs { steps: [200, 12_000], ..dpd("box = 2.02\ndensity = 3.0\n") },
             Must::Right(0.06),
         ),
-        case(
-            "a box less than two cut-offs wide",
-            Inputs { scene: "box = 1.9\ndensity = 3.0\n".into(), ..dpd.clone() },
-            Must::Refused,
-        ),
+        case("a box less than two cut-offs wide", dpd("box = 1.9\ndensity = 3.0\n"), Must::Refused),
         case(
             "a lone particle",
             set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 1\n"),

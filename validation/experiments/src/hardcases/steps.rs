@@ -14,22 +14,10 @@ const IDEAL_TWO: &str =
 
 pub fn cases() -> Vec<Case> {
     let case = |name, run, must, exact| Case { group: GROUP, name, run, must, exact };
-    let liquid = |dt: f64| Inputs {
-        model: SET6.into(),
-        kt: 1.0,
-        scene: "box = 4.0\ndensity = 6.05\n".into(),
-        data: None,
-        dt,
-        steps: [200, 1000],
-    };
+    let liquid = |dt: f64| Inputs::new(SET6, 1.0, "box = 4.0\ndensity = 6.05\n", dt, [200, 1000]);
     // γ Δt is told; Σ w² over neighbours is about 1.3 at this density.
-    let gas = |model: &str, dt: f64, rest: &str| Inputs {
-        model: model.into(),
-        kt: 1.0,
-        scene: format!("box = 4.0\ndensity = 3.0\n{rest}"),
-        data: None,
-        dt,
-        steps: [100, 400],
+    let gas = |model: &str, dt: f64, rest: &str| {
+        Inputs::new(model, 1.0, format!("box = 4.0\ndensity = 3.0\n{rest}"), dt, [100, 400])
     };
     let strong = |gamma: f64| IDEAL.replace("gamma = 4.5", &format!("gamma = {gamma:?}"));
     // The watch has more samples of a longer stage.
@@ -37,20 +25,8 @@ pub fn cases() -> Vec<Case> {
     let drops = "box = [7.0, 7.0, 12.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\ncenter = [3.5, 3.5, 3.0]\n\
                  density = 12.0\nvelocity = [0.0, 0.0, 8.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\n\
                  center = [3.5, 3.5, 9.0]\ndensity = 12.0\nvelocity = [0.0, 0.0, -8.0]\n";
-    let collision = Inputs {
-        model: SPLINE.into(),
-        kt: 0.5,
-        scene: drops.into(),
-        data: None,
-        dt: 0.005,
-        steps: [1500, 800],
-    };
-    let cold = Inputs {
-        kt: 0.0,
-        scene: "box = 4.0\ndensity = 3.0\n".into(),
-        steps: [10, 10],
-        ..gas(IDEAL, 0.01, "")
-    };
+    let collision = Inputs::new(SPLINE, 0.5, drops, 0.005, [1500, 800]);
+    let cold = Inputs { kt: 0.0, steps: [10, 10], ..gas(IDEAL, 0.01, "") };
     let said = Must::RightOrSaid(0.06);
     let right = |part: f64| Some(Must::Right(part));
     vec![

@@ -8,20 +8,17 @@ use std::path::Path;
 pub struct Deck<'a> {
     pub style: &'a PairStyle,
     pub kt: f64,
-    /// Seed of the noise.
     pub seed: u64,
     /// The plugin to load, if the style is one of its.
     pub plugin: Option<&'a Path>,
     pub data: String,
     /// Commands for accelerated styles.
     pub acceleration: &'a str,
-    /// `newton on`?
     pub newton: bool,
     /// Whether particles can be found by tag.
     pub map: bool,
     /// How often the box is repeated along x.
     pub copies: usize,
-    /// Skin of the lists.
     pub skin: f64,
     pub build: &'a str,
 }

@@ -12,9 +12,6 @@ use std::path::Path;
 
 /// Shows the frames of the dump at `path` to observers, which look at positions alone, of particles of one species in the box of
 /// `state`; frames are `every` steps of `dt` apart.
-///
-/// # Errors
-/// The dump has no positions.
 pub fn show(
     path: &Path,
     (scene, stage, kt): (&Scene, &str, f64),

@@ -9,7 +9,6 @@ const SCRIPT: &str = "in.lammps";
 
 #[derive(Debug, Clone)]
 pub struct PluginHost {
-    /// LAMMPS.
     pub host: Host,
     /// The plugin to load; `None` where the program has the styles in it.
     pub plugin: Option<PathBuf>,
@@ -17,9 +16,6 @@ pub struct PluginHost {
 
 impl PluginHost {
     /// Builds the plugin for `host`, if necessary.
-    ///
-    /// # Errors
-    /// It cannot be built.
     pub fn open(host: Host, note: &dyn Fn(&str)) -> Result<PluginHost, LammpsError> {
         let plugin = plugin::build(&host, note)?;
         plugin::check(&host, &plugin)?;
@@ -31,18 +27,12 @@ impl PluginHost {
     }
 
     /// The LAMMPS that is installed, with the plugin.
-    ///
-    /// # Errors
-    /// There is none, or the plugin cannot be built.
     pub fn find(note: &dyn Fn(&str)) -> Result<PluginHost, LammpsError> {
         PluginHost::open(Host::find()?, note)
     }
 
     /// Runs a script on `ranks` ranks in `folder`, at most for `limit`, and gives what LAMMPS prints. Its variable `plugin` is the
     /// plugin's path.
-    ///
-    /// # Errors
-    /// LAMMPS stops, or the script cannot be written.
     pub fn run(
         &self,
         ranks: usize,

@@ -19,9 +19,6 @@ pub struct Loop {
 }
 
 /// Reads the account of the last loop of a run, which an error names as `what`.
-///
-/// # Errors
-/// Something is missing in it.
 pub fn timed(what: &str, text: &str) -> Result<Loop, ExperimentError> {
     parse(text).map_err(|problem| ExperimentError::Printed { what: what.to_owned(), problem })
 }

@@ -3,7 +3,6 @@
 use psidpd_core::model::{ForceLaw, WarrenPair};
 use psidpd_lammps_host::export::eam::Grid;
 
-/// A pair style with its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PairStyle {
     /// The plugin's `dpd/psi` with a model file and words behind the seed.
@@ -30,7 +29,6 @@ impl PairStyle {
         matches!(self, PairStyle::Psi { .. } | PairStyle::MdpdPsi { .. })
     }
 
-    /// `pair_style` and `pair_coeff`.
     pub fn commands(&self, kt: f64, seed: u64) -> String {
         let warren = |p: &WarrenPair| format!("{:?} {:?} {:?} {:?} {:?}", p.a, p.b, p.gamma, p.rc, p.rd);
         match self {

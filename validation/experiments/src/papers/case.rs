@@ -14,15 +14,11 @@ pub const VAGUE: f64 = 0.1;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// With the published number.
     Equal,
-    /// It is this or more.
     AtLeast,
-    /// It is this or less.
     AtMost,
 }
 
-/// A value beside the published one.
 #[derive(Debug, Clone)]
 pub struct Compared {
     pub name: String,
@@ -89,7 +85,6 @@ pub struct Reproduction {
 }
 
 impl Reproduction {
-    /// Whether all values agree.
     pub fn passes(&self) -> bool {
         !self.values.is_empty() && self.values.iter().all(Compared::passes)
     }
@@ -146,12 +141,10 @@ impl Reproduction {
     }
 }
 
-/// a − b of independent values.
 pub fn difference(a: Measured, b: Measured) -> Measured {
     Measured { value: a.value - b.value, error: a.error.hypot(b.error) }
 }
 
-/// a/b of independent values.
 pub fn ratio(a: Measured, b: Measured) -> Measured {
     let value = a.value / b.value;
     Measured { value, error: (a.error / b.value).hypot(value * b.error / b.value) }

@@ -12,7 +12,6 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// How large the runs of a case are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Size {
     /// Half an hour for all cases.
@@ -25,7 +24,6 @@ pub enum Size {
 pub struct Context {
     pub size: Size,
     pub folder: PathBuf,
-    /// Threads of each run.
     pub threads: NonZeroUsize,
     /// Folders of runs that were made in this call, which figures of the same runs share.
     pub made: Rc<RefCell<HashSet<PathBuf>>>,
@@ -48,7 +46,6 @@ pub struct Fluid<'a> {
 }
 
 impl Context {
-    /// A number by size.
     pub fn pick<T>(&self, quick: T, full: T) -> T {
         match self.size {
             Size::Quick => quick,

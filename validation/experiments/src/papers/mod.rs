@@ -19,11 +19,10 @@ use crate::ExperimentError;
 pub use case::{Compared, Reproduction, Rule};
 pub use context::{Context, Size};
 
-/// A figure or table.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Case {
     /// `PAPER-figN`, `PAPER-tableN`, or another short name.
-    pub id: &'static str,
+    pub id: String,
     pub paper: &'static str,
     pub what: &'static str,
     add: Add,
@@ -32,8 +31,8 @@ pub struct Case {
 /// Makes the runs of a case and adds its values and plots.
 type Add = fn(&Context, &mut Reproduction) -> Result<(), ExperimentError>;
 
-/// A paper, and its cases: id, the comparison in a line, and the function that makes it.
-type Paper = (&'static str, &'static [(&'static str, &'static str, Add)]);
+/// A paper: a short name, a reference, and its cases: figure or table, the comparison in a line, and the function that makes it.
+type Paper = (&'static str, &'static str, &'static [(&'static str, &'static str, Add)]);
 
 const PAPERS: [Paper; 5] =
     [pagonabarraga::PAPER, trofimov::PAPER, warren::PAPER, wang::PAPER, berendsen::PAPER];
@@ -51,8 +50,9 @@ impl Case {
 }
 
 pub fn cases() -> Vec<Case> {
-    let of =
-        |(paper, cases): Paper| cases.iter().map(move |(id, what, add)| Case { id, paper, what, add: *add });
+    let of = |(name, paper, cases): Paper| {
+        cases.iter().map(move |(of, what, add)| Case { id: format!("{name}-{of}"), paper, what, add: *add })
+    };
     PAPERS.into_iter().flat_map(of).collect()
 }
 
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn ids_are_unique_and_begin_with_their_paper() {
-        let mut ids: Vec<&str> = super::cases().iter().map(|case| case.id).collect();
+        let mut ids: Vec<String> = super::cases().into_iter().map(|case| case.id).collect();
         let papers = ["pagonabarraga-", "trofimov-", "warren-", "wang-", "berendsen-"];
         assert!(ids.iter().all(|id| papers.iter().any(|paper| id.starts_with(paper))), "{ids:?}");
         let count = ids.len();

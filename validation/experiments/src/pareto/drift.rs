@@ -51,9 +51,6 @@ pub fn schemes() -> Vec<Physics> {
 }
 
 /// Runs a scheme without its thermostat.
-///
-/// # Errors
-/// It cannot begin.
 pub fn drift(origin: &Origin, physics: &Physics, effort: Effort) -> Result<EnergyDrift, ExperimentError> {
     let dt = origin.dt(physics);
     let every = physics.interval();

@@ -19,7 +19,6 @@ use std::time::Duration;
 /// Longest time that one run may take.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// LAMMPS with the plugin, in a folder for decks.
 #[derive(Debug)]
 pub struct LammpsRuns {
     host: PluginHost,
@@ -29,18 +28,12 @@ pub struct LammpsRuns {
 
 impl LammpsRuns {
     /// The LAMMPS that is installed; builds the plugin for it if necessary.
-    ///
-    /// # Errors
-    /// There is none, or the plugin cannot be built.
     pub fn open(origin: &Origin, work: &Path, note: &dyn Fn(&str)) -> Result<LammpsRuns, ExperimentError> {
         let host = PluginHost::find(note)?;
         Ok(LammpsRuns { host, work: work.to_owned(), own: own_style(origin)? })
     }
 
     /// Seconds for a step, by LAMMPS's own clock, with no output in the loop.
-    ///
-    /// # Errors
-    /// LAMMPS stops.
     pub fn time(&self, origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ExperimentError> {
         let text = self.run(origin, setting, &[10, steps], "time", "")?;
         let account = log::timed("a timed run of LAMMPS", &text)?;
@@ -49,9 +42,6 @@ impl LammpsRuns {
 
     /// Makes a run of LAMMPS's own style: kinetic temperature and pressure by LAMMPS, g(r), diffusion and densities from
     /// its configurations. `step` is the time that a step takes.
-    ///
-    /// # Errors
-    /// LAMMPS prints what is not understood.
     pub fn sample(
         &self,
         origin: &Origin,

@@ -28,7 +28,7 @@ pub use tolerance::Tolerance;
 use crate::ExperimentError;
 use crate::code::Host;
 use crate::files;
-use crate::jobs::{self, Job};
+use crate::jobs;
 use crate::machine::machine;
 use lammps::LammpsRuns;
 use origin::Origin;
@@ -45,7 +45,6 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What `psidpd pareto` is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Minutes that all of it may take, roughly.
@@ -58,7 +57,6 @@ pub struct Options {
     pub lammps: bool,
     /// How much of each setting is sampled, and how it is timed; by the minutes if left out.
     pub fixed: Option<(Effort, Pace)>,
-    /// Folder for `pareto.json` and `pareto.html`.
     pub out: PathBuf,
 }
 
@@ -77,9 +75,6 @@ const ROUNDS: usize = 5;
 const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 
 /// Holds the settings of a scene against each other, and writes `pareto.json` and `pareto.html`.
-///
-/// # Errors
-/// The scene cannot be run with its own step, or something cannot be written.
 pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comparison, ExperimentError> {
     let out = files::absolute_folder(&options.out)?;
     let seconds = 60.0 * options.minutes;
@@ -232,12 +227,10 @@ fn sample_all(
 ) -> Result<(References, Vec<Sampled>), ExperimentError> {
     let bar = progress.bar("errors", physics.len() as u64 + 2);
     let references = [Physics::reference(), Physics::small_steps()];
-    let mut jobs: Vec<Job<Result<Sampled, ExperimentError>>> = Vec::new();
-    for (k, physics) in references.iter().chain(physics).enumerate() {
-        let effort = if k < references.len() { effort.times(REFERENCE) } else { effort };
-        jobs.push(Box::new(move || sample::sample(origin, physics, effort)));
-    }
-    let mut found = jobs::counted(jobs, &bar).into_iter();
+    let longer = references.iter().map(|physics| (physics, effort.times(REFERENCE)));
+    let runs = longer.chain(physics.iter().map(|physics| (physics, effort))).collect();
+    let sample = |(physics, effort)| sample::sample(origin, physics, effort);
+    let mut found = jobs::counted(runs, &bar, sample).into_iter();
     // A model without energy, or a flow, has no Monte Carlo.
     let configurations = found.next().map_or(Err(String::new()), |found| found.map_err(|e| e.to_string()));
     let mut rest: Vec<Sampled> = found.collect::<Result<_, _>>()?;
@@ -259,10 +252,7 @@ fn drifts(
     let schemes = drift::schemes();
     let effort = Effort::Seconds(seconds / schemes.len() as f64);
     let bar = progress.bar("energy", schemes.len() as u64);
-    let job = |scheme| -> Job<Result<EnergyDrift, ExperimentError>> {
-        Box::new(move || drift::drift(origin, scheme, effort))
-    };
-    jobs::counted(schemes.iter().map(job).collect(), &bar).into_iter().collect()
+    jobs::counted(schemes, &bar, |scheme| drift::drift(origin, &scheme, effort)).into_iter().collect()
 }
 
 fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Deviation>) -> Point {
@@ -334,7 +324,6 @@ fn plugin_points(origin: &Origin, points: &mut Vec<Point>) {
 
 type Own = (Option<Reference>, Vec<Point>);
 
-/// LAMMPS's own style.
 fn own_points(
     origin: &Origin,
     lammps: &LammpsRuns,
@@ -357,11 +346,9 @@ fn own_points(
         _ => Effort::Seconds(WORKERS * seconds / OWN.len() as f64),
     };
     let bar = progress.bar("LAMMPS's own style", OWN.len() as u64);
-    let mut jobs: Vec<Job<Result<Sampled, ExperimentError>>> = Vec::new();
-    for (k, physics) in physics.iter().enumerate() {
-        jobs.push(Box::new(move || lammps.sample(origin, physics, effort, step, &format!("own-{k}"))));
-    }
-    let sampled: Vec<Sampled> = jobs::counted(jobs, &bar).into_iter().collect::<Result<_, _>>()?;
+    let sample = |k: usize| lammps.sample(origin, &physics[k], effort, step, &format!("own-{k}"));
+    let sampled = jobs::counted((0..OWN.len()).collect(), &bar, sample);
+    let sampled: Vec<Sampled> = sampled.into_iter().collect::<Result<_, _>>()?;
     let mut known = known;
     let (reference, first) = match (&sampled[0], is_another_law(own)) {
         (Sampled::Made { quantities, .. }, true) => {

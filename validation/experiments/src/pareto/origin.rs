@@ -67,9 +67,6 @@ impl<'a> Origin<'a> {
     }
 
     /// A simulation that begins here.
-    ///
-    /// # Errors
-    /// As [`Scene::simulation`].
     pub fn simulation(
         &self,
         physics: &Physics,

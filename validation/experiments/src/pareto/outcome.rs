@@ -15,12 +15,10 @@ pub struct Comparison {
     pub version: &'static str,
     pub machine: String,
     pub scene: String,
-    /// Name of the stage that was measured.
     pub stage: String,
     pub particles: usize,
     #[serde(rename = "kT")]
     pub kt: f64,
-    /// Δt of the stage.
     pub dt: f64,
     /// Whether temperatures are compared with kT; against the reference otherwise.
     pub temperature_is_known: bool,
@@ -28,19 +26,16 @@ pub struct Comparison {
     pub reference: Reference,
     /// What those of diffusion and viscosities are compared with, if the reference has no time step.
     pub reference_of_dynamics: Option<Reference>,
-    /// That of LAMMPS's own style.
     pub lammps_reference: Option<Reference>,
     /// Why LAMMPS, or one of its styles, is not among the points.
     pub left_out: Vec<String>,
     pub points: Vec<Point>,
-    /// Energy without thermostat.
     pub drifts: Vec<EnergyDrift>,
     /// What was asked for; one percent of all that was resolved so well if nothing was.
     #[serde(rename = "tolerance", serialize_with = "tolerance::by_name")]
     pub tolerances: Vec<Tolerance>,
     /// Quantities that are not judged, as most points do not resolve one percent of them.
     pub unresolved: Vec<String>,
-    /// The cheapest setting within these.
     pub recommended: Option<Recommended>,
 }
 
@@ -70,16 +65,13 @@ pub struct Reference {
     pub values: Vec<Deviation>,
 }
 
-/// Wall seconds for a unit of simulated time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
     /// The median over rounds.
     pub value: f64,
     /// Half of the difference between the slowest round and the fastest.
     pub error: f64,
-    /// The fastest round.
     pub min: f64,
-    /// The slowest round.
     pub max: f64,
 }
 

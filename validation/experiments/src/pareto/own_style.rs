@@ -8,9 +8,6 @@ use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
 
 /// The style for the fluid of a scene, found by the model's parameters and compared with its forces.
-///
-/// # Errors
-/// The model does not hold at the temperature.
 pub fn own_style(origin: &Origin) -> Result<Option<PairStyle>, ExperimentError> {
     let scene = origin.scene;
     let fluid = scene.model.at(origin.stage.kt)?;

@@ -72,7 +72,6 @@ pub fn table(outcome: &Comparison) -> Table {
     table
 }
 
-/// Energy without thermostat.
 pub fn drifts(outcome: &Comparison) -> Table {
     let mut table = Table::new([
         "conservative steps of",
@@ -206,9 +205,6 @@ pub fn explanation(outcome: &Comparison) -> String {
 }
 
 /// `pareto.html`.
-///
-/// # Errors
-/// A plot cannot be drawn.
 pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));

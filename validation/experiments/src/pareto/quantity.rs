@@ -32,7 +32,6 @@ pub enum Class {
 }
 
 impl Class {
-    /// With the names on the command line.
     pub const ALL: [(&'static str, Class); 8] = [
         ("u", Class::Energy),
         ("p", Class::Pressure),
@@ -94,7 +93,6 @@ pub struct Structure {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Quantities {
     pub scalars: Vec<Quantity>,
-    /// g(r) of all particles.
     pub structure: Option<Structure>,
 }
 
@@ -152,7 +150,6 @@ impl Quantities {
         self
     }
 
-    /// A quantity by its name.
     pub fn get(&self, name: &str) -> Option<Measured> {
         self.scalars.iter().find(|q| q.name == name).map(|q| q.measured)
     }
@@ -161,11 +158,9 @@ impl Quantities {
 /// What is known better than by measuring, and units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known {
-    /// kT of the stage.
     pub kt: f64,
     /// Whether that is the temperature of velocities and configurations: no flow, forces with a potential.
     pub temperature: bool,
-    /// ρ kT.
     pub ideal_pressure: f64,
 }
 
@@ -176,7 +171,6 @@ pub struct Deviation {
     pub name: String,
     /// What was measured, in the unit of the model.
     pub measured: Measured,
-    /// The error, with its sign.
     pub value: f64,
     /// One standard deviation of that, the reference's among it.
     pub error: f64,

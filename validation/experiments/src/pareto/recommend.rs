@@ -52,9 +52,6 @@ pub fn scene_of(origin: &Origin, physics: &Physics, steps: &[u64]) -> Scene {
 }
 
 /// The lines of a LAMMPS script that make the same steps.
-///
-/// # Errors
-/// LAMMPS cannot express them.
 pub fn lammps_lines(origin: &Origin, physics: &Physics) -> Result<String, LammpsError> {
     let script = deck::script_of(&scene_of(origin, physics, &[origin.stage.steps]), Script::default())?;
     let wanted = ["comm_modify", "pair_style", "pair_coeff", "fix ", "fix_modify", "timestep", "run_style"];

@@ -61,9 +61,6 @@ pub const FAR_OFF: f64 = 5.0;
 
 /// What is observed: temperature of configurations, pressures, g(r) and diffusion, and what the scene itself asks of interfaces and
 /// viscosities. Without time there is neither diffusion nor viscosity.
-///
-/// # Errors
-/// The model has none of these: never.
 pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Result<Observe, ExperimentError> {
     let (scene, stage) = (origin.scene, origin.stage);
     // Pressure and forces of LAMMPS's own law are not those of the model.
@@ -113,9 +110,6 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
 }
 
 /// Makes a run.
-///
-/// # Errors
-/// It cannot begin.
 pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ExperimentError> {
     let (dt, every) = (origin.dt(physics), physics.interval());
     let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;

@@ -81,7 +81,6 @@ fn force_gradient(lambda: f64, every: u64) -> Integrator {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
-    /// Three, for tests.
     Few,
     /// Those that are known to do well, beside velocity Verlet.
     Quick,

@@ -22,9 +22,6 @@ const CYCLE: u64 = psidpd_dynamics::run::REORDERING;
 const MOST: u64 = 1 << 16;
 
 /// Wall seconds for a unit of simulated time: of every setting, in every round.
-///
-/// # Errors
-/// A run that was stable before stops, or LAMMPS does.
 pub fn time(
     origin: &Origin,
     settings: &[Setting],

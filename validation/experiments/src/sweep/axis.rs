@@ -41,7 +41,6 @@ fn spaced(low: f64, high: f64, n: usize) -> Vec<String> {
 }
 
 impl Axis {
-    /// Whether every value is a number.
     pub fn is_numeric(&self) -> bool {
         self.edits.iter().all(|e| e.number().is_some())
     }

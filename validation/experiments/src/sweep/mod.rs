@@ -7,6 +7,7 @@ pub use axis::Axis;
 pub use page::{page, table};
 
 use crate::ExperimentError;
+use crate::jobs;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
 use psidpd_dynamics::scene::{Edit, Scene};
@@ -16,7 +17,6 @@ use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 #[derive(Debug, Clone)]
 pub struct Options {
@@ -48,7 +48,6 @@ fn shown<S: serde::Serializer>(edits: &[Edit], to: S) -> Result<S::Ok, S::Error>
     to.collect_map(edits.iter().map(|e| (e.key(), e.value())))
 }
 
-/// The table of a sweep, in its folder.
 const TABLE: &str = "sweep.csv";
 
 const MOST: usize = 10_000;
@@ -69,25 +68,16 @@ pub fn run(
     Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
     refuse_other_grid(options, &points)?;
     std::fs::create_dir_all(&options.out).map_err(WriteError::at(&options.out))?;
-    let (next, ended) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let done: Mutex<Vec<Option<Point>>> = Mutex::new(vec![None; points.len()]);
-    let work = || {
-        loop {
-            let k = next.fetch_add(1, Ordering::Relaxed);
-            let Some(edits) = points.get(k).filter(|_| stop.load(Ordering::Relaxed) == 0) else { break };
-            let point = run_point(options, edits, stop);
-            if point.finished || point.error.is_some() {
-                tell(&point, ended.fetch_add(1, Ordering::Relaxed) + 1);
-            }
-            done.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(point);
+    let ended = AtomicUsize::new(0);
+    let goes_on = |_: &_| stop.load(Ordering::Relaxed) == 0;
+    let threads = options.jobs.get().min(points.len());
+    Ok(jobs::on(threads, points.iter().enumerate().take_while(goes_on), |edits| {
+        let point = run_point(options, edits, stop);
+        if point.finished || point.error.is_some() {
+            tell(&point, ended.fetch_add(1, Ordering::Relaxed) + 1);
         }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..options.jobs.get().min(points.len()) {
-            scope.spawn(work);
-        }
-    });
-    Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect())
+        point
+    }))
 }
 
 /// Every value of every axis with every value of the others, the last axis fastest.
@@ -166,9 +156,6 @@ fn attempt(options: &Options, edits: &[Edit], folder: &Path, stop: &AtomicUsize)
 }
 
 /// Writes `sweep.csv` and `report.html`.
-///
-/// # Errors
-/// A file cannot be written.
 pub fn write(options: &Options, title: &str, points: &[Point]) -> Result<(), ExperimentError> {
     let to = |name: &str, text: String| write_atomically(options.out.join(name), text.as_bytes());
     to(TABLE, page::csv(&options.axes, points))?;

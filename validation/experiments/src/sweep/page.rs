@@ -64,9 +64,6 @@ pub fn table(axes: &[Axis], points: &[Point]) -> Table {
 }
 
 /// A page with a plot of each result.
-///
-/// # Errors
-/// A plot cannot be drawn.
 pub fn page(title: &str, axes: &[Axis], points: &[Point]) -> Result<Report, ReportError> {
     let mut sections = vec![Section::new("Results", vec![Item::Table(table(axes, points))])];
     let mut plots = Vec::new();

@@ -2,7 +2,6 @@
 
 /// A command, which may span several lines.
 pub struct Command<'a> {
-    /// Number of the command's first line.
     pub line: usize,
     /// The text of the command with its line breaks.
     pub text: &'a str,

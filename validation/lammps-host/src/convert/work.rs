@@ -45,7 +45,6 @@ struct Part {
     is_open: bool,
 }
 
-/// The place of the pair style.
 struct Place {
     part: usize,
     /// Where it begins in the new text.
@@ -94,9 +93,11 @@ impl Work<'_> {
         self.found.left.push(note);
     }
 
-    fn by_hand(&mut self, command: &Command, text: impl Into<String>) {
+    /// Keeps a command as it is, to be rewritten by hand.
+    fn by_hand(&mut self, command: &Command, text: impl Into<String>) -> Option<String> {
         let note = self.note(command, text);
         self.found.by_hand.push(note);
+        None
     }
 
     fn take(&mut self, command: &Command) {
@@ -114,47 +115,40 @@ impl Work<'_> {
                 self.velocities |= rest.windows(2).any(|w| w == ["vel", "yes"]);
                 None
             }
-            words => {
-                self.look(command, words);
-                None
-            }
+            words => self.look(command, words),
         };
         self.parts[self.part].text += new.as_deref().unwrap_or(command.text);
     }
 
     /// Reports commands that are kept but may depend on the built-in.
-    fn look(&mut self, command: &Command, words: &[&str]) {
+    fn look(&mut self, command: &Command, words: &[&str]) -> Option<String> {
         match words {
             ["units", units] if !["lj", "real", "metal"].contains(units) => {
-                self.by_hand(command, "the style works in units lj, real and metal");
+                self.by_hand(command, "the style works in units lj, real and metal")
             }
-            ["read_restart", ..] => {
-                self.by_hand(
-                    command,
-                    "a restart file of atom_style mdpd cannot be read: begin from a data file",
-                );
-            }
+            ["read_restart", ..] => self
+                .by_hand(command, "a restart file of atom_style mdpd cannot be read: begin from a data file"),
             ["compute", id, _, "property/atom", rest @ ..] if rest.contains(&"rho") => {
                 let text = format!(
                     "there is no property rho: 'fix {id} all pair 1 mdpd/psi density 0' has the density, as f_{id}"
                 );
-                self.by_hand(command, text);
+                self.by_hand(command, text)
             }
             ["atom_style" | "pair_style", name, ..] if name.contains('$') => {
-                self.by_hand(command, "a variable has the style: write the style itself, and convert again");
+                self.by_hand(command, "a variable has the style: write the style itself, and convert again")
             }
             // The first words of fixes and computes are names of the user.
             ["fix" | "dump" | "compute", _, _, rest @ ..] if names_built_in(rest) => {
-                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi");
+                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi")
             }
             [
                 "variable" | "fix_modify" | "pair_coeff" | "pair_modify" | "if" | "run" | "python" | "set"
                 | "change_box",
                 rest @ ..,
             ] if names_built_in(rest) => {
-                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi");
+                self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi")
             }
-            _ => {}
+            _ => None,
         }
     }
 
@@ -166,10 +160,7 @@ impl Work<'_> {
                 // The order of columns in data files is that of a hybrid, with a single style too.
                 if others.is_empty() { vec!["atomic"] } else { [&["hybrid"], others.as_slice()].concat() }
             }
-            _ => {
-                self.look(command, &command.words);
-                return None;
-            }
+            _ => return self.look(command, &command.words),
         };
         self.column =
             Some(if style == ["mdpd"] { Some(Column::Third) } else { Column::of_hybrid(&style[1..]) });
@@ -181,16 +172,14 @@ impl Work<'_> {
     fn pair_style(&mut self, command: &Command, style: &[&str]) -> Option<String> {
         let at = |name| style.iter().position(|word| *word == name);
         let (Some(densities), Some(forces)) = (at(DENSITIES), at(FORCES)) else {
-            if at(DENSITIES).is_some() || at(FORCES).is_some() {
-                self.by_hand(command, "mdpd and mdpd/rhosum belong together: one of them is missing");
+            return if at(DENSITIES).is_some() || at(FORCES).is_some() {
+                self.by_hand(command, "mdpd and mdpd/rhosum belong together: one of them is missing")
             } else {
-                self.look(command, &command.words);
-            }
-            return None;
+                self.look(command, &command.words)
+            };
         };
         let Some(arguments) = style.get(forces + 1..forces + 4) else {
-            self.by_hand(command, "mdpd needs a temperature, a cut-off and a seed");
-            return None;
+            return self.by_hand(command, "mdpd needs a temperature, a cut-off and a seed");
         };
         let mut new = vec!["mdpd/psi"];
         new.extend(arguments);
@@ -228,8 +217,7 @@ impl Work<'_> {
     fn pair_coeff(&mut self, command: &Command, types: [&str; 2], rest: &[&str]) -> Option<String> {
         let key = (types[0].to_owned(), types[1].to_owned());
         if self.style.is_none() {
-            self.look(command, &command.words);
-            return None;
+            return self.look(command, &command.words);
         }
         match rest {
             [DENSITIES, range, ..] => {
@@ -278,27 +266,24 @@ impl Work<'_> {
     fn read_data(&mut self, command: &Command, file: &str, rest: &[&str]) -> Option<String> {
         let file = file.trim_matches(['"', '\'']);
         let Some(column) = self.column? else {
-            self.by_hand(
+            return self.by_hand(
                 command,
                 "atoms of this hybrid have a column for the density: take it out of the data file",
             );
-            return None;
         };
         if file.contains('$') {
-            self.by_hand(
+            return self.by_hand(
                 command,
                 format!("a variable has the data file: take the density out of its atoms, {column}"),
             );
-            return None;
         }
         let new = new_name(file, DATA);
         let names = || self.found.data.iter().map(|data| data.name.as_str());
         if names().any(|other| other != file && new_name(other, DATA) == new) {
-            self.by_hand(
+            return self.by_hand(
                 command,
                 format!("{new} would be the new name of two data files: rename one of them"),
             );
-            return None;
         }
         if names().all(|other| other != file) {
             let note = self.note(command, String::new());
@@ -309,24 +294,21 @@ impl Work<'_> {
         Some(command.with("read_data", &words))
     }
 
-    /// Converts an included file, once.
     fn include(&mut self, command: &Command, file: &str) -> Option<String> {
         if file.contains('$') {
-            self.by_hand(command, "a variable has the included file: write its name, and convert again");
-            return None;
+            return self
+                .by_hand(command, "a variable has the included file: write its name, and convert again");
         }
         let known = self.parts.iter().position(|part| part.name.as_deref() == Some(file));
         if known.is_some_and(|k| self.parts[k].is_open) {
-            self.by_hand(command, "the included file includes itself");
-            return None;
+            return self.by_hand(command, "the included file includes itself");
         }
         if known.is_none() {
             let Some(old) = (self.read)(file) else {
-                self.by_hand(
+                return self.by_hand(
                     command,
                     "the included file cannot be read in the folder of the script: convert it too",
                 );
-                return None;
             };
             self.parts.push(Part { name: Some(file.to_owned()), text: String::new(), is_open: true });
             let here = self.parts.len() - 1;
@@ -403,7 +385,6 @@ impl Work<'_> {
     }
 }
 
-/// Whether a word sets the density of atoms.
 fn is_density(word: &&str) -> bool {
     ["sph/rho", "meso/rho"].contains(word)
 }

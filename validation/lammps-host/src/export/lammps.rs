@@ -18,16 +18,12 @@ use psidpd_formats::memory;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-/// The name of the script.
 pub const SCRIPT: &str = "in.lammps";
-/// The name of the initial state.
 pub const START: &str = "start.data";
-/// The name of the model.
 pub const MODEL: &str = "model.toml";
 /// The name of the model for stages without a thermostat.
 pub const MODEL_WITHOUT_THERMOSTAT: &str = "model-without-thermostat.toml";
 
-/// The names of all files.
 pub const FILES: [&str; 4] = [SCRIPT, START, MODEL, MODEL_WITHOUT_THERMOSTAT];
 
 /// Largest number of steps of one `run` command.
@@ -70,9 +66,6 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
 }
 
 /// Writes what the script of a scene reads, with `state` as its start, and returns the names of the files.
-///
-/// # Errors
-/// As [`write()`].
 pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
     std::fs::create_dir_all(out).map_err(LammpsError::io("write", out))?;
     let mut files = vec![PathBuf::from(START), PathBuf::from(MODEL)];

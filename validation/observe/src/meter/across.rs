@@ -60,9 +60,7 @@ impl Across {
     pub fn read_along(options: &Options, axis: Option<usize>) -> Result<Across, FileError> {
         let axis = axis.or(options.place.slab).unwrap_or(options.place.fluid.dimensions - 1);
         let across = Across::at(options, axis);
-        let bins = options.count("bins", 1, 10_000)?;
-        let bins = bins.unwrap_or(((across.height / 0.1).ceil() as usize).clamp(1, 10_000));
-        Ok(Across { bins, ..across })
+        Ok(Across { bins: options.bins(across.height, 0.1, 1)?, ..across })
     }
 
     /// One bin over the whole direction.
@@ -87,12 +85,10 @@ impl Across {
         self.volume / self.bins as f64
     }
 
-    /// The area of a face.
     pub fn area(&self) -> f64 {
         self.volume / self.height
     }
 
-    /// The name of the coordinate.
     pub fn name(&self) -> &'static str {
         ["x", "y", "z"][self.axis]
     }

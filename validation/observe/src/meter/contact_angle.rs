@@ -233,17 +233,14 @@ impl Meter for ContactAngle {
                 options.error("axis", "in two dimensions a drop has no further direction; leave axis out")
             );
         }
+        options.require_right_angles("")?;
         let lengths = domain.lengths();
-        if (0..d).any(|k| (domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k]) {
-            return Err(options.error("", "the box must have right angles"));
-        }
         let outwards = (0..d)
             .filter(|k| *k != wall.0 && Some(*k) != along)
             .map(|k| 0.5 * lengths[k])
             .fold(f64::INFINITY, f64::min);
         let upwards = lengths[wall.0];
-        let preset = [outwards, upwards].map(|l| ((l / 0.25).ceil() as usize).clamp(4, 2000));
-        let bins = options.counts("bins", 4, 2000)?.unwrap_or(preset);
+        let bins = options.bins_of_plane([outwards, upwards], 4)?;
         let low = domain.origin()[wall.0];
         Ok(ContactAngle {
             wall,

@@ -44,10 +44,8 @@ impl Meter for DensityField {
     fn read(options: &Options) -> Result<DensityField, FileError> {
         let (domain, fluid) = (options.place.domain, options.place.fluid);
         let d = fluid.dimensions;
+        options.require_right_angles("")?;
         let lengths = domain.lengths();
-        if (0..d).any(|k| (domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k]) {
-            return Err(options.error("", "the box must have right angles"));
-        }
         let depth = match options.axis("axis")? {
             Some(_) if d == 2 => return Err(options.error("axis", "two dimensions have one plane only")),
             Some(axis) => axis,
@@ -59,8 +57,7 @@ impl Meter for DensityField {
             1 => [0, 2],
             _ => [0, 1],
         };
-        let preset = axes.map(|k| ((lengths[k] / 0.25).ceil() as usize).clamp(1, 2000));
-        let bins = options.counts("bins", 1, 2000)?.unwrap_or(preset);
+        let bins = options.bins_of_plane(axes.map(|k| lengths[k]), 1)?;
         let kinds = if fluid.species.len() > 1 { fluid.species.len() } else { 1 };
         Ok(DensityField {
             axes,

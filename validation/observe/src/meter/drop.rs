@@ -19,7 +19,6 @@ const WIDTH: usize = 5;
 /// The number of innermost shells that are averaged before a fit, because they hold few particles.
 const CORE: usize = 5;
 
-/// The size and the pressure of a drop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Drop {
     distance: Distance,
@@ -204,13 +203,8 @@ impl Meter for Drop {
     const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<Drop, FileError> {
-        let half = options.half_box();
-        let range = options.positive("range")?.unwrap_or(half);
-        if range > half * (1.0 + 1e-12) {
-            return Err(options.error("range", format!("must not exceed half the box, {half}, is {range}")));
-        }
-        let bins = options.count("bins", 12, 10_000)?;
-        let bins = bins.unwrap_or(((range / 0.1).ceil() as usize).clamp(12, 10_000));
+        let range = options.within_half_box("range")?.unwrap_or(options.half_box());
+        let bins = options.bins(range, 0.1, 12)?;
         Ok(Drop {
             distance: Distance::read(options)?,
             range,

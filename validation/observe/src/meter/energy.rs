@@ -7,7 +7,6 @@ use crate::series::Series;
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// The contributions to the energy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     names: Vec<String>,

@@ -61,7 +61,6 @@ fn sum(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-/// The clusters of a configuration.
 pub(super) struct Linked {
     /// For each particle, the first member of its cluster; `None` for particles that do not take part.
     pub labels: Vec<Option<usize>>,
@@ -128,7 +127,6 @@ const LINKED: [f64; 2] = [2.5, 2.0];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Distance {
     given: Option<f64>,
-    /// The choice made at the first sample.
     chosen: Option<f64>,
     /// The longest distance that may be chosen.
     longest: f64,
@@ -138,15 +136,9 @@ impl Distance {
     pub fn read(options: &Options) -> Result<Distance, FileError> {
         let fluid = options.place.fluid;
         let range = fluid.conservative_range();
-        let half = options.half_box();
         let preset = if range > 0.0 { range } else { fluid.cutoff() };
-        let given = options.positive("distance")?;
-        if let Some(distance) = given.filter(|d| *d > half * (1.0 + 1e-12)) {
-            return Err(
-                options.error("distance", format!("must not exceed half the box, {half}, is {distance}"))
-            );
-        }
-        Ok(Distance { given, chosen: None, longest: if preset > 0.0 { preset } else { 1.0 }.min(half) })
+        let longest = if preset > 0.0 { preset } else { 1.0 }.min(options.half_box());
+        Ok(Distance { given: options.within_half_box("distance")?, chosen: None, longest })
     }
 
     #[cfg(test)]

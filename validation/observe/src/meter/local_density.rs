@@ -4,7 +4,7 @@ use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::Series;
-use psidpd_core::document::{FileError, FileErrorKind};
+use psidpd_core::document::FileError;
 use psidpd_core::model::kernel::Kernel;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,6 @@ const SHELLS: usize = 200;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalDensity {
     name: String,
-    /// The index of the density in the model.
     density: usize,
     species: Vec<String>,
     dimensions: usize,
@@ -79,7 +78,7 @@ impl Meter for LocalDensity {
         let names: Vec<(&str, usize)> =
             fluid.densities.iter().enumerate().map(|(k, d)| (d.name.as_str(), k)).collect();
         if names.is_empty() {
-            return Err(options.at("").error(FileErrorKind::Value("the model has no density".into())));
+            return Err(options.error("", "the model has no density"));
         }
         let density = options.choice("density", &names)?.unwrap_or(0);
         let bins = options.count("bins", 1, 10_000)?.unwrap_or(200);

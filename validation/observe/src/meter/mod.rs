@@ -36,7 +36,6 @@ use serde::{Deserialize, Serialize};
 
 /// A measurement during a run. It is written to checkpoints, so it must not hold NaN or infinity.
 pub trait Meter: Sized {
-    /// The keys of the observable.
     const TABLE: Table;
     /// The default number of steps between samples; `None` takes that of `[observe]`.
     const EVERY: Option<u64> = None;
@@ -66,7 +65,6 @@ pub trait Meter: Sized {
     /// Forgets every sample and keeps the settings.
     fn forget(&mut self);
 
-    /// The results.
     fn finish(&self) -> Vec<Observation>;
 }
 

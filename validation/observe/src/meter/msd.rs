@@ -32,7 +32,6 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Adds one sample.
     pub fn tick(&mut self, time: f64) {
         if self.samples == 0 {
             self.first = time;

@@ -144,14 +144,11 @@ impl Meter for Pendant {
     fn read(options: &Options) -> Result<Pendant, FileError> {
         let (domain, d) = (options.place.domain, options.place.fluid.dimensions);
         let axis = options.axis("axis")?.unwrap_or(d - 1);
+        options.require_right_angles("axis")?;
         let lengths = domain.lengths();
-        if (0..d).any(|k| (domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k]) {
-            return Err(options.error("axis", "the box must have right angles"));
-        }
         let outwards = (0..d).filter(|k| *k != axis).map(|k| 0.5 * lengths[k]).fold(f64::INFINITY, f64::min);
         let along = lengths[axis];
-        let preset = [outwards, along].map(|l| ((l / 0.25).ceil() as usize).clamp(4, 2000));
-        let bins = options.counts("bins", 4, 2000)?.unwrap_or(preset);
+        let bins = options.bins_of_plane([outwards, along], 4)?;
         let hangs_down = options.choice("apex", &[("low", true), ("high", false)])?.unwrap_or(true);
         Ok(Pendant {
             axis,

@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::frame::Frame;
-use crate::keys::{BINS, Need, PLAIN, Table, ValueKind, key};
+use crate::keys::{BINS, Need, PLAIN, Table, ValueKind, keys};
 use crate::observation::{Kind, Observation};
 use crate::options::Options;
 use crate::series::{Measured, Series};
@@ -66,30 +66,18 @@ impl Meter for Poiseuille {
                 square distance of the velocities from the fit in units of the highest: noise, or a flow that is not \
                 steady or not Newtonian. `poiseuille_profile`: `velocity` and `fit`. Jackknife errors. Skip the time \
                 ρD²/(π²η), several times over, in which the flow sets in.",
-        keys: &[
-            key(
-                "axis",
-                ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"),
-                Need::Default("the direction in which the body force of the scene is reversed"),
-                "The direction across the flow.",
-                "\"z\"",
-            ),
-            key(
-                "flow",
-                ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"),
-                Need::Default("the direction of the body force of the scene"),
-                "The direction of the flow.",
-                "\"x\"",
-            ),
-            key(
-                "acceleration",
-                ValueKind::Words("positive number"),
-                Need::Default("that of the body force of the scene"),
-                "Force over mass in the lower half of the box.",
-                "0.05",
-            ),
-            BINS,
-        ],
+        keys: keys! {
+            "axis": ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"), Need::Default("the direction in which the body force of the scene is reversed"),
+                "The direction across the flow."
+                => "\"z\"";
+            "flow": ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"), Need::Default("the direction of the body force of the scene"),
+                "The direction of the flow."
+                => "\"x\"";
+            "acceleration": ValueKind::Words("positive number"), Need::Default("that of the body force of the scene"),
+                "Force over mass in the lower half of the box."
+                => "0.05";
+            then BINS;
+        },
         ..PLAIN
     };
 

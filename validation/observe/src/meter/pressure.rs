@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 /// The names of the components of a pressure tensor.
 const NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
-/// The pressure tensor of the whole box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pressure {
     dimensions: usize,

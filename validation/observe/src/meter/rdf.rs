@@ -10,7 +10,6 @@ use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Partial radial distribution functions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rdf {
     range: f64,
@@ -50,12 +49,8 @@ impl Meter for Rdf {
         let fluid = options.place.fluid;
         let half = options.half_box();
         let preset = if fluid.cutoff() > 0.0 { half.min(3.0 * fluid.cutoff()) } else { half };
-        let range = options.positive("range")?.unwrap_or(preset);
-        if range > half * (1.0 + 1e-12) {
-            return Err(options.error("range", format!("must not exceed half the box, {half}, is {range}")));
-        }
-        let bins = options.count("bins", 1, 10_000)?;
-        let bins = bins.unwrap_or(((range / 0.02).ceil() as usize).clamp(1, 10_000));
+        let range = options.within_half_box("range")?.unwrap_or(preset);
+        let bins = options.bins(range, 0.02, 1)?;
         let pairs = SpeciesPairs::new(&fluid.species);
         let series = Series::new(bins * pairs.len());
         Ok(Rdf { range, bins, dimensions: fluid.dimensions, pairs, series })

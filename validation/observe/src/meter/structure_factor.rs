@@ -14,7 +14,6 @@ use std::f64::consts::TAU;
 /// The largest number of candidate wave vectors.
 const MOST_CANDIDATES: f64 = 2e7;
 
-/// Partial structure factors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StructureFactor {
     pairs: SpeciesPairs,
@@ -61,9 +60,7 @@ impl Meter for StructureFactor {
 
     fn read(options: &Options) -> Result<StructureFactor, FileError> {
         let (domain, d) = (options.place.domain, options.place.fluid.dimensions);
-        if !domain.periodic()[..d].iter().all(|p| *p) {
-            return Err(options.error("", "the box must be periodic in every direction"));
-        }
+        options.require_periodic()?;
         let basis = reciprocal(domain);
         let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let shortest = basis[..d].iter().map(|b| length(*b)).fold(f64::INFINITY, f64::min);

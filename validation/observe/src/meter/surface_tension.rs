@@ -73,12 +73,7 @@ impl Meter for SurfaceTension {
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
         let place = options.place;
         let axis = options.axis("axis")?.or(place.slab).unwrap_or(place.fluid.dimensions - 1);
-        let lengths = place.domain.lengths();
-        if (0..place.fluid.dimensions)
-            .any(|k| (place.domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k])
-        {
-            return Err(options.error("axis", "the box must have right angles"));
-        }
+        options.require_right_angles("axis")?;
         if !place.fluid.is_conservative() {
             return Err(options.error("", "a force of the model has no potential: there is no free energy"));
         }

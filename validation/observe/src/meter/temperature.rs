@@ -8,7 +8,6 @@ use crate::series::Series;
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// The kinetic and the configurational kT.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Temperature {
     /// The reason why the fluid has no configurational temperature; empty if it has one.

@@ -101,9 +101,7 @@ impl Meter for Viscosity {
     fn read(options: &Options) -> Result<Viscosity, FileError> {
         let place = options.place;
         let dimensions = place.fluid.dimensions;
-        if !place.domain.periodic()[..dimensions].iter().all(|p| *p) {
-            return Err(options.error("", "the box must be periodic in every direction"));
-        }
+        options.require_periodic()?;
         let length = options.count("length", 2, 100_000)?.unwrap_or(400);
         Ok(Viscosity::new(dimensions, length, place.domain.volume(dimensions)))
     }

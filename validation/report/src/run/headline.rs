@@ -25,7 +25,6 @@ pub struct Headline {
     pub notes: Vec<String>,
 }
 
-/// One measured value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeadlineValue {
     /// The name is `density`, `temperature`, `pressure`, `liquid`, `vapour`, `tension`, `width` or `radius`.

@@ -47,9 +47,6 @@ pub fn write_run_report(folder: &Path) -> Result<PathBuf, ReportError> {
 }
 
 /// The report of the run in a folder.
-///
-/// # Errors
-/// The function fails if the folder has none of the files of a run.
 pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
     if !FILES.iter().any(|(name, _)| folder.join(name).exists()) {
         let files: Vec<&str> = FILES.iter().map(|f| f.0).collect();

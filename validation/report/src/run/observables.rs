@@ -100,7 +100,6 @@ fn figure(o: &Observation, plot: Result<String, super::ReportError>) -> Item {
     }
 }
 
-/// Names that mark leading columns as coordinates.
 const COORDINATES: [&str; 4] = ["x", "y", "z", "r"];
 
 /// Draws values on a grid as a map, and other values as points.

@@ -7,9 +7,7 @@ use psidpd_core::engine::{PeriodicBox, Pool, part};
 
 /// Particles whose coordinates are done together, in whole vectors.
 const GROUP: usize = 4;
-/// Their coordinates.
 const LANES: usize = 3 * GROUP;
-/// Coordinates of a vector.
 const WIDTH: usize = 4;
 
 /// Fewest particles for which another thread pays off.
@@ -29,7 +27,6 @@ pub struct Moving<'a> {
     pub kept: &'a mut Kept,
 }
 
-/// What is kept from loop to loop.
 #[derive(Debug, Clone, Default)]
 pub struct Kept {
     /// Velocities and forces of the beginning of the step.
@@ -79,7 +76,6 @@ pub struct Surroundings<'a> {
 /// The first particles that went too far, by what is wrong with them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Faults {
-    /// Its velocity is too high, or no number.
     pub fast: Option<usize>,
     /// It is beyond a wall even after reflection.
     pub escaped: Option<usize>,
@@ -89,14 +85,12 @@ pub struct Faults {
 
 /// The particles of one thread.
 pub struct Part<'a> {
-    /// The number of the first.
     first: usize,
     pub x: &'a mut [[f64; 3]],
     pub v: &'a mut [[f64; 3]],
     pub f: &'a [[f64; 3]],
     pub species: &'a [i32],
     image: &'a mut [[i32; 3]],
-    /// Empty for integrators that keep nothing.
     pub kept: [&'a mut [[f64; 3]]; 2],
     faults: Faults,
 }

@@ -11,9 +11,6 @@ impl Simulation {
     /// The two evaluations compute forces alone. If momentum is recorded, the second computes a virial too.
     /// The virial of forces `F̃` between the particles at `x` is `W(x̃) − Σ (x̃ − x) ⊗ F̃`, with the
     /// conservative part of `F̃`.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::compute`], at either set of positions.
     pub(in crate::run) fn displaced_forces(&mut self, c: f64) -> Result<(), RunError> {
         self.compute(Want::FORCES, None)?;
         self.add_external_forces();

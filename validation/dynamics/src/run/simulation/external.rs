@@ -93,7 +93,6 @@ impl Simulation {
         &self.external.frozen
     }
 
-    /// Number of particles that are not frozen.
     pub fn mobile(&self) -> usize {
         self.len() - self.frozen().iter().filter(|frozen| **frozen).count()
     }

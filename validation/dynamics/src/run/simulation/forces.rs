@@ -175,7 +175,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// The settings of the evaluations.
     pub fn settings(&self) -> Settings {
         self.forces.settings()
     }
@@ -207,7 +206,6 @@ impl Simulation {
         self.forces.plan()
     }
 
-    /// Number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.forces.plan().dimensions()
     }

@@ -62,9 +62,6 @@ pub struct Simulation {
 
 impl Simulation {
     /// Creates a simulation of `model` at temperature `kt` from `state`, at step 0. Positions outside the box are wrapped.
-    ///
-    /// # Errors
-    /// The model is invalid at `kt`, or `state` is invalid for it.
     pub fn new(model: &Model, kt: f64, state: State, seed: u64) -> Result<Simulation, RunError> {
         let fluid = model.at(kt)?;
         let particles = Particles::new(state, fluid.species.len(), fluid.dimensions)?;
@@ -89,9 +86,6 @@ impl Simulation {
     }
 
     /// Sets the temperature of the thermostat and of every formula with kT.
-    ///
-    /// # Errors
-    /// The model is invalid at `kt`.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt() {
             self.forces.set_temperature(kt)?;
@@ -178,7 +172,6 @@ impl Simulation {
         if want == Want::FORCES { Ok(()) } else { self.refresh(want) }
     }
 
-    /// Makes steps of `dt` without totals.
     pub fn advance(&mut self, steps: u64, dt: f64, integrator: Integrator) -> Result<(), RunError> {
         for _ in 0..steps {
             self.begin_step(dt, integrator, Want::FORCES)?;

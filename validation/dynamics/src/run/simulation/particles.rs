@@ -181,7 +181,6 @@ impl Simulation {
         &self.particles.state.image
     }
 
-    /// Mass of each species.
     pub fn masses(&self) -> &[f64] {
         &self.particles.state.mass
     }

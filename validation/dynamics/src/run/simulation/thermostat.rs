@@ -11,7 +11,6 @@ use psidpd_core::engine::{Step, Want};
 #[derive(Debug, Clone)]
 pub(super) struct Thermostat {
     on: bool,
-    /// `None` if the fluid has none.
     pairs: Option<PairThermostat>,
     /// Iterations at earlier temperatures and settings.
     effort_before: Effort,
@@ -21,7 +20,6 @@ pub(super) struct Thermostat {
     impulse_virial: [f64; 6],
     /// Whether drag and noise are among the present forces, where they act; `None` if nobody has asked for these forces.
     in_forces: Option<bool>,
-    /// Of [`Simulation::with_forces_kept`].
     kept_forces: Vec<[f64; 3]>,
 }
 
@@ -29,9 +27,7 @@ pub(super) struct Thermostat {
 #[derive(Debug, Clone, Copy)]
 pub struct Heat {
     pub update: Update,
-    /// The law of its noise.
     pub noise: Law,
-    /// How long it acts.
     pub time: f64,
     pub stream: Stream,
 }
@@ -173,7 +169,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// With the virial, where it is recorded.
     fn wants(&self, want: Want) -> Want {
         Want { virial: want.virial || self.is_recording(), ..want }
     }

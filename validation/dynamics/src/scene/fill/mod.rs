@@ -14,7 +14,6 @@ use rand::seq::SliceRandom;
 /// The error of a part that has no room for its particles at their minimum distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crowded {
-    /// Index of the part.
     pub part: usize,
     /// Number of particles that found a position.
     pub placed: usize,

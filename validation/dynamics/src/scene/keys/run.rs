@@ -32,53 +32,10 @@ pub const BODY_FORCE: Table = Table {
     ..PLAIN
 };
 
-const STAGE_INTEGRATOR: Key = Key {
-    about: "The integrator; that of the top level if left out.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"",
-    ..INTEGRATOR
-};
-
-const STAGE_LAMBDA: Key = Key {
-    about: "The parameter of `groot-warren`, from 0 to 1, or of `two-stage` and `force-gradient`, from 0 to 0.5.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"\nlambda = 0.5",
-    ..LAMBDA
-};
-
-const STAGE_GRADIENT: Key = Key {
-    about: "The parameter of `force-gradient`; as at the top level.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"force-gradient\"\ngradient = 0.045",
-    ..GRADIENT
-};
-
-const STAGE_THERMOSTAT_STEP: Key = Key {
-    about: "The thermostat of the integrator; as at the top level.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_step = \"pairwise\"",
-    ..THERMOSTAT_STEP
-};
-
-const STAGE_THERMOSTAT_EVERY: Key = Key {
-    about: "Number of steps between applications of the thermostat; as at the top level.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_every = 4",
-    ..THERMOSTAT_EVERY
-};
-
-const STAGE_NOISE: Key = Key {
-    about: "The distribution of the noise of the integrator; as at the top level.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nnoise = \"uniform\"",
-    ..NOISE
-};
-
-const STAGE_SWEEPS: Key = Key {
-    about: "Number of sweeps in a step of `monte-carlo`; as at the top level.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nsweeps = 10",
-    ..SWEEPS
-};
-
-const STAGE_MAX_MOVE: Key = Key {
-    about: "The largest trial move of `monte-carlo`; as at the top level.",
-    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nmax_move = 0.1",
-    ..MAX_MOVE
-};
+/// A key of the top level in a stage.
+const fn of_stage(of_top: Key, about: &'static str, example: &'static str) -> Key {
+    Key { about, example, ..of_top }
+}
 
 pub const STAGE: Table = Table {
     path: "stage",
@@ -93,14 +50,30 @@ pub const STAGE: Table = Table {
         key("dt", Positive, OPTIONAL,
             "The time step; that of the top level if left out.",
             "[[stage]]\nname = \"produce\"\nsteps = 1000\ndt = 0.005"),
-        STAGE_INTEGRATOR,
-        STAGE_LAMBDA,
-        STAGE_GRADIENT,
-        STAGE_THERMOSTAT_STEP,
-        STAGE_THERMOSTAT_EVERY,
-        STAGE_NOISE,
-        STAGE_SWEEPS,
-        STAGE_MAX_MOVE,
+        of_stage(INTEGRATOR,
+            "The integrator; that of the top level if left out.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\""),
+        of_stage(LAMBDA,
+            "The parameter of `groot-warren`, from 0 to 1, or of `two-stage` and `force-gradient`, from 0 to 0.5.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"\nlambda = 0.5"),
+        of_stage(GRADIENT,
+            "The parameter of `force-gradient`; as at the top level.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"force-gradient\"\ngradient = 0.045"),
+        of_stage(THERMOSTAT_STEP,
+            "The thermostat of the integrator; as at the top level.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_step = \"pairwise\""),
+        of_stage(THERMOSTAT_EVERY,
+            "Number of steps between applications of the thermostat; as at the top level.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_every = 4"),
+        of_stage(NOISE,
+            "The distribution of the noise of the integrator; as at the top level.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nnoise = \"uniform\""),
+        of_stage(SWEEPS,
+            "Number of sweeps in a step of `monte-carlo`; as at the top level.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nsweeps = 10"),
+        of_stage(MAX_MOVE,
+            "The largest trial move of `monte-carlo`; as at the top level.",
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nmax_move = 0.1"),
         key("kT", Temperature, OPTIONAL,
             "The temperature; that of the top level if left out. Two temperatures, `[from, to]`, make a ramp in \
              levels of equal steps; the last level is at `to`.",

@@ -9,14 +9,27 @@ pub use read::{FACES, SHAPES, Shapes};
 /// coordinate is ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// A block between two corners.
-    Block { low: [f64; 3], high: [f64; 3] },
+    Block {
+        low: [f64; 3],
+        high: [f64; 3],
+    },
     /// A ball; in two dimensions a disc.
-    Sphere { center: [f64; 3], radius: f64 },
-    /// A cylinder along an axis.
-    Cylinder { axis: usize, center: [f64; 3], radius: f64, length: f64 },
+    Sphere {
+        center: [f64; 3],
+        radius: f64,
+    },
+    Cylinder {
+        axis: usize,
+        center: [f64; 3],
+        radius: f64,
+        length: f64,
+    },
     /// The part of a block that other regions, which do not overlap, leave free.
-    Rest { low: [f64; 3], high: [f64; 3], others: Vec<Shape> },
+    Rest {
+        low: [f64; 3],
+        high: [f64; 3],
+        others: Vec<Shape>,
+    },
 }
 
 impl Shape {
@@ -49,7 +62,6 @@ impl Shape {
         }
     }
 
-    /// Whether a point lies in the region.
     pub fn contains(&self, x: [f64; 3], dimensions: usize) -> bool {
         match self {
             Shape::Block { low, high } => (0..dimensions).all(|k| (low[k]..=high[k]).contains(&x[k])),

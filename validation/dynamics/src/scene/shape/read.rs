@@ -12,7 +12,6 @@ const ROUNDING: f64 = 1e-9;
 pub const SHAPES: &[&str] = &["box", "slab", "layer", "sphere", "cylinder", "rest"];
 
 pub struct Shapes<'a> {
-    /// Number of dimensions, 2 or 3.
     pub dimensions: usize,
     pub domain: &'a PeriodicBox,
 }
@@ -70,15 +69,14 @@ impl Shapes<'_> {
         for k in 0..self.dimensions {
             let slack = ROUNDING * (high[k] - low[k]);
             if from[k] < low[k] - slack || to[k] > high[k] + slack {
-                let message = format!(
+                return Err(key.error(format!(
                     "reaches from {} to {} along {}, out of the box from {} to {}",
                     from[k],
                     to[k],
                     ["x", "y", "z"][k],
                     low[k],
                     high[k]
-                );
-                return Err(key.error(FileErrorKind::Value(message)));
+                )));
             }
         }
         Ok(())
@@ -93,8 +91,7 @@ impl Shapes<'_> {
             }
         }
         if (0..self.dimensions).any(|k| low[k] >= high[k]) {
-            let message = "the corner high must be above low in every direction".to_owned();
-            return Err(section.error(FileErrorKind::Value(message)));
+            return Err(section.error("the corner high must be above low in every direction"));
         }
         Ok(Shape::Block { low, high })
     }
@@ -141,8 +138,7 @@ impl Shapes<'_> {
         let thickness = value.positive()?;
         let length = self.domain.lengths()[axis];
         if thickness > length {
-            let message = format!("must not exceed the box, {length} long, is {thickness}");
-            return Err(value.error(FileErrorKind::Value(message)));
+            return Err(value.error(format!("must not exceed the box, {length} long, is {thickness}")));
         }
         Ok(thickness)
     }

@@ -11,30 +11,19 @@ use crate::models::STANDARD;
 const IMMISCIBLE: &str = include_str!("../../../../models/drop-collision.toml");
 
 pub const PAPER: Paper = (
+    "berendsen",
     "H. J. C. Berendsen, Simulating the Physical World, Cambridge (2007), chapter 11",
     &[
+        ("alpha", "standard DPD: p = rho kT + alpha a rho^2 with alpha = 0.101(1)", compressibility::alpha),
         (
-            "berendsen-alpha",
-            "standard DPD: p = rho kT + alpha a rho^2 with alpha = 0.101(1)",
-            compressibility::alpha,
-        ),
-        (
-            "berendsen-water",
+            "water",
             "standard DPD: a rho = 75 kT has the compressibility of water, 1/kappa = 16",
             compressibility::water,
         ),
-        (
-            "berendsen-lowe-andersen",
-            "Lowe and Andersen's thermostat: temperature and pressure",
-            lowe_andersen::compare,
-        ),
-        ("berendsen-tension", "like 14.5, unlike 41.5, density 10: tension 28", collision::tension),
-        ("berendsen-fig11.1", "two drops that meet at a Weber number of 4 become one", collision::merge),
-        (
-            "berendsen-size",
-            "3.75 million particles (quick: a hundredth): memory of a few steps",
-            collision::size,
-        ),
+        ("lowe-andersen", "Lowe and Andersen's thermostat: temperature and pressure", lowe_andersen::compare),
+        ("tension", "like 14.5, unlike 41.5, density 10: tension 28", collision::tension),
+        ("fig11.1", "two drops that meet at a Weber number of 4 become one", collision::merge),
+        ("size", "3.75 million particles (quick: a hundredth): memory of a few steps", collision::size),
     ],
 );
 

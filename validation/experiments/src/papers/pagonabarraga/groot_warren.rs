@@ -8,7 +8,6 @@ use crate::papers::case::{Reproduction, bare, difference, line, profile};
 use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
-/// The box has edge 6 in the paper.
 pub fn groot_warren(
     context: &Context,
     name: &str,

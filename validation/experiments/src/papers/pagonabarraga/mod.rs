@@ -15,68 +15,49 @@ const QUADRATIC: &str = include_str!("../../../../models/groot-warren-quadratic.
 const BINARY: &str = include_str!("../../../../models/binary-2d.toml");
 
 pub const PAPER: Paper = (
+    "pagonabarraga",
     "I. Pagonabarraga, D. Frenkel, J. Chem. Phys. 115, 5015 (2001)",
     &[
         (
-            "pagonabarraga-fig1",
+            "fig1",
             "van der Waals with alpha_3 = 0 and 5: critical point and compressibility (theory)",
             critical::fig1,
         ),
         (
-            "pagonabarraga-fig2",
+            "fig2",
             "van der Waals with alpha_3 = 0 and 5: where pressure and tension vanish (theory)",
             critical::fig2,
         ),
+        ("fig3", "Groot-Warren by psi, linear and quadratic kernel: pressure", groot_warren::fig3),
         (
-            "pagonabarraga-fig3",
-            "Groot-Warren by psi, linear and quadratic kernel: pressure",
-            groot_warren::fig3,
-        ),
-        (
-            "pagonabarraga-fig4",
+            "fig4",
             "g(r) at density 3: a linear kernel makes less structure than a quadratic one",
             groot_warren::fig4,
         ),
         (
-            "pagonabarraga-fig5",
+            "fig5",
             "g(r) at density 14: a linear kernel makes more structure than a quadratic one",
             groot_warren::fig5,
         ),
         (
-            "pagonabarraga-fig6",
+            "fig6",
             "van der Waals in two dimensions: pressure against the equation of state",
             van_der_waals::fig6,
         ),
+        ("fig7", "slab: temperature, mean-square displacement, tension by the mean pressures", slab::fig7),
+        ("fig8", "slab: densities of gas and liquid, and their profile", slab::fig8),
+        ("fig9", "slab: profile of the difference of the pressures, tension by two routes", slab::fig9),
         (
-            "pagonabarraga-fig7",
-            "slab: temperature, mean-square displacement, tension by the mean pressures",
-            slab::fig7,
-        ),
-        ("pagonabarraga-fig8", "slab: densities of gas and liquid, and their profile", slab::fig8),
-        (
-            "pagonabarraga-fig9",
-            "slab: profile of the difference of the pressures, tension by two routes",
-            slab::fig9,
-        ),
-        (
-            "pagonabarraga-fig10",
+            "fig10",
             "binary mixture at half of T_c: temperature and displacements of both species",
             binary::fig10,
         ),
+        ("fig11", "binary mixture at half of T_c: profiles of concentration and of density", binary::fig11),
         (
-            "pagonabarraga-fig11",
-            "binary mixture at half of T_c: profiles of concentration and of density",
-            binary::fig11,
-        ),
-        (
-            "pagonabarraga-fig12",
+            "fig12",
             "binary mixture: critical temperature, tension of mean field near it, and measured",
             tension::fig12,
         ),
-        (
-            "pagonabarraga-structure",
-            "Groot-Warren: the length l_0 and the minimum of S(k), eq. (31)",
-            structure::minimum,
-        ),
+        ("structure", "Groot-Warren: the length l_0 and the minimum of S(k), eq. (31)", structure::minimum),
     ],
 );

@@ -8,9 +8,7 @@ use crate::papers::context::{Context, mean_field};
 use psidpd_observe::Measured;
 
 const SCENE: &str = include_str!("../../../../scenes/full/van-der-waals-2d-slab.toml");
-/// The run of all three figures.
 const RUN: &str = "slab";
-/// kT of the figures.
 const KT: f64 = 0.75;
 
 fn slab(context: &Context) -> Result<(Context, Observed), ExperimentError> {

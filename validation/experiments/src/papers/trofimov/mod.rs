@@ -18,35 +18,20 @@ const LENNARD_JONES: &str = include_str!("../../../../models/lennard-jones-corre
 const DEMIXING: &str = include_str!("../../../../models/huggins-demixing.toml");
 
 pub const PAPER: Paper = (
+    "trofimov",
     "S. Y. Trofimov, E. L. F. Nies, M. A. J. Michels, J. Chem. Phys. 117, 9383 (2002)",
     &[
-        ("trofimov-fig1", "no fluid of p = rho kT + A rho^2 is stiffer than 2 p (theory)", stiffness::fig1),
-        ("trofimov-fig2", "k = 3 uncorrected: more than 20 % too low", pressure::fig2),
-        ("trofimov-fig3", "k = 4 uncorrected: more than 40 % too low", pressure::fig3),
-        ("trofimov-fig4", "-[r w' g]/3 of k = 3 and 4 is close to 1/1.05 above density 2", density::fig4),
-        ("trofimov-fig5", "<n> against rho for k = 3: the line 1.047 n + 1.54", density::fig5),
-        ("trofimov-fig6", "k = 3 with 1.047 n + 1.54: within 1 %", pressure::fig6),
-        (
-            "trofimov-fig7",
-            "Lennard-Jones isotherm: the line 1.062 n + 1.39, and the pressure with it",
-            pressure::fig7,
-        ),
-        ("trofimov-fig8", "<n> of k = 2 against rho and A: it depends little on A above 5", density::fig8),
-        (
-            "trofimov-fig9",
-            "compressible Huggins mixture, e_AA = 1.9: two layers, total density",
-            huggins::fig9,
-        ),
-        (
-            "trofimov-fig10",
-            "compressible Huggins mixture: compositions of two phases on the binodal",
-            huggins::fig10,
-        ),
-        (
-            "trofimov-table3",
-            "compressible Huggins mixture, e_AA = 1.6: p = 954.5, <rho~> = rho",
-            huggins::table3,
-        ),
+        ("fig1", "no fluid of p = rho kT + A rho^2 is stiffer than 2 p (theory)", stiffness::fig1),
+        ("fig2", "k = 3 uncorrected: more than 20 % too low", pressure::fig2),
+        ("fig3", "k = 4 uncorrected: more than 40 % too low", pressure::fig3),
+        ("fig4", "-[r w' g]/3 of k = 3 and 4 is close to 1/1.05 above density 2", density::fig4),
+        ("fig5", "<n> against rho for k = 3: the line 1.047 n + 1.54", density::fig5),
+        ("fig6", "k = 3 with 1.047 n + 1.54: within 1 %", pressure::fig6),
+        ("fig7", "Lennard-Jones isotherm: the line 1.062 n + 1.39, and the pressure with it", pressure::fig7),
+        ("fig8", "<n> of k = 2 against rho and A: it depends little on A above 5", density::fig8),
+        ("fig9", "compressible Huggins mixture, e_AA = 1.9: two layers, total density", huggins::fig9),
+        ("fig10", "compressible Huggins mixture: compositions of two phases on the binodal", huggins::fig10),
+        ("table3", "compressible Huggins mixture, e_AA = 1.6: p = 954.5, <rho~> = rho", huggins::table3),
     ],
 );
 

@@ -11,23 +11,24 @@ const WEAK: &str = include_str!("../../../../models/spline-demixing-b08.toml");
 const STRONG: &str = include_str!("../../../../models/spline-demixing-b10.toml");
 
 pub const PAPER: Paper = (
+    "wang",
     "X. Wang, S. Chen, Acta Phys. Sin. (2010)",
     &[
         (
-            "wang-fig2",
+            "fig2",
             "equation of state of 8.0 W(0.8) - 4.08 W(1.0) against the van der Waals fit of the paper",
             pressure::fig2,
         ),
-        ("wang-fig3", "attraction B = 0.8: no two phases", demixing::fig3),
-        ("wang-fig4", "attraction B = 1.0: two phases", demixing::fig4),
-        ("wang-limit", "17.0 W(0.8) collapses, 19.0 W(0.8) does not (theory)", demixing::limit),
+        ("fig3", "attraction B = 0.8: no two phases", demixing::fig3),
+        ("fig4", "attraction B = 1.0: two phases", demixing::fig4),
+        ("limit", "17.0 W(0.8) collapses, 19.0 W(0.8) does not (theory)", demixing::limit),
         (
-            "wang-fig6",
+            "fig6",
             "drop of 5960 particles: densities inside and outside, tension by Laplace's law",
             drop::fig6,
         ),
-        ("wang-fig8", "drop of 5960 particles: P_n - P_t, tension by its integral", drop::fig8),
-        ("wang-fig10", "drop of 5960 particles: pressure inside, in the surface, outside", drop::fig10),
-        ("wang-fig11", "drops of 2828 to 16312 particles: tension by Laplace's law", drop::fig11),
+        ("fig8", "drop of 5960 particles: P_n - P_t, tension by its integral", drop::fig8),
+        ("fig10", "drop of 5960 particles: pressure inside, in the surface, outside", drop::fig10),
+        ("fig11", "drops of 2828 to 16312 particles: tension by Laplace's law", drop::fig11),
     ],
 );

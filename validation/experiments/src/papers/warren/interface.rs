@@ -7,7 +7,6 @@ use crate::papers::case::{Reproduction, bare, difference, profile};
 use crate::papers::context::{Context, Fluid};
 use psidpd_observe::Measured;
 
-/// Bins of the density profile.
 const BIN: f64 = 0.05;
 /// How far from the liquid the densities are of which the pressures give its compressibility; the third derivative of the
 /// pressure makes 0.1 of this.

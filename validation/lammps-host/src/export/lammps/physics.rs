@@ -24,12 +24,10 @@ impl<'a> Physics<'a> {
         Physics { scene, dimensions, walls, mobile }
     }
 
-    /// The arguments of `boundary`.
     pub fn boundary(&self) -> String {
         self.walls.map(|wall| if wall { "f" } else { "p" }).join(" ")
     }
 
-    /// The group of mobile particles.
     pub fn mobile(&self) -> &'static str {
         self.mobile
     }
@@ -75,7 +73,6 @@ impl<'a> Physics<'a> {
         writeln!(s, "thermo_modify temp warmth")
     }
 
-    /// Writes the fixes of the body forces.
     pub fn write_body_forces(&self, s: &mut impl Write) -> Result {
         for (k, force) in self.scene.body_forces.iter().enumerate() {
             let name = format!("body{}", k + 1);
@@ -135,7 +132,6 @@ impl<'a> Physics<'a> {
     }
 }
 
-/// The ranges as arguments of `group id`.
 fn ids(tags: &Tags) -> String {
     match tags {
         Tags::All => "> 0".to_owned(),
