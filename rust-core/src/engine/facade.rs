@@ -379,6 +379,4 @@ impl Engine {
 }
 
 #[cfg(test)]
-mod special_tests;
-#[cfg(test)]
 mod tests;
