@@ -38,9 +38,9 @@ pub enum PresetError {
     NoPotential {
         /// The coefficient, `B` or `rd`.
         name: &'static str,
-        /// Its value for one pair.
+        /// The coefficient of one pair.
         first: f64,
-        /// Its different value for another pair.
+        /// The coefficient of another pair.
         second: f64,
     },
     /// The model file's reader refuses a coefficient.
