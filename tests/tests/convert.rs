@@ -81,7 +81,7 @@ fn is_the_same_fluid(style: &str) {
     assert!(out.status.success() && said(&out).contains("another fluid"), "{}", said(&out));
     assert!(String::from_utf8_lossy(&out.stdout).contains("mdpd/psi 1.0 1.0 9872598\n"), "{}", said(&out));
 
-    // What cannot be rewritten is named with its line, and the exit code says so.
+    // A command that cannot be rewritten is named with its line, and the exit code is 1.
     let hidden = format!("{}if \"1 > 0\" then \"fix 2 all mvv/dpd\"\n", OLD.replace("STYLE", style));
     std::fs::write(at("in.hidden"), &hidden).unwrap();
     let out = psidpd(folder.path(), &["lammps", "convert", "in.hidden", "--law", "lucy"]);

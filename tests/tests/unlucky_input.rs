@@ -286,7 +286,7 @@ fn a_full_standard_output_is_an_error_of_every_verb() {
             "{line}: {text}"
         );
     }
-    // These verbs take minutes, or need LAMMPS or a feature.
+    // The other verbs take minutes, or need LAMMPS or a feature.
     let long = ["validate", "bench", "pareto", "hardcases", "model", "devices"];
     for verb in verbs() {
         let tried = lines.iter().any(|line| line.split(' ').next() == Some(&verb)) || verb == "lammps";

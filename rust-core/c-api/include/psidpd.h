@@ -175,7 +175,7 @@ typedef struct psidpd_engine psidpd_engine;
 typedef struct psidpd_model psidpd_model;
 
 /**
- * What a model file says of the model.
+ * The title of a model, and the number of its dimensions and species.
  */
 typedef struct psidpd_model_facts {
   /**
@@ -213,7 +213,7 @@ typedef struct psidpd_settings {
 } psidpd_settings;
 
 /**
- * What a host needs to know of an engine.
+ * The facts of an engine that a host needs.
  */
 typedef struct psidpd_engine_facts {
   /**
@@ -469,7 +469,7 @@ psidpd_status psidpd_model_parse(const char *name, const char *text, struct psid
 void psidpd_model_free(struct psidpd_model *model);
 
 /**
- * Puts in `*facts` what the model file says of the model.
+ * Puts in `*facts` the title of the model, and the number of its dimensions and species.
  *
  * # Errors
  * PSIDPD_STATUS_NULL_POINTER.
@@ -514,7 +514,7 @@ psidpd_status psidpd_engine_new(const struct psidpd_model *model,
                                 struct psidpd_engine **engine);
 
 /**
- * Puts in `*facts` what a host needs to know of the engine.
+ * Puts in `*facts` the facts of the engine that a host needs.
  *
  * # Errors
  * PSIDPD_STATUS_NULL_POINTER.

@@ -182,7 +182,7 @@ pub(super) fn not_before(call: &str) -> Failure {
     Failure::new(Status::CallOrder, format!("{call} has not been called, or has failed"))
 }
 
-/// What a host needs to know of an engine.
+/// The facts of an engine that a host needs.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct EngineFacts {
@@ -201,7 +201,7 @@ pub struct EngineFacts {
     pub plan: *const c_char,
 }
 
-/// Puts in `*facts` what a host needs to know of the engine.
+/// Puts in `*facts` the facts of the engine that a host needs.
 ///
 /// # Errors
 /// PSIDPD_STATUS_NULL_POINTER.

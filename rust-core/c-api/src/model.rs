@@ -93,7 +93,7 @@ pub unsafe extern "C" fn psidpd_model_free(model: *mut Model) {
     });
 }
 
-/// What a model file says of the model.
+/// The title of a model, and the number of its dimensions and species.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct ModelFacts {
@@ -105,7 +105,7 @@ pub struct ModelFacts {
     pub species: usize,
 }
 
-/// Puts in `*facts` what the model file says of the model.
+/// Puts in `*facts` the title of the model, and the number of its dimensions and species.
 ///
 /// # Errors
 /// PSIDPD_STATUS_NULL_POINTER.

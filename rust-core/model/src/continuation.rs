@@ -67,7 +67,7 @@ impl Bounds {
 pub struct Stray {
     /// Index of the variable.
     pub variable: usize,
-    /// Its excess `δ` over the nearest bound.
+    /// The excess `δ` of the variable over the nearest bound.
     pub beyond: f64,
     /// The highest power of `δ` in the continuation.
     pub order: usize,

@@ -28,6 +28,5 @@ pub use continuation::{Bounds, Continuation, Stray, continuation};
 pub use file::{KNOWN_FUNCTIONS, Model, Published, Units};
 pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity};
 pub use presets::{
-    ForceLaw, PresetError, SplinePair, WarrenPair, lucy_mdpd, lucy_mdpd_text, spline_dpd, spline_dpd_text,
-    warren_ab, warren_ab_text,
+    ForceLaw, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab, warren_ab_text,
 };

@@ -1,4 +1,4 @@
-//! What the engine asks of each of its two paths.
+//! The calls of the engine to either of its two paths.
 
 use super::error::EngineError;
 use super::request::{Request, Results};

@@ -55,22 +55,13 @@ pub struct ExcessWork {
     registers: Vec<f64>,
     point: Vec<f64>,
     expansion: Expansion,
-    outside: Vec<Stray>,
-    /// Pairs of a lane and a variable out of bounds, lane by lane.
-    strays: Vec<LaneStray>,
-    /// The variables, moved to their bounds if out of them; used only if there are strays.
+    /// The variables of one lane that are out of their bounds.
+    strays: Vec<Stray>,
+    /// The variables, moved to their bounds where they are out of them; empty if none is.
     moved: Vec<f64>,
     totals: Vec<f64>,
     beyond: Vec<f64>,
     curve: CurveBlock,
-}
-
-/// One bounded variable of one lane, out of its bounds by `beyond`.
-#[derive(Debug, Clone, Copy)]
-struct LaneStray {
-    lane: usize,
-    bounded: usize,
-    beyond: f64,
 }
 
 impl ExcessPlan {
@@ -152,7 +143,7 @@ impl ExcessPlan {
         slopes: &mut [f64],
         work: &mut ExcessWork,
     ) -> [u64; 2] {
-        work.strays.clear();
+        work.moved.clear();
         match self {
             ExcessPlan::Constant(value) => {
                 psi.fill(*value);
@@ -173,7 +164,6 @@ impl ExcessWork {
             registers: Vec::new(),
             point: Vec::new(),
             expansion: Expansion::default(),
-            outside: Vec::new(),
             strays: Vec::new(),
             moved: Vec::new(),
             totals: Vec::new(),
@@ -184,7 +174,7 @@ impl ExcessWork {
 
     /// The densities at which a formula was last evaluated when it was asked for `at`.
     pub fn evaluated_at<'a>(&'a self, at: &'a [f64]) -> &'a [f64] {
-        if self.strays.is_empty() { at } else { &self.moved }
+        if self.moved.is_empty() { at } else { &self.moved }
     }
 }
 
@@ -255,76 +245,70 @@ impl FormulaPlan {
             !values.iter().fold(false, |out, x| out | (*x < b.bounds.low) | (*x > b.bounds.high))
         };
         let moves = !self.bounded.iter().all(within);
-        let mut count = [0; 2];
         if moves {
-            work.moved.clear();
             work.moved.extend_from_slice(at);
-            count = self.clamp(lanes, &mut work.moved, &mut work.strays);
-        }
-        let at = if moves { &work.moved } else { at };
-        let outputs = std::iter::once(&mut *psi).chain(slopes.chunks_exact_mut(lanes));
-        let program = &self.program;
-        let registers = &mut work.registers;
-        vectors::run(work.set, EvaluateBlock { program, lanes, at, outputs, registers });
-        if moves {
-            self.extend(lanes, psi, slopes, work);
-        }
-        count
-    }
-
-    /// Moves variables to their bounds and lists them, lane by lane.
-    fn clamp(&self, lanes: usize, at: &mut [f64], strays: &mut Vec<LaneStray>) -> [u64; 2] {
-        for (bounded, variable) in self.bounded.iter().enumerate() {
-            let values = &mut at[variable.variable * lanes..][..lanes];
-            for (lane, value) in values.iter_mut().enumerate() {
-                let beyond = variable.bounds.beyond(*value);
-                if beyond != 0.0 {
-                    *value = variable.bounds.clamp(*value);
-                    strays.push(LaneStray { lane, bounded, beyond });
-                }
+            for BoundedVariable { variable, bounds } in &self.bounded {
+                let values = &mut work.moved[variable * lanes..][..lanes];
+                values.iter_mut().for_each(|x| *x = bounds.clamp(*x));
             }
         }
-        strays.sort_unstable_by_key(|s| (s.lane, s.bounded));
-        let mut count = [0; 2];
-        for lane in strays.chunk_by(|a, b| a.lane == b.lane) {
-            count[0] += lane.iter().any(|s| s.beyond < 0.0) as u64;
-            count[1] += lane.iter().any(|s| s.beyond > 0.0) as u64;
-        }
-        count
+        let inside = if moves { &work.moved } else { at };
+        let outputs = std::iter::once(&mut *psi).chain(slopes.chunks_exact_mut(lanes));
+        let registers = &mut work.registers;
+        vectors::run(
+            work.set,
+            EvaluateBlock { program: &self.program, lanes, at: inside, outputs, registers },
+        );
+        if moves { self.extend(lanes, at, psi, slopes, work) } else { [0; 2] }
     }
 
-    /// Replaces ψ and slopes in the moved lanes by the continuation from the bounds.
+    /// Replaces ψ and slopes in the moved lanes by the continuation from the bounds. Returns the numbers of lanes with a
+    /// variable below its bounds, and above.
     ///
     /// With the operator `E_k ψ = ψ + δ_k ψ_k + ½ δ_k² ψ_kk` at the bound for each variable out of
     /// bounds, ψ becomes `E_1 E_2 … ψ`; these commute with each other and with the slopes along the
     /// other variables.
-    fn extend(&self, lanes: usize, psi: &mut [f64], slopes: &mut [f64], work: &mut ExcessWork) {
-        let ExcessWork { point, expansion, outside, strays, moved, .. } = work;
-        for stray in strays.chunk_by(|a, b| a.lane == b.lane) {
-            let lane = stray[0].lane;
+    fn extend(
+        &self,
+        lanes: usize,
+        at: &[f64],
+        psi: &mut [f64],
+        slopes: &mut [f64],
+        work: &mut ExcessWork,
+    ) -> [u64; 2] {
+        let ExcessWork { point, expansion, strays, moved, .. } = work;
+        let mut count = [0; 2];
+        for lane in 0..lanes {
+            let stray = |b: &BoundedVariable| {
+                let beyond = b.bounds.beyond(at[b.variable * lanes + lane]);
+                (beyond != 0.0).then(|| Stray { variable: b.variable, beyond, order: b.bounds.order(beyond) })
+            };
+            strays.clear();
+            strays.extend(self.bounded.iter().filter_map(stray));
+            if strays.is_empty() {
+                continue;
+            }
+            count[0] += strays.iter().any(|s| s.beyond < 0.0) as u64;
+            count[1] += strays.iter().any(|s| s.beyond > 0.0) as u64;
             point.clear();
             point.extend(moved.chunks_exact(lanes).map(|values| values[lane]));
-            outside.clear();
-            outside.extend(stray.iter().map(|s| {
-                let BoundedVariable { variable, bounds } = self.bounded[s.bounded];
-                Stray { variable, beyond: s.beyond, order: bounds.order(s.beyond) }
-            }));
             let mut along = [0; Expansion::MOST];
-            along.iter_mut().zip(outside.iter()).for_each(|(along, o)| *along = o.variable);
-            let along = &along[..outside.len()];
+            along.iter_mut().zip(strays.iter()).for_each(|(along, s)| *along = s.variable);
+            let along = &along[..strays.len()];
             let coefficients = expansion.coefficients(&self.outputs[0], point, along);
-            psi[lane] = continuation(coefficients, outside, &[]);
+            psi[lane] = continuation(coefficients, strays, &[]);
             if slopes.is_empty() {
                 continue;
             }
             for (slope, v) in self.variables.iter().enumerate().filter(|(_, v)| along.contains(v)) {
-                slopes[slope * lanes + lane] = continuation(coefficients, outside, &[*v]);
+                slopes[slope * lanes + lane] = continuation(coefficients, strays, &[*v]);
             }
             for (slope, v) in self.variables.iter().enumerate().filter(|(_, v)| !along.contains(v)) {
                 let coefficients = expansion.coefficients(&self.outputs[1 + slope], point, along);
-                slopes[slope * lanes + lane] = continuation(coefficients, outside, &[*v]);
+                slopes[slope * lanes + lane] = continuation(coefficients, strays, &[*v]);
             }
         }
+        count
     }
 }
 

@@ -46,7 +46,7 @@ pub struct Pending {
     number: u64,
 }
 
-/// What an engine has done since it was made.
+/// Times and counts of an engine's work since it was made.
 #[derive(Debug, Clone, Copy)]
 pub struct Statistics {
     /// Times of the parts of sweeps.
@@ -147,7 +147,7 @@ impl Engine {
         self.sweep.sweep.pool()
     }
 
-    /// What the engine has done since it was made.
+    /// Times and counts of the engine's work since it was made.
     pub fn statistics(&self) -> Statistics {
         let (sweep, sums) = (&self.sweep.sweep, &self.pair_sums);
         let (a, b) = (sums.out_of_bounds(), sweep.out_of_bounds());
@@ -378,7 +378,5 @@ impl Engine {
     }
 }
 
-#[cfg(test)]
-mod special_tests;
 #[cfg(test)]
 mod tests;

@@ -38,7 +38,7 @@ pub struct Plan {
 pub struct LinearTerm {
     /// Index of the density.
     pub density: usize,
-    /// Its weight function.
+    /// Weight function of the density.
     pub kernel: Kernel,
     /// The kernel whose slope is the force law.
     pub force_kernel: Kernel,

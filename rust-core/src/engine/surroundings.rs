@@ -2,7 +2,7 @@
 
 use psidpd_passes::domain::PeriodicBox;
 
-/// What a host knows about the pairs of its particles.
+/// A host's knowledge of the pairs of its particles.
 #[derive(Debug, Clone, Copy)]
 pub enum Surroundings<'a> {
     /// There are no ghosts: the engine applies the periods of the box.

@@ -355,8 +355,5 @@ pub fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     first
 }
 
-#[cfg(all(test, not(loom)))]
-mod miri_sized;
-
-#[cfg(all(test, loom))]
-mod loom_model;
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
 use super::{Spline, SplineError};
-use crate::document::{Columns, FileError, FileErrorKind, Value};
+use crate::document::{Columns, FileError, Value};
 use std::path::Path;
 
 /// The spline through the rows of the file that `value` names.
@@ -11,6 +11,6 @@ pub fn read_spline(value: &Value, directory: &Path, names: [&str; 2]) -> Result<
             SplineError::NotMonotone(row) => row,
             _ => usize::MAX,
         };
-        table.error(row, FileErrorKind::Value(error.to_string()))
+        table.error(row, &error.to_string())
     })
 }

@@ -1,6 +1,6 @@
 //! Tables of numbers in files beside a model or scene file.
 
-use super::{FileError, FileErrorKind, Source, Value};
+use super::{FileError, Source, Value};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -32,13 +32,12 @@ impl Columns {
     /// Fails without the file or without a row, and for a row that is too short or not finite numbers.
     pub fn read(value: &Value, directory: &Path, names: [&str; 2]) -> Result<Columns, FileError> {
         let path = directory.join(value.string()?.value);
-        let text = read_text(&path, LARGEST).map_err(|message| {
-            value.error(FileErrorKind::Value(format!("cannot read {}: {message}", path.display())))
-        })?;
+        let text = read_text(&path, LARGEST)
+            .map_err(|message| value.error(format!("cannot read {}: {message}", path.display())))?;
         if !(lies_in(&path, directory) || std::env::var_os(ANYWHERE).is_some_and(|v| v == "1")) {
             let message = format!("{} lies outside the folder of the file that names it", path.display());
             return Err(value
-                .error(FileErrorKind::Value(message))
+                .error(message)
                 .with_help(format!("put it there, or set {ANYWHERE}=1 to read tables from anywhere")));
         }
         Columns::parse(&path.display().to_string(), &text, names)
@@ -65,9 +64,7 @@ impl Columns {
                 .filter(|f| !f.is_empty())
                 .map(|f| f.trim_matches('"'))
                 .collect();
-            let error = |message: String| {
-                FileError::new(&table.source, span.clone(), "", FileErrorKind::Value(message))
-            };
+            let error = |message: String| FileError::new(&table.source, span.clone(), "", message);
             let is_header = places.is_none() && fields.iter().any(|f| f.parse::<f64>().is_err());
             if is_header {
                 let place = |name: &str| {
@@ -93,8 +90,8 @@ impl Columns {
     }
 
     /// An error in row `row`, or in the file as a whole if there is no such row.
-    pub fn error(&self, row: usize, kind: FileErrorKind) -> FileError {
-        FileError::new(&self.source, self.rows.get(row).cloned().unwrap_or(0..0), "", kind)
+    pub fn error(&self, row: usize, message: &str) -> FileError {
+        FileError::new(&self.source, self.rows.get(row).cloned().unwrap_or(0..0), "", message)
     }
 }
 

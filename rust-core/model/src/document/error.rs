@@ -91,6 +91,7 @@ pub enum FileErrorKind {
     Value(String),
 }
 
+/// A message in words about a value that is out of its domain.
 impl From<String> for FileErrorKind {
     fn from(message: String) -> FileErrorKind {
         FileErrorKind::Value(message)
@@ -103,12 +104,28 @@ impl From<&str> for FileErrorKind {
     }
 }
 
+/// A place in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// The file.
+    pub source: Arc<Source>,
+    /// The bytes of the file.
+    pub span: Range<usize>,
+    /// The dotted key of the value there; empty if there is none.
+    pub key: String,
+}
+
+impl Place {
+    /// An error at this place.
+    pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
+        FileError::new(&self.source, self.span.clone(), &self.key, kind)
+    }
+}
+
 /// An error in a file: its kind, its place, and advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileError {
-    source: Arc<Source>,
-    span: Range<usize>,
-    key: String,
+    place: Place,
     kind: Box<FileErrorKind>,
     help: Option<String>,
 }
@@ -123,7 +140,8 @@ impl FileError {
     ) -> FileError {
         let kind = kind.into();
         let help = suggestion(key, &kind);
-        FileError { source: Arc::clone(source), span, key: key.to_owned(), kind: Box::new(kind), help }
+        let place = Place { source: Arc::clone(source), span, key: key.to_owned() };
+        FileError { place, kind: Box::new(kind), help }
     }
 
     /// The same error with advice.
@@ -135,17 +153,17 @@ impl FileError {
 
     /// The file that contains the error.
     pub fn file(&self) -> &Source {
-        &self.source
+        &self.place.source
     }
 
     /// The bytes of the file that the error is about.
     pub fn span(&self) -> Range<usize> {
-        self.span.clone()
+        self.place.span.clone()
     }
 
     /// The dotted key of the value that is wrong.
     pub fn key(&self) -> &str {
-        &self.key
+        &self.place.key
     }
 
     /// The kind of the error.
@@ -160,7 +178,7 @@ impl FileError {
 
     /// The line of the error, from 1.
     pub fn line(&self) -> usize {
-        self.source.line_column(self.span.start).0
+        self.place.source.line_column(self.place.span.start).0
     }
 }
 
@@ -189,12 +207,13 @@ fn shortened(text: &str, longest: usize) -> Cow<'_, str> {
 /// Formats the error in one line: `file:line: key: what (what to do)`.
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut text = self.source.name.clone();
+        let Place { source, key, .. } = &self.place;
+        let mut text = source.name.clone();
         if !matches!(*self.kind, FileErrorKind::Unreadable(_)) {
             write!(text, ":{}", self.line())?;
         }
-        if !self.key.is_empty() {
-            write!(text, ": {}", shortened(&self.key, LONGEST_KEY))?;
+        if !key.is_empty() {
+            write!(text, ": {}", shortened(key, LONGEST_KEY))?;
         }
         write!(text, ": {}", self.kind)?;
         if let Some(help) = &self.help {

@@ -1,7 +1,7 @@
 //! The keys that a file may have, as tables. A file with other keys is refused; editor schemas and
 //! pages of documentation are generated from the tables too.
 
-use super::{FileError, FileErrorKind, Section, Value};
+use super::{FileError, Section, Value};
 
 /// A table of a file, or of another table.
 #[derive(Debug, Clone, Copy)]
@@ -217,7 +217,7 @@ impl Table {
 /// An error at `key`, for a file of another kind than the one expected.
 pub fn of_another_kind(root: &Section, key: &str, what: &str) -> FileError {
     let span = root.get(key).map_or(0..0, |value| value.span());
-    FileError::new(root.source(), span, key, FileErrorKind::Value(what.to_owned()))
+    FileError::new(root.source(), span, key, what)
 }
 
 /// Calls `read`, and refuses the keys of a file that its tables do not have. A misspelt key is reported first, before a key
@@ -278,46 +278,46 @@ fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
     root.get(first).map_or_else(Vec::new, inner)
 }
 
-/// Declares keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are
-/// left out where all have the key.
+/// Declares keys in short: `"name": VALUE, NEED, "meaning" => "example";`.
 #[macro_export]
 macro_rules! keys {
-    ($($name:literal $([$forms:expr])?: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
-        &[$($crate::document::keys::Key {
-            $(forms: $forms,)?
-            ..$crate::document::keys::key($name, $value, $need, $about, $example)
-        }),*]
+    ($($name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
+        &[$($crate::document::keys::key($name, $value, $need, $about, $example)),*]
     };
 }
 
 pub use keys;
 
-/// The `first` keys and those of every group, `N` in all.
-pub const fn joined<const N: usize>(first: &[Key], groups: &[&[Key]]) -> [Key; N] {
+/// Keys that a form of a table has: the name of the form, alone in a list, and the keys.
+pub type FormKeys = (&'static [&'static str], &'static [Key]);
+
+/// The `first` keys, which all forms have, and those of each form, `N` in all.
+pub const fn joined<const N: usize>(first: &[Key], forms: &[FormKeys]) -> [Key; N] {
     let mut keys = [first[0]; N];
     let mut n = 0;
     while n < first.len() {
         keys[n] = first[n];
         n += 1;
     }
-    let mut group = 0;
-    while group < groups.len() {
+    let mut form = 0;
+    while form < forms.len() {
+        let (name, of_form) = forms[form];
         let mut k = 0;
-        while k < groups[group].len() {
-            keys[n] = groups[group][k];
+        while k < of_form.len() {
+            keys[n] = Key { forms: name, ..of_form[k] };
             (n, k) = (n + 1, k + 1);
         }
-        group += 1;
+        form += 1;
     }
     keys
 }
 
-/// The number of keys of all groups.
-pub const fn count(groups: &[&[Key]]) -> usize {
-    let (mut n, mut group) = (0, 0);
-    while group < groups.len() {
-        n += groups[group].len();
-        group += 1;
+/// The number of keys of all forms.
+pub const fn count(forms: &[FormKeys]) -> usize {
+    let (mut n, mut form) = (0, 0);
+    while form < forms.len() {
+        n += forms[form].1.len();
+        form += 1;
     }
     n
 }

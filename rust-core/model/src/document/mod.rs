@@ -10,7 +10,7 @@ mod printable;
 mod section;
 
 pub use columns::{Columns, open_regular};
-pub use error::{FileError, FileErrorKind, Source};
+pub use error::{FileError, FileErrorKind, Place, Source};
 pub use printable::printable;
 pub use section::{Located, Section, Value};
 
@@ -82,7 +82,8 @@ impl Document {
 
     /// The table of top-level keys.
     pub fn root(&self) -> Section<'_> {
-        Section::new(&self.source, String::new(), 0..0, &self.root)
+        let place = Place { source: Arc::clone(&self.source), span: 0..0, key: String::new() };
+        Section::new(place, &self.root)
     }
 }
 

@@ -1,6 +1,6 @@
 use super::node::{Content, Node, Table};
 use super::printable::is_control;
-use super::{FileError, FileErrorKind, Source};
+use super::{FileError, FileErrorKind, Place, Source};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -9,81 +9,74 @@ use std::sync::Arc;
 pub struct Located<T> {
     /// The value, interpreted.
     pub value: T,
-    /// The value's bytes in the file.
-    pub span: Range<usize>,
-    /// The value's dotted key.
-    pub key: String,
+    /// The value's place.
+    pub place: Place,
 }
 
 impl<T> Located<T> {
     /// An error about this value.
-    pub fn error(&self, source: &Arc<Source>, kind: impl Into<FileErrorKind>) -> FileError {
-        FileError::new(source, self.span.clone(), &self.key, kind)
+    pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
+        self.place.error(kind)
     }
 
     /// Converts the value and keeps its place.
     pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Located<U> {
-        Located { value: f(self.value), span: self.span, key: self.key }
+        Located { value: f(self.value), place: self.place }
     }
 }
 
 /// A table of a document.
 #[derive(Debug, Clone)]
 pub struct Section<'a> {
-    source: &'a Arc<Source>,
-    path: String,
-    span: Range<usize>,
+    place: Place,
     table: &'a Table,
 }
 
 /// A value of a document, not yet interpreted.
 #[derive(Debug, Clone)]
 pub struct Value<'a> {
-    source: &'a Arc<Source>,
-    key: String,
+    place: Place,
     value: &'a Node,
 }
 
 impl<'a> Section<'a> {
-    pub(super) fn new(
-        source: &'a Arc<Source>,
-        path: String,
-        span: Range<usize>,
-        table: &'a Table,
-    ) -> Section<'a> {
-        Section { source, path, span, table }
+    pub(super) fn new(place: Place, table: &'a Table) -> Section<'a> {
+        Section { place, table }
     }
 
     /// The file that contains this section.
-    pub fn source(&self) -> &'a Arc<Source> {
-        self.source
+    pub fn source(&self) -> &Arc<Source> {
+        &self.place.source
     }
 
     /// The dotted path of a key of this section.
     pub fn path_of(&self, key: &str) -> String {
-        match (self.path.is_empty(), key.is_empty()) {
+        match (self.place.key.is_empty(), key.is_empty()) {
             (true, _) => key.to_owned(),
-            (_, true) => self.path.clone(),
-            _ => format!("{}.{key}", self.path),
+            (_, true) => self.place.key.clone(),
+            _ => format!("{}.{key}", self.place.key),
         }
+    }
+
+    /// The place of a key of this section, or of its value.
+    fn place_of(&self, key: &str, span: &Range<usize>) -> Place {
+        Place { source: Arc::clone(self.source()), span: span.clone(), key: self.path_of(key) }
     }
 
     /// An error about this section as a whole.
     pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
-        FileError::new(self.source, self.span.clone(), &self.path, kind)
+        self.place.error(kind)
     }
 
     /// The value of an optional key.
     pub fn get(&self, key: &str) -> Option<Value<'a>> {
         let value = self.table.get(key)?;
-        Some(Value { source: self.source, key: self.path_of(key), value })
+        Some(Value { place: self.place_of(key, &value.span), value })
     }
 
     /// The value of a required key; fails without it.
     pub fn require(&self, key: &str) -> Result<Value<'a>, FileError> {
-        self.get(key).ok_or_else(|| {
-            FileError::new(self.source, self.span.clone(), &self.path_of(key), FileErrorKind::Missing)
-        })
+        self.get(key).ok_or_else(|| self.place_of(key, &self.place.span).error(FileErrorKind::Missing))
     }
 
     /// Every key with its value, in the order of the file: for tables whose keys are names.
@@ -92,10 +85,10 @@ impl<'a> Section<'a> {
             .entries
             .iter()
             .map(|entry| {
-                let name = entry.key.clone();
-                let key = self.path_of(&name);
-                let located = Located { value: name, span: entry.key_span.clone(), key: key.clone() };
-                (located, Value { source: self.source, key, value: &entry.value })
+                let place = self.place_of(&entry.key, &entry.key_span);
+                let value =
+                    Value { place: self.place_of(&entry.key, &entry.value.span), value: &entry.value };
+                (Located { value: entry.key.clone(), place }, value)
             })
             .collect()
     }
@@ -108,30 +101,30 @@ impl<'a> Section<'a> {
         };
         known.sort_unstable();
         known.dedup();
-        let kind = FileErrorKind::UnknownKey { known: known.join(", ") };
-        Err(FileError::new(self.source, stranger.key_span.clone(), &self.path_of(&stranger.key), kind))
+        let place = self.place_of(&stranger.key, &stranger.key_span);
+        Err(place.error(FileErrorKind::UnknownKey { known: known.join(", ") }))
     }
 }
 
 impl<'a> Value<'a> {
     /// The value's dotted key.
     pub fn key(&self) -> &str {
-        &self.key
+        &self.place.key
     }
 
-    /// The file that contains the value.
-    pub fn source(&self) -> &'a Arc<Source> {
-        self.source
+    /// The value's place in the file.
+    pub fn place(&self) -> &Place {
+        &self.place
     }
 
     /// The value's bytes in the file.
     pub fn span(&self) -> Range<usize> {
-        self.value.span.clone()
+        self.place.span.clone()
     }
 
     /// An error about this value.
     pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
-        FileError::new(self.source, self.span(), &self.key, kind)
+        self.place.error(kind)
     }
 
     fn wrong(&self, expected: &'static str) -> FileError {
@@ -139,7 +132,7 @@ impl<'a> Value<'a> {
     }
 
     fn located<T>(&self, value: T) -> Located<T> {
-        Located { value, span: self.span(), key: self.key.clone() }
+        Located { value, place: self.place.clone() }
     }
 
     /// Reads a number; integers are numbers too.
@@ -155,7 +148,7 @@ impl<'a> Value<'a> {
     pub fn positive(&self) -> Result<f64, FileError> {
         match self.number()?.value {
             x if x > 0.0 => Ok(x),
-            x => Err(self.error(FileErrorKind::Value(format!("must be positive, is {x}")))),
+            x => Err(self.error(format!("must be positive, is {x}"))),
         }
     }
 
@@ -168,7 +161,7 @@ impl<'a> Value<'a> {
         };
         Some(match number {
             Some(x) if f64::is_finite(x) => Ok(x),
-            _ => Err(self.error(FileErrorKind::Value("is not a finite number".into()))),
+            _ => Err(self.error("is not a finite number")),
         })
     }
 
@@ -177,9 +170,9 @@ impl<'a> Value<'a> {
         match &self.value.content {
             Content::Integer(digits, radix) => match u64::from_str_radix(digits, *radix) {
                 Ok(value) => Ok(self.located(value)),
-                Err(_) => Err(self.error(FileErrorKind::Value("must be a whole number from 0".into()))),
+                Err(_) => Err(self.error("must be a whole number from 0")),
             },
-            Content::Float(x) => Err(self.error(FileErrorKind::Value(not_an_integer(x)))),
+            Content::Float(x) => Err(self.error(not_an_integer(x))),
             _ => Err(self.wrong("an integer")),
         }
     }
@@ -196,9 +189,7 @@ impl<'a> Value<'a> {
     pub fn string(&self) -> Result<Located<String>, FileError> {
         match self.as_str() {
             // Strings may be printed, and written to other files.
-            Some(s) if s.contains(is_control) => {
-                Err(self.error(FileErrorKind::Value("has a control character in it".into())))
-            }
+            Some(s) if s.contains(is_control) => Err(self.error("has a control character in it")),
             Some(s) => Ok(self.located(s.to_owned())),
             None => Err(self.wrong("a string")),
         }
@@ -241,10 +232,10 @@ impl<'a> Value<'a> {
             items
                 .iter()
                 .enumerate()
-                .map(|(k, value)| Value {
-                    source: self.source,
-                    key: format!("{}[{}]", self.key, k + 1),
-                    value,
+                .map(|(k, value)| {
+                    let (source, key) =
+                        (Arc::clone(&self.place.source), format!("{}[{}]", self.key(), k + 1));
+                    Value { place: Place { source, span: value.span.clone(), key }, value }
                 })
                 .collect(),
         )
@@ -258,7 +249,7 @@ impl<'a> Value<'a> {
     /// The table, if the value is one.
     pub fn as_section(&self) -> Option<Section<'a>> {
         let Content::Table(table) = &self.value.content else { return None };
-        Some(Section::new(self.source, self.key.clone(), self.span(), table))
+        Some(Section::new(self.place.clone(), table))
     }
 
     /// Reads an array of `N` numbers.
@@ -266,12 +257,8 @@ impl<'a> Value<'a> {
         let items = self.array()?;
         let numbers: Vec<f64> =
             items.iter().map(|v| v.number().map(|x| x.value)).collect::<Result<_, _>>()?;
-        <[f64; N]>::try_from(numbers).map_err(|_| {
-            self.error(FileErrorKind::Value(format!(
-                "expected {expected}, found an array of length {}",
-                items.len()
-            )))
-        })
+        <[f64; N]>::try_from(numbers)
+            .map_err(|_| self.error(format!("expected {expected}, found an array of length {}", items.len())))
     }
 }
 

@@ -129,6 +129,13 @@ pub enum ErrorKind {
 #[error("the formula needs more than {MAX_NODES} operations")]
 pub struct TooLarge;
 
+/// An error of the whole expression.
+impl From<TooLarge> for ExpressionError {
+    fn from(error: TooLarge) -> ExpressionError {
+        Span::new(0, 0).error(ErrorKind::TooLarge(error))
+    }
+}
+
 fn hint(suggestion: &Option<String>, known: &[String]) -> String {
     match suggestion {
         Some(name) => format!(", did you mean `{name}`? (known: {})", known.join(", ")),

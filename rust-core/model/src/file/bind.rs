@@ -7,48 +7,41 @@ use super::interaction::{PairTable, ThermostatEntry};
 use crate::continuation::Bounds;
 use crate::curve::pressure_table;
 use crate::curve::{Curve, CurveForm, Pressure};
-use crate::document::{FileError, FileErrorKind, Located, Source};
-use crate::expression::{Ast, ErrorKind, Expansion, ExpressionError, Formula, Variables};
+use crate::document::{FileError, FileErrorKind, Located};
+use crate::expression::{Ast, Expansion, Formula, Variables};
 use crate::fluid::{
     ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
 };
 use crate::kernel::Kernel;
-use crate::number::formula_error;
+use crate::number::{Number, formula_error};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Parameters and variables that formulas may refer to.
-struct Context<'a> {
-    source: &'a Arc<Source>,
-    constants: BTreeMap<String, f64>,
-    species: usize,
-}
+/// The parameters of a model and `kT`, which formulas may refer to.
+type Constants = BTreeMap<String, f64>;
 
 pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
     let source = &model.source;
     if !(kt > 0.0 && kt.is_finite()) {
         let message = format!("the temperature must be a positive number, is {kt}");
-        return Err(FileError::new(source, 0..0, "kT", FileErrorKind::Value(message)));
+        return Err(FileError::new(source, 0..0, "kT", message));
     }
     let mut constants = model.parameters.clone();
     constants.insert("kT".into(), kt);
-    let context = Context { source, constants, species: model.species.len() };
     let densities = model
         .densities
         .iter()
-        .map(|entry| bind_density(entry, &context, model.dimensions))
+        .map(|entry| bind_density(entry, &constants, model.dimensions))
         .collect::<Result<Vec<_>, _>>()?;
     let variables = variables(model);
     let excess = model
         .excess
         .iter()
-        .map(|entry| bind_excess(entry, &context, &variables, &densities))
+        .map(|entry| bind_excess(entry, &constants, &variables, &densities))
         .collect::<Result<Vec<_>, _>>()?;
     check_bounded(model, &densities, &excess)?;
-    let bind_pair = |table: &PairTable| {
-        let potential = table.form.bind(&context.constants, source)?;
-        Ok(PairTerm { between: table.between, potential })
-    };
+    let bind_pair =
+        |table: &PairTable| Ok(PairTerm { between: table.between, potential: table.form.bind(&constants)? });
     let pairs = model.pairs.iter().map(bind_pair).collect::<Result<Vec<_>, _>>()?;
     Ok(Fluid {
         title: model.title.clone(),
@@ -59,25 +52,26 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
         densities,
         excess,
         pairs,
-        thermostats: bind_thermostats(&model.thermostats, &context)?,
+        thermostats: bind_thermostats(&model.thermostats, &constants, model.species.len())?,
     })
 }
 
 fn bind_excess(
     entry: &ExcessEntry,
-    context: &Context,
+    constants: &Constants,
     variables: &Variables,
     densities: &[WeightedDensity],
 ) -> Result<ExcessFreeEnergy, FileError> {
-    let count = context.species;
+    let kt = constants["kT"];
     match entry {
         ExcessEntry::None => Ok(ExcessFreeEnergy::Formula(Formula::constant(0.0))),
-        ExcessEntry::Formula(ast) => Formula::compile(&ast.value, &context.constants, variables)
+        ExcessEntry::Formula(ast) => Formula::compile(&ast.value, constants, variables)
             .map(ExcessFreeEnergy::Formula)
-            .map_err(|e| formula_error(context.source, ast, e)),
+            .map_err(|e| formula_error(ast, e)),
         ExcessEntry::Table { spline, density } => {
             // A straight line is a formula, which needs no pass of its own.
             let line = spline.straight().and_then(|[intercept, slope]| {
+                let count = variables.count / densities.len();
                 Formula::linear(intercept, (0..count).map(|s| (density * count + s, slope))).ok()
             });
             Ok(match line {
@@ -89,32 +83,25 @@ fn bind_excess(
             })
         }
         ExcessEntry::Slopes { slopes, energy } => {
-            bind_slopes(slopes, energy.as_ref(), context, variables, densities).map(ExcessFreeEnergy::Slopes)
+            bind_slopes(slopes, energy.as_ref(), constants, variables).map(ExcessFreeEnergy::Slopes)
         }
-        ExcessEntry::PressureTable { spline, density, key } => {
-            let psi = pressure_table::psi(spline, context.constants["kT"])
-                .map_err(|message| key.error(context.source, FileErrorKind::Value(message)))?;
+        ExcessEntry::PressureTable { spline, density, place } => {
+            let psi = pressure_table::psi(spline, kt).map_err(|message| place.error(message))?;
             Ok(ExcessFreeEnergy::Curve(Curve { density: *density, form: CurveForm::Table(Arc::new(psi)) }))
         }
         ExcessEntry::Pressure { formula: ast, density } => {
             let variables = Variables { count: 1, names: BTreeMap::from([("rho".to_owned(), vec![0])]) };
-            let kt = context.constants["kT"];
             // The integration of ψ starts within the bounds, if there are any.
             let start = match densities[*density].bounds {
                 Some(Bounds { low, high, .. }) if low > 0.0 => (low * high).sqrt(),
                 Some(Bounds { high, .. }) if high > 0.0 => 0.5 * high,
                 _ => 1.0,
             };
-            let too_large = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
-            Formula::compile(&ast.value, &context.constants, &variables)
-                .and_then(|p| Pressure::new(&p, kt, start).map_err(too_large))
-                .map(|p| {
-                    ExcessFreeEnergy::Curve(Curve {
-                        density: *density,
-                        form: CurveForm::Pressure(Arc::new(p)),
-                    })
-                })
-                .map_err(|e| formula_error(context.source, ast, e))
+            let pressure = Formula::compile(&ast.value, constants, &variables)
+                .and_then(|p| Ok(Pressure::new(&p, kt, start)?))
+                .map_err(|e| formula_error(ast, e))?;
+            let form = CurveForm::Pressure(Arc::new(pressure));
+            Ok(ExcessFreeEnergy::Curve(Curve { density: *density, form }))
         }
     }
 }
@@ -123,62 +110,70 @@ fn bind_excess(
 fn bind_slopes(
     slopes: &[(Located<String>, Located<Ast>)],
     energy: Option<&Located<Ast>>,
-    context: &Context,
+    constants: &Constants,
     variables: &Variables,
-    densities: &[WeightedDensity],
 ) -> Result<StatedSlopes, FileError> {
-    let source = context.source;
     let compile = |ast: &Located<Ast>| {
-        Formula::compile(&ast.value, &context.constants, variables).map_err(|e| formula_error(source, ast, e))
+        Formula::compile(&ast.value, constants, variables).map_err(|e| formula_error(ast, e))
     };
     let mut stated: Vec<Option<Formula>> = vec![None; variables.count];
     for (name, ast) in slopes {
         let Some(members) = variables.names.get(&name.value) else {
             let known = variables.names.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-            let name_of = name.value.clone();
-            let kind = FileErrorKind::UnknownName { what: "density variable", name: name_of, known };
-            return Err(name.error(source, kind));
+            let named = name.value.clone();
+            return Err(name.error(FileErrorKind::UnknownName {
+                what: "density variable",
+                name: named,
+                known,
+            }));
         };
         let formula = compile(ast)?;
         for v in members {
             if stated[*v].replace(formula.clone()).is_some() {
-                let message = "the slope of one of its partial densities is stated twice".into();
-                return Err(name.error(source, FileErrorKind::Value(message)));
+                return Err(name.error("the slope of one of its partial densities is stated twice"));
             }
         }
     }
     let energy = energy.map(compile).transpose()?.unwrap_or_else(|| Formula::constant(0.0));
     let slopes = stated.into_iter().map(|s| s.unwrap_or_else(|| Formula::constant(0.0))).collect();
-    let law = StatedSlopes { energy, slopes };
-    let bounded = |v: &usize| densities[v / context.species].bounds.is_some() && law.depends_on(*v);
-    if let Some(v) = (0..variables.count).find(bounded) {
-        let name = &densities[v / context.species].name;
-        let message =
-            format!("density {name} has bounds, beyond which psi is continued; stated slopes have no psi");
-        return Err(FileError::new(source, 0..0, "excess_free_energy", FileErrorKind::Value(message))
-            .with_help("leave the bounds out, or limit the density in the formula with min and max"));
-    }
-    Ok(law)
+    Ok(StatedSlopes { energy, slopes })
 }
 
-/// With n bounded variables the continuation of ψ has 3^n terms.
+/// Fails for a species whose ψ depends on more bounded variables than its continuation can have, and for bounds of a density
+/// that stated slopes depend on.
 fn check_bounded(
     model: &Model,
     densities: &[WeightedDensity],
     excess: &[ExcessFreeEnergy],
 ) -> Result<(), FileError> {
     let count = model.species.len();
+    let all = (0..densities.len() * count).filter(|v| densities[v / count].bounds.is_some());
     for (entry, excess) in model.excess.iter().zip(excess) {
-        let (ExcessEntry::Formula(ast), ExcessFreeEnergy::Formula(psi)) = (entry, excess) else { continue };
-        let bounded = (0..densities.len() * count)
-            .filter(|v| densities[v / count].bounds.is_some() && psi.depends_on(*v))
-            .count();
-        if bounded > Expansion::MOST {
-            let message =
-                format!("depends on {bounded} partial densities with bounds, at most {}", Expansion::MOST);
-            return Err(ast
-                .error(&model.source, FileErrorKind::Value(message))
-                .with_help("leave the bounds out, or limit the densities in the formula with min and max"));
+        match (entry, excess) {
+            (ExcessEntry::Formula(ast), ExcessFreeEnergy::Formula(psi)) => {
+                // With n bounded variables the continuation of ψ has 3^n terms.
+                let (bounded, most) = (all.clone().filter(|v| psi.depends_on(*v)).count(), Expansion::MOST);
+                if bounded > most {
+                    let message =
+                        format!("depends on {bounded} partial densities with bounds, at most {most}");
+                    return Err(ast.error(message).with_help(
+                        "leave the bounds out, or limit the densities in the formula with min and max",
+                    ));
+                }
+            }
+            (_, ExcessFreeEnergy::Slopes(law)) => {
+                if let Some(v) = all.clone().find(|v| law.depends_on(*v)) {
+                    let name = &densities[v / count].name;
+                    let message = format!(
+                        "density {name} has bounds, beyond which psi is continued; stated slopes have no psi"
+                    );
+                    return Err(FileError::new(&model.source, 0..0, "excess_free_energy", message)
+                        .with_help(
+                            "leave the bounds out, or limit the density in the formula with min and max",
+                        ));
+                }
+            }
+            _ => {}
         }
     }
     Ok(())
@@ -199,39 +194,25 @@ fn variables(model: &Model) -> Variables {
 
 fn bind_density(
     entry: &DensityEntry,
-    context: &Context,
+    constants: &Constants,
     dimensions: usize,
 ) -> Result<WeightedDensity, FileError> {
-    let (constants, source) = (&context.constants, context.source);
-    let range = entry.range.positive(constants, source)?;
-    let correction = entry
-        .correction
-        .iter()
-        .map(|coefficients| {
-            if coefficients.is_empty() {
-                return Ok(Polynomial::identity());
-            }
-            let values: Result<Vec<f64>, FileError> =
-                coefficients.iter().map(|c| c.evaluate(constants, source).map(|x| x.value)).collect();
-            values.map(Polynomial)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    debug_assert_eq!(correction.len(), context.species * context.species);
+    let range = entry.range.positive(constants)?;
+    let polynomial = |coefficients: &Vec<Number>| {
+        if coefficients.is_empty() {
+            return Ok(Polynomial::identity());
+        }
+        let values = coefficients.iter().map(|c| c.evaluate(constants).map(|x| x.value));
+        values.collect::<Result<_, _>>().map(Polynomial)
+    };
     let bounds = match &entry.bounds {
         None => None,
         Some([low, high]) => {
-            let low = low.evaluate(constants, source)?;
-            let high = high.evaluate(constants, source)?;
-            if low.value >= high.value {
-                return Err(low.error(
-                    source,
-                    FileErrorKind::Value(format!(
-                        "the lower bound {} is not below the upper {}",
-                        low.value, high.value
-                    )),
-                ));
+            let (low, high) = (low.evaluate(constants)?, high.evaluate(constants)?.value);
+            if low.value >= high {
+                return Err(low.error(format!("the lower bound {} is not below the upper {high}", low.value)));
             }
-            Some(Bounds { low: low.value, high: high.value, below: entry.below })
+            Some(Bounds { low: low.value, high, below: entry.below })
         }
     };
     Ok(WeightedDensity {
@@ -239,33 +220,27 @@ fn bind_density(
         kernel: Kernel::new(entry.kernel, range, dimensions),
         force_kernel: Kernel::new(entry.force_kernel, range, dimensions),
         includes_self: entry.includes_self,
-        correction,
+        correction: entry.correction.iter().map(polynomial).collect::<Result<_, FileError>>()?,
         bounds,
     })
 }
 
 fn bind_thermostats(
     entries: &[ThermostatEntry],
-    context: &Context,
+    constants: &Constants,
+    count: usize,
 ) -> Result<Vec<Option<Thermostat>>, FileError> {
-    let (constants, source) = (&context.constants, context.source);
-    let count = context.species;
     let mut all = vec![None; count * count];
     // The entry for all pairs comes first, so that entries for single pairs replace it.
     let ordered =
         entries.iter().filter(|e| e.between.is_none()).chain(entries.iter().filter(|e| e.between.is_some()));
     for entry in ordered {
-        let gamma = entry.gamma.evaluate(constants, source)?;
+        let gamma = entry.gamma.evaluate(constants)?;
         if gamma.value < 0.0 {
-            return Err(gamma
-                .error(source, FileErrorKind::Value(format!("must not be negative, is {}", gamma.value))));
+            return Err(gamma.error(format!("must not be negative, is {}", gamma.value)));
         }
-        let exponent = match &entry.exponent {
-            Some(number) => number.positive(constants, source)?,
-            None => 1.0,
-        };
-        let thermostat =
-            Thermostat { gamma: gamma.value, range: entry.range.positive(constants, source)?, exponent };
+        let exponent = entry.exponent.as_ref().map_or(Ok(1.0), |number| number.positive(constants))?;
+        let thermostat = Thermostat { gamma: gamma.value, range: entry.range.positive(constants)?, exponent };
         match entry.between {
             None => all.fill(Some(thermostat)),
             Some([a, b]) => {

@@ -36,18 +36,17 @@ pub fn read(
     let mut densities: Vec<DensityEntry> = Vec::new();
     let entries = section.entries();
     if entries.len() > MOST_DENSITIES {
-        let message = format!("{} densities, more than {MOST_DENSITIES}", entries.len());
-        return Err(value.error(FileErrorKind::Value(message)));
+        return Err(value.error(format!("{} densities, more than {MOST_DENSITIES}", entries.len())));
     }
     for (name, value) in entries {
-        check_identifier(&name, &section)?;
+        check_identifier(&name)?;
         let Some(table) = value.as_section() else {
             return Err(value
                 .error(FileErrorKind::WrongType { expected: "a table", found: "something else" })
-                .with_help(format!("densities have names: write [density.{}]", "n")));
+                .with_help("densities have names: write [density.n]"));
         };
         let entry = read_one(name.clone(), &table, species)?;
-        check_clashes(&name, &section, species, parameters, &densities)?;
+        check_clashes(&name, species, parameters, &densities)?;
         densities.push(entry);
     }
     Ok(densities)
@@ -56,34 +55,26 @@ pub fn read(
 fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Result<DensityEntry, FileError> {
     let choices: Vec<(&str, KernelKind)> = KernelKind::ALL.iter().map(|k| (k.name(), *k)).collect();
     let kernel = table.require("kernel")?.one_of("kernel", &choices)?.value;
-    let force_kernel = match table.get("force_kernel") {
-        Some(value) => value.one_of("kernel", &choices)?.value,
-        None => kernel,
-    };
+    let force_kernel = table
+        .get("force_kernel")
+        .map_or(Ok(kernel), |value| value.one_of("kernel", &choices).map(|kernel| kernel.value))?;
     let range = Number::require(table, "range")?;
-    let includes_self = match table.get("self") {
-        Some(value) => value.boolean()?.value,
-        None => false,
-    };
+    let includes_self =
+        table.get("self").map_or(Ok(false), |value| value.boolean().map(|flag| flag.value))?;
     let correction = match table.get("correction") {
-        Some(value) => read_correction(&value, table, species)?,
+        Some(value) => read_correction(&value, species)?,
         None => vec![Vec::new(); species.len() * species.len()],
     };
-    let bounds = match table.get("bounds") {
-        Some(value) => {
-            let items = value.array()?;
-            let [low, high] = items.as_slice() else {
-                return Err(value.error(FileErrorKind::Value("expected [lowest, highest]".into())));
-            };
-            Some([Number::read(low)?, Number::read(high)?])
-        }
-        None => None,
-    };
+    let bounds = table.get("bounds").map(|value| {
+        let [low, high] = &value.array()?[..] else { return Err(value.error("expected [lowest, highest]")) };
+        Ok([Number::read(low)?, Number::read(high)?])
+    });
+    let bounds = bounds.transpose()?;
     let below = match table.get("below") {
         Some(value) => {
             let choices = [("linear", Continuation::Linear), ("constant", Continuation::Constant)];
             if bounds.is_none() {
-                return Err(value.error(FileErrorKind::Value("has no meaning without bounds".into())));
+                return Err(value.error("has no meaning without bounds"));
             }
             value.one_of("continuation", &choices)?.value
         }
@@ -94,19 +85,13 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
 }
 
 /// Reads one polynomial for all pairs of species, or a table of `"A|B"`: the density of A felt by B.
-fn read_correction(
-    value: &Value,
-    table: &Section,
-    species: &[String],
-) -> Result<Vec<Vec<Number>>, FileError> {
+fn read_correction(value: &Value, species: &[String]) -> Result<Vec<Vec<Number>>, FileError> {
     let coefficients = |value: &Value| -> Result<Vec<Number>, FileError> {
         let items = value.array()?;
         if items.is_empty() || items.len() > 16 {
-            return Err(
-                value.error(FileErrorKind::Value("expected 1 to 16 coefficients in ascending powers".into()))
-            );
+            return Err(value.error("expected 1 to 16 coefficients in ascending powers"));
         }
-        items.iter().map(|item| Number::read(item)).collect()
+        items.iter().map(Number::read).collect()
     };
     let count = species.len();
     if value.as_array().is_some() {
@@ -121,13 +106,9 @@ fn read_correction(
     let mut all = vec![Vec::new(); count * count];
     for (key, value) in pairs.entries() {
         let Some((of, by)) = key.value.split_once('|') else {
-            return Err(key.error(
-                table.source(),
-                FileErrorKind::Value("expected \"A|B\", the density of A felt by B".into()),
-            ));
+            return Err(key.error("expected \"A|B\", the density of A felt by B"));
         };
-        let index =
-            |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()), table.source());
+        let index = |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()));
         all[index(by)? * count + index(of)?] = coefficients(&value)?;
     }
     Ok(all)
@@ -136,7 +117,6 @@ fn read_correction(
 /// Fails if a variable of a density has the name of a parameter or of another density's variable.
 fn check_clashes(
     name: &Located<String>,
-    section: &Section,
     species: &[String],
     parameters: &BTreeMap<String, f64>,
     others: &[DensityEntry],
@@ -154,11 +134,8 @@ fn check_clashes(
         .find(|n| mine.contains(n));
     match taken {
         None => Ok(()),
-        Some(taken) => Err(name.error(
-            section.source(),
-            FileErrorKind::Value(format!(
-                "its variable {taken} has the name of another variable or parameter"
-            )),
-        )),
+        Some(taken) => {
+            Err(name.error(format!("its variable {taken} has the name of another variable or parameter")))
+        }
     }
 }

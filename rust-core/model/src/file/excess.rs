@@ -1,7 +1,7 @@
 use super::density::DensityEntry;
 use super::species_index;
 use crate::curve::{Spline, read_spline};
-use crate::document::{FileError, FileErrorKind, Located, Section, Value};
+use crate::document::{FileError, FileErrorKind, Located, Place, Section, Value};
 use crate::expression::Ast;
 use crate::number::read_formula;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub enum ExcessEntry {
     /// The pressure as a formula of one density's total.
     Pressure { formula: Located<Ast>, density: usize },
     /// The pressure as a table of one density's total.
-    PressureTable { spline: Arc<Spline>, density: usize, key: Located<()> },
+    PressureTable { spline: Arc<Spline>, density: usize, place: Place },
     /// Slopes that may have no ψ, by the names of the variables, and the formula that is reported as energy.
     Slopes { slopes: Vec<(Located<String>, Located<Ast>)>, energy: Option<Located<Ast>> },
 }
@@ -37,7 +37,7 @@ pub fn read(
     };
     let section = value.section()?;
     for (name, value) in section.entries() {
-        let index = species_index(&species.value, &name, section.source())?;
+        let index = species_index(&species.value, &name)?;
         all[index] = match value.as_section() {
             None => ExcessEntry::Formula(read_formula(&value)?),
             Some(table) => read_curve(&table, species.value.len(), densities, directory)?,
@@ -46,7 +46,7 @@ pub fn read(
     match all.iter().position(|e| matches!(e, ExcessEntry::None)) {
         None => Ok(all),
         Some(missing) => Err(section
-            .error(FileErrorKind::Value(format!("species {} has no entry", species.value[missing])))
+            .error(format!("species {} has no entry", species.value[missing]))
             .with_help(format!("write {} = \"0\" if it has none", species.value[missing]))),
     }
 }
@@ -59,19 +59,18 @@ fn read_curve(
     densities: &[DensityEntry],
     directory: &Path,
 ) -> Result<ExcessEntry, FileError> {
-    let value = |message: &str| FileErrorKind::Value(message.into());
     let file = table.get("table");
     let pressure = table.get("pressure");
     let (slopes, energy, named) = (table.get("slopes"), table.get("energy"), table.get("density"));
     if let Some(slopes) = slopes {
         let others = [("table", &file), ("pressure", &pressure), ("density", &named)];
         if let Some((name, Some(other))) = others.iter().find(|(_, v)| v.is_some()) {
-            return Err(other.error(FileErrorKind::Value(format!("slopes exclude {name}"))));
+            return Err(other.error(format!("slopes exclude {name}")));
         }
         return read_slopes(&slopes, energy);
     }
     if let Some(energy) = energy {
-        return Err(energy.error(value("has no meaning without slopes")));
+        return Err(energy.error("has no meaning without slopes"));
     }
     let density = read_density(named, table, densities)?;
     match (file, pressure) {
@@ -83,8 +82,7 @@ fn read_curve(
                 section.only(["table"])?;
                 let file = section.require("table")?;
                 let spline = Arc::new(read_spline(&file, directory, ["rho", "p"])?);
-                let key = Located { value: (), span: file.span(), key: file.key().to_owned() };
-                return Ok(ExcessEntry::PressureTable { spline, density, key });
+                return Ok(ExcessEntry::PressureTable { spline, density, place: file.place().clone() });
             }
             let names_file = |text: &str| {
                 let extension = Path::new(text).extension().and_then(|e| e.to_str());
@@ -100,11 +98,11 @@ fn read_curve(
             Ok(ExcessEntry::Pressure { formula, density })
         }
         (None, Some(pressure)) => Err(pressure
-            .error(value("gives psi for a model of one species only"))
+            .error("gives psi for a model of one species only")
             .with_help("write psi of each species as a formula or a table")),
-        (Some(_), Some(pressure)) => Err(pressure.error(value("excludes a table"))),
+        (Some(_), Some(pressure)) => Err(pressure.error("excludes a table")),
         (None, None) => {
-            Err(table.error(value("expected a formula, { table = \"file\" } or { pressure = \"formula\" }")))
+            Err(table.error("expected a formula, { table = \"file\" } or { pressure = \"formula\" }"))
         }
     }
 }
@@ -135,11 +133,11 @@ fn read_density(
             })
         }
         (None, [_]) => Ok(0),
-        (None, []) => Err(table
-            .error(FileErrorKind::Value("depends on a density, and the model has none".into()))
-            .with_help("write a [density.n]")),
+        (None, []) => {
+            Err(table.error("depends on a density, and the model has none").with_help("write a [density.n]"))
+        }
         (None, _) => Err(table
-            .error(FileErrorKind::Value(format!("does not say which density it depends on: {}", known())))
+            .error(format!("does not say which density it depends on: {}", known()))
             .with_help("write density = \"name\" in the braces")),
     }
 }

@@ -1,5 +1,5 @@
 use super::species_index;
-use crate::document::{FileError, FileErrorKind, Section, Source, Value};
+use crate::document::{FileError, Section, Source, Value};
 use crate::fluid::{ExcessFreeEnergy, Fluid};
 use crate::number::Number;
 use crate::pair::PairEntry;
@@ -23,12 +23,9 @@ pub struct ThermostatEntry {
     pub exponent: Option<Number>,
 }
 
-fn read_between(value: &Value, species: &[String], source: &Arc<Source>) -> Result<[usize; 2], FileError> {
-    let items = value.array()?;
-    let [a, b] = items.as_slice() else {
-        return Err(value.error(FileErrorKind::Value("expected two species".into())));
-    };
-    Ok([species_index(species, &a.string()?, source)?, species_index(species, &b.string()?, source)?])
+fn read_between(value: &Value, species: &[String]) -> Result<[usize; 2], FileError> {
+    let [a, b] = &value.array()?[..] else { return Err(value.error("expected two species")) };
+    Ok([species_index(species, &a.string()?)?, species_index(species, &b.string()?)?])
 }
 
 /// Reads every `[[pair]]`.
@@ -36,7 +33,7 @@ pub fn read_pairs(root: &Section, species: &[String], directory: &Path) -> Resul
     let tables = root.get("pair").map_or(Ok(Vec::new()), |value| value.array())?;
     let read = |item: &Value| {
         let table = item.section()?;
-        let between = read_between(&table.require("between")?, species, table.source())?;
+        let between = read_between(&table.require("between")?, species)?;
         let form = PairEntry::read(&table.require("form")?, &table, directory)?;
         Ok(PairTable { between, form })
     };
@@ -51,8 +48,7 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
     let mut entries: Vec<ThermostatEntry> = Vec::new();
     for item in value.array()? {
         let table = item.section()?;
-        let between =
-            table.get("between").map(|value| read_between(&value, species, table.source())).transpose()?;
+        let between = table.get("between").map(|value| read_between(&value, species)).transpose()?;
         let same = |a: [usize; 2], b: [usize; 2]| a == b || a == [b[1], b[0]];
         let twice = entries.iter().any(|e| match (e.between, between) {
             (None, None) => true,
@@ -60,9 +56,7 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
             _ => false,
         });
         if twice {
-            return Err(
-                table.error(FileErrorKind::Value("this pair of species has a thermostat already".into()))
-            );
+            return Err(table.error("this pair of species has a thermostat already"));
         }
         entries.push(ThermostatEntry {
             between,
@@ -102,7 +96,7 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
     let missing =
         |table: &[bool]| (0..count).find_map(|a| (a..count).find(|b| !table[a * count + b]).map(|b| (a, b)));
     let whole = |key: &str, message: String, help: String| {
-        Err(FileError::new(source, 0..0, key, FileErrorKind::Value(message)).with_help(help))
+        Err(FileError::new(source, 0..0, key, message).with_help(help))
     };
     if let (false, Some((a, b))) = (nothing, missing(&coupled)) {
         let (a, b) = (&fluid.species[a], &fluid.species[b]);

@@ -1,6 +1,6 @@
 //! Published values of the fluid, for comparison with measured ones.
 
-use crate::document::{FileError, FileErrorKind, Section};
+use crate::document::{FileError, Section};
 
 /// The quantities that the file may state.
 pub const QUANTITIES: [&str; 5] = ["pressure", "liquid", "vapour", "tension", "width"];
@@ -29,15 +29,12 @@ pub fn read(root: &Section) -> Result<Vec<Published>, FileError> {
             let Some(value) = table.get(name) else { continue };
             let [x, error] = value.numbers("a value and its error")?;
             if error <= 0.0 {
-                return Err(
-                    value.error(FileErrorKind::Value(format!("the error must be positive, is {error}")))
-                );
+                return Err(value.error(format!("the error must be positive, is {error}")));
             }
             values.push((name, [x, error]));
         }
         if density.is_none() && values.iter().any(|(name, _)| *name == "pressure") {
-            let message = "a pressure needs the density that it belongs to".to_owned();
-            return Err(table.require("pressure")?.error(FileErrorKind::Value(message)));
+            return Err(table.require("pressure")?.error("a pressure needs the density that it belongs to"));
         }
         all.push(Published { kt, density, values });
     }

@@ -152,26 +152,18 @@ fn read_dimensions(root: &Section) -> Result<usize, FileError> {
     };
     match value.count()?.value {
         d @ (2 | 3) => Ok(d as usize),
-        _ => Err(value.error(FileErrorKind::Value("must be 2 or 3".into()))),
+        _ => Err(value.error("must be 2 or 3")),
     }
 }
 
 /// The index of a species by its name.
-fn species_index(
-    species: &[String],
-    name: &Located<String>,
-    source: &Arc<Source>,
-) -> Result<usize, FileError> {
-    species.iter().position(|s| *s == name.value).ok_or_else(|| {
-        name.error(
-            source,
-            FileErrorKind::UnknownName {
-                what: "species",
-                name: name.value.clone(),
-                known: species.join(", "),
-            },
-        )
-    })
+fn species_index(species: &[String], name: &Located<String>) -> Result<usize, FileError> {
+    let unknown = || FileErrorKind::UnknownName {
+        what: "species",
+        name: name.value.clone(),
+        known: species.join(", "),
+    };
+    species.iter().position(|s| *s == name.value).ok_or_else(|| name.error(unknown()))
 }
 
 #[cfg(test)]

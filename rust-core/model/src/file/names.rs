@@ -1,4 +1,4 @@
-use crate::document::{FileError, FileErrorKind, Located, Section};
+use crate::document::{FileError, Located, Section};
 
 /// The functions of formulas; no parameter, density or species may take such a name.
 pub const KNOWN_FUNCTIONS: &[&str] =
@@ -12,32 +12,30 @@ pub fn read_species(root: &Section) -> Result<Located<Vec<String>>, FileError> {
     let value = root.require("species")?;
     let items = value.array()?;
     if items.is_empty() || items.len() > MOST_SPECIES {
-        return Err(value.error(FileErrorKind::Value(format!("must name 1 to {MOST_SPECIES} species"))));
+        return Err(value.error(format!("must name 1 to {MOST_SPECIES} species")));
     }
     let mut names: Vec<String> = Vec::new();
     for item in items {
         let name = item.string()?.value;
         let fits = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if !fits {
-            return Err(item.error(FileErrorKind::Value(format!(
-                "\"{name}\" is not a species name: letters, digits and underscores only"
-            ))));
+            return Err(
+                item.error(format!("\"{name}\" is not a species name: letters, digits and underscores only"))
+            );
         }
         if name == "NULL" {
-            return Err(item.error(FileErrorKind::Value(
-                "NULL is reserved: pair_coeff uses it for a type without species".into(),
-            )));
+            return Err(item.error("NULL is reserved: pair_coeff uses it for a type without species"));
         }
         if names.contains(&name) {
-            return Err(item.error(FileErrorKind::Value(format!("\"{name}\" is named twice"))));
+            return Err(item.error(format!("\"{name}\" is named twice")));
         }
         names.push(name);
     }
-    Ok(Located { value: names, span: value.span(), key: value.key().to_owned() })
+    Ok(Located { value: names, place: value.place().clone() })
 }
 
 /// Checks that a parameter or density has a name that formulas can use.
-pub fn check_identifier(name: &Located<String>, section: &Section) -> Result<(), FileError> {
+pub fn check_identifier(name: &Located<String>) -> Result<(), FileError> {
     let mut chars = name.value.chars();
     let starts = chars.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
     let goes_on = chars.all(|c| c.is_ascii_alphanumeric() || c == '_');
@@ -50,5 +48,5 @@ pub fn check_identifier(name: &Located<String>, section: &Section) -> Result<(),
     } else {
         return Ok(());
     };
-    Err(name.error(section.source(), FileErrorKind::Value(problem.into())))
+    Err(name.error(problem))
 }

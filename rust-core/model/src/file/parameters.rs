@@ -1,7 +1,7 @@
 //! The table `[parameters]`.
 
 use super::names::check_identifier;
-use crate::document::{FileError, FileErrorKind, Section};
+use crate::document::{FileError, Section};
 use crate::number::Number;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,22 +15,20 @@ pub fn read(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
         return Ok(known);
     };
     let section = value.section()?;
-    let source = section.source();
     let mut waiting: Vec<(String, Number)> = Vec::new();
     let entries = section.entries();
     if entries.len() > MOST_PARAMETERS {
-        let message = format!("{} parameters, more than {MOST_PARAMETERS}", entries.len());
-        return Err(value.error(FileErrorKind::Value(message)));
+        return Err(value.error(format!("{} parameters, more than {MOST_PARAMETERS}", entries.len())));
     }
     for (name, value) in entries {
-        check_identifier(&name, &section)?;
+        check_identifier(&name)?;
         let number = Number::read(&value)?;
         if let Number::Formula(ast) = &number
             && ast.value.names().any(|(name, _)| name == "kT")
         {
-            let message =
-                "a parameter has one value at all temperatures: write kT where the parameter is used";
-            return Err(value.error(FileErrorKind::Value(message.into())));
+            return Err(value.error(
+                "a parameter has one value at all temperatures: write kT where the parameter is used",
+            ));
         }
         waiting.push((name.value, number));
     }
@@ -47,7 +45,7 @@ pub fn read(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
                 }
             };
             if ready {
-                let value = number.evaluate(&known, source)?.value;
+                let value = number.evaluate(&known)?.value;
                 known.insert(name, value);
             } else {
                 still.push((name, number));
@@ -55,10 +53,8 @@ pub fn read(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
         }
         if still.len() == before {
             let circle: Vec<&str> = still.iter().map(|(n, _)| n.as_str()).collect();
-            return Err(section.error(FileErrorKind::Value(format!(
-                "these parameters refer to each other in a circle: {}",
-                circle.join(", ")
-            ))));
+            let circle = circle.join(", ");
+            return Err(section.error(format!("these parameters refer to each other in a circle: {circle}")));
         }
         waiting = still;
     }

@@ -132,41 +132,37 @@ impl Kernel {
     /// The weight `w(r)`.
     #[inline]
     pub fn value(&self, r: f64) -> f64 {
-        struct At(f64);
-        impl ShapeVisitor for At {
-            type Output = f64;
-            fn visit<S: Shape>(self) -> f64 {
-                S::value(self.0)
-            }
-        }
-        if r < self.range { self.value_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
+        self.derivative::<0>(self.value_factor, r)
     }
 
     /// The slope `w'(r)`; no kernel of this list has a positive slope.
     #[inline]
     pub fn slope(&self, r: f64) -> f64 {
-        struct At(f64);
-        impl ShapeVisitor for At {
-            type Output = f64;
-            fn visit<S: Shape>(self) -> f64 {
-                S::slope(self.0)
-            }
-        }
-        if r < self.range { self.slope_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
+        self.derivative::<1>(self.slope_factor, r)
     }
 
     /// The curvature `w''(r)` within the range, 0 beyond; a jump of `w'` at the range does not contribute.
     #[inline]
     pub fn curvature(&self, r: f64) -> f64 {
-        struct At(f64);
-        impl ShapeVisitor for At {
+        self.derivative::<2>(self.slope_factor / self.range, r)
+    }
+
+    /// A derivative of the shape, times `factor`.
+    #[inline]
+    fn derivative<const ORDER: usize>(&self, factor: f64, r: f64) -> f64 {
+        struct At<const ORDER: usize>(f64);
+        impl<const ORDER: usize> ShapeVisitor for At<ORDER> {
             type Output = f64;
+            #[inline]
             fn visit<S: Shape>(self) -> f64 {
-                S::curvature(self.0)
+                match ORDER {
+                    0 => S::value(self.0),
+                    1 => S::slope(self.0),
+                    _ => S::curvature(self.0),
+                }
             }
         }
-        let factor = self.slope_factor / self.range;
-        if r < self.range { factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
+        if r < self.range { factor * self.kind.visit(At::<ORDER>(r / self.range)) } else { 0.0 }
     }
 }
 

@@ -1,11 +1,10 @@
 use super::{FormEntry, PairForm};
 use crate::document::keys::{Key, REQUIRED, ValueKind, keys};
-use crate::document::{FileError, Located, Section, Source};
-use crate::expression::{Ast, ErrorKind, ExpressionError, Formula, Program, TooLarge, Variables};
+use crate::document::{FileError, Located, Section};
+use crate::expression::{Ast, Formula, Program, TooLarge, Variables};
 use crate::number::{Number, formula_error, read_formula};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 /// A potential written as a formula of `r`; not shifted, so it should vanish at its range.
 #[derive(Debug, Clone)]
@@ -44,12 +43,12 @@ impl FormEntry for ExpressionEntry {
     type Form = ExpressionPair;
 
     const KEYS: &'static [Key] = keys! {
-        "phi" [&["expression"]]: ValueKind::Formula, REQUIRED,
+        "phi": ValueKind::Formula, REQUIRED,
             "The potential as a formula of `r`, the parameters and `kT`. It is not shifted, and should vanish \
              at the range."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"2*(1 - r^2)^2\"\nrange = \
              1.0";
-        "range" [&["expression"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "range": ValueKind::NumberOrFormula, REQUIRED,
             "The distance at and beyond which the potential is zero."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"8*(0.5 - r)^2\"\nrange = \
              0.5";
@@ -60,17 +59,12 @@ impl FormEntry for ExpressionEntry {
         Ok(ExpressionEntry { phi, range: Number::require(table, "range")? })
     }
 
-    fn bind(
-        &self,
-        constants: &BTreeMap<String, f64>,
-        source: &Arc<Source>,
-    ) -> Result<ExpressionPair, FileError> {
+    fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<ExpressionPair, FileError> {
         let variables = Variables { count: 1, names: BTreeMap::from([("r".to_owned(), vec![0])]) };
-        let range = self.range.positive(constants, source)?;
-        let too_large = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
+        let range = self.range.positive(constants)?;
         Formula::compile(&self.phi.value, constants, &variables)
-            .and_then(|formula| ExpressionPair::new(&formula, range).map_err(too_large))
-            .map_err(|e| formula_error(source, &self.phi, e))
+            .and_then(|formula| Ok(ExpressionPair::new(&formula, range)?))
+            .map_err(|e| formula_error(&self.phi, e))
     }
 }
 

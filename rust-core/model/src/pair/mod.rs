@@ -13,11 +13,10 @@ pub use soft::Soft;
 pub use spline::{SplineAttractive, spline_shape};
 pub use table::TablePair;
 
-use crate::document::keys::Key;
-use crate::document::{FileError, Section, Source, Value};
+use crate::document::keys::{FormKeys, Key};
+use crate::document::{FileError, Section, Value};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 /// A pair potential that vanishes at and beyond its range.
 pub trait PairForm {
@@ -71,7 +70,7 @@ pub trait FormEntry: Sized {
     ///
     /// # Errors
     /// Fails for values out of their domain.
-    fn bind(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<Self::Form, FileError>;
+    fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<Self::Form, FileError>;
 }
 
 /// The one list of pair forms.
@@ -80,8 +79,8 @@ macro_rules! pair_table {
         /// The names of all forms.
         pub const FORMS: &[&str] = &[$($name),+];
 
-        /// The keys of each form.
-        pub const FORM_KEYS: &[&[Key]] = &[$(<$entry as FormEntry>::KEYS),+];
+        /// The name and the keys of each form.
+        pub const FORM_KEYS: &[FormKeys] = &[$((&[$name], <$entry as FormEntry>::KEYS)),+];
 
         /// The parameters of a pair potential of any form as the model file has them.
         #[derive(Debug, Clone)]
@@ -107,13 +106,9 @@ macro_rules! pair_table {
             ///
             /// # Errors
             /// Fails for values out of their domain.
-            pub fn bind(
-                &self,
-                constants: &BTreeMap<String, f64>,
-                source: &Arc<Source>,
-            ) -> Result<PairPotential, FileError> {
+            pub fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<PairPotential, FileError> {
                 match self {
-                    $(PairEntry::$variant(entry) => entry.bind(constants, source).map(PairPotential::$variant)),+
+                    $(PairEntry::$variant(entry) => entry.bind(constants).map(PairPotential::$variant)),+
                 }
             }
         }
@@ -165,6 +160,7 @@ pair_table!(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
 
     /// Compares φ' with central differences, and checks that φ = 0 at the range.
     pub(crate) fn slope_is_derivative(form: &impl PairForm, skip: &[f64]) {

@@ -1,10 +1,9 @@
 use super::{FormEntry, PairForm};
 use crate::document::keys::{Key, REQUIRED, ValueKind, keys};
-use crate::document::{FileError, Section, Source};
+use crate::document::{FileError, Section};
 use crate::number::Number;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 /// The soft potential of standard DPD, `φ = ½ a R (1 − r/R)²`: a force `a (1 − r/R)`.
 ///
@@ -38,10 +37,10 @@ impl FormEntry for SoftEntry {
     type Form = Soft;
 
     const KEYS: &'static [Key] = keys! {
-        "strength" [&["soft"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "strength": ValueKind::NumberOrFormula, REQUIRED,
             "The amplitude of `phi = strength range/2 (1 - r/range)^2`, a force; negative if it attracts."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = \"-40\"\nrange = 1.0";
-        "range" [&["soft"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "range": ValueKind::NumberOrFormula, REQUIRED,
             "The distance at and beyond which the potential is zero."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = \"2^(1/3)\"";
     };
@@ -51,9 +50,9 @@ impl FormEntry for SoftEntry {
         Ok(SoftEntry { strength: number("strength")?, range: number("range")? })
     }
 
-    fn bind(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<Soft, FileError> {
-        let strength = self.strength.evaluate(constants, source)?.value;
-        Ok(Soft::new(strength, self.range.positive(constants, source)?))
+    fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<Soft, FileError> {
+        let strength = self.strength.evaluate(constants)?.value;
+        Ok(Soft::new(strength, self.range.positive(constants)?))
     }
 }
 

@@ -1,11 +1,10 @@
 use super::{FormEntry, PairForm};
 use crate::document::keys::{Key, REQUIRED, ValueKind, keys};
-use crate::document::{FileError, Section, Source};
+use crate::document::{FileError, Section};
 use crate::kernel::{CubicSpline, Shape};
 use crate::number::Number;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 /// The repulsive–attractive potential of Wang and Chen,
 /// `φ = a [A W(r, R_A) − B W(r, R_B)]`, with the cubic spline `W` of their eq. (8), `W(0) = 1`,
@@ -77,24 +76,24 @@ impl FormEntry for SplineEntry {
     type Form = SplineAttractive;
 
     const KEYS: &'static [Key] = keys! {
-        "strength" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "strength": ValueKind::NumberOrFormula, REQUIRED,
             "The amplitude, an energy, of `phi = strength [A W(r, range_A) - B W(r, range_B)]` with Wang and Chen's \
              cubic spline, `W(0) = 1`."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A = \
              0.8\nrange_B = 1.0";
-        "A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "A": ValueKind::NumberOrFormula, REQUIRED,
             "The weight of the repulsion."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A \
              = 0.8\nrange_B = 1.0";
-        "B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "B": ValueKind::NumberOrFormula, REQUIRED,
             "The weight of the attraction."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = \
              0.8\nrange_A = 0.8\nrange_B = 1.0";
-        "range_A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "range_A": ValueKind::NumberOrFormula, REQUIRED,
             "The range of the repulsion."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
              0.75\nrange_B = 1.0";
-        "range_B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+        "range_B": ValueKind::NumberOrFormula, REQUIRED,
             "The range of the attraction."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
              0.8\nrange_B = 1.1";
@@ -111,18 +110,14 @@ impl FormEntry for SplineEntry {
         })
     }
 
-    fn bind(
-        &self,
-        constants: &BTreeMap<String, f64>,
-        source: &Arc<Source>,
-    ) -> Result<SplineAttractive, FileError> {
-        let value = |number: &Number| number.evaluate(constants, source).map(|x| x.value);
+    fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<SplineAttractive, FileError> {
+        let value = |number: &Number| number.evaluate(constants).map(|x| x.value);
         Ok(SplineAttractive::new(
             value(&self.strength)?,
             value(&self.repulsion)?,
             value(&self.attraction)?,
-            self.repulsion_range.positive(constants, source)?,
-            self.attraction_range.positive(constants, source)?,
+            self.repulsion_range.positive(constants)?,
+            self.attraction_range.positive(constants)?,
         ))
     }
 }

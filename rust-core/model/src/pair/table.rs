@@ -1,7 +1,7 @@
 use super::{FormEntry, PairForm};
 use crate::curve::{Spline, read_spline};
 use crate::document::keys::{Key, OPTIONAL, REQUIRED, ValueKind, keys};
-use crate::document::{FileError, FileErrorKind, Located, Section, Source};
+use crate::document::{FileError, Place, Section};
 use crate::number::Number;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,7 +31,8 @@ impl TablePair {
 #[derive(Debug, Clone)]
 pub struct TableEntry {
     spline: Arc<Spline>,
-    file: Located<String>,
+    /// The name of the file in the model.
+    file: Place,
     range: Option<Number>,
 }
 
@@ -39,11 +40,11 @@ impl FormEntry for TableEntry {
     type Form = TablePair;
 
     const KEYS: &'static [Key] = keys! {
-        "file" [&["table"]]: ValueKind::TableFile, REQUIRED,
+        "file": ValueKind::TableFile, REQUIRED,
             "Rows of `r` and `phi`, as for a table of psi; the cubic spline through them. It is not shifted, \
              and must end at 0."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"";
-        "range" [&["table"]]: ValueKind::NumberOrFormula, OPTIONAL,
+        "range": ValueKind::NumberOrFormula, OPTIONAL,
             "The distance at and beyond which the potential is zero; the last `r` of the table if left out."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"\nrange = 1.0";
     };
@@ -52,22 +53,22 @@ impl FormEntry for TableEntry {
         let file = table.require("file")?;
         Ok(TableEntry {
             spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
-            file: file.string()?,
+            file: file.place().clone(),
             range: table.get("range").map(|value| Number::read(&value)).transpose()?,
         })
     }
 
-    fn bind(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<TablePair, FileError> {
+    fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<TablePair, FileError> {
         let [_, last] = self.spline.ends();
         let range = match &self.range {
-            Some(number) => number.positive(constants, source)?,
+            Some(number) => number.positive(constants)?,
             None => last,
         };
         if let Some(number) = self.range.as_ref().filter(|_| range > last) {
             let message = format!("is beyond the last r of the table, {last}");
-            return Err(number.evaluate(constants, source)?.error(source, FileErrorKind::Value(message)));
+            return Err(number.evaluate(constants)?.error(message));
         }
-        check(&self.spline, range).map_err(|m| self.file.error(source, FileErrorKind::Value(m)))?;
+        check(&self.spline, range).map_err(|message| self.file.error(message))?;
         Ok(TablePair::new(Arc::clone(&self.spline), range))
     }
 }

@@ -38,9 +38,9 @@ pub enum PresetError {
     NoPotential {
         /// The coefficient, `B` or `rd`.
         name: &'static str,
-        /// Its value for one pair.
+        /// The coefficient of one pair.
         first: f64,
-        /// Its different value for another pair.
+        /// The coefficient of another pair.
         second: f64,
     },
     /// The model file's reader refuses a coefficient.
@@ -48,22 +48,25 @@ pub enum PresetError {
     File(#[from] FileError),
 }
 
-/// The upper triangle of a row-major table: indices of the species and their coefficients.
-pub(super) fn upper_triangle(
+/// The upper triangle of a row-major table: indices of the species and their coefficients, `nothing` where a pair has none.
+pub(super) fn upper_triangle<P: Copy>(
     species: usize,
-    pairs: &[Option<WarrenPair>],
-) -> Result<Vec<(usize, usize, WarrenPair)>, PresetError> {
+    pairs: &[Option<P>],
+    nothing: Option<P>,
+) -> Result<Vec<(usize, usize, P)>, PresetError> {
     if species == 0 || pairs.len() != species * species {
         return Err(PresetError::Shape);
     }
-    let mut upper = Vec::new();
-    for i in 0..species {
-        for j in i..species {
-            let pair = pairs[i * species + j].ok_or(PresetError::Missing(i + 1, j + 1))?;
-            upper.push((i, j, pair));
-        }
-    }
-    Ok(upper)
+    let of = |(i, j): (usize, usize)| {
+        let pair = pairs[i * species + j].or(nothing).ok_or(PresetError::Missing(i + 1, j + 1))?;
+        Ok((i, j, pair))
+    };
+    (0..species).flat_map(|i| (i..species).map(move |j| (i, j))).map(of).collect()
+}
+
+/// The names of species as strings of a model file.
+pub(super) fn quoted(species: &[String]) -> Vec<String> {
+    species.iter().map(|name| format!("\"{name}\"")).collect()
 }
 
 /// Writes pair forces and thermostats, as a part of a model file.

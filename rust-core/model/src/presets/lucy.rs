@@ -8,7 +8,7 @@
 //! `ρ` is a mass density summed over all types, so that these forces have no potential unless all `B_ij` and
 //! `r_d,ij` are equal (Warren, Phys. Rev. E 87, 045303 (2013)); with Lucy's kernel they never have one.
 
-use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
+use super::coefficients::{PresetError, WarrenPair, pair_text, quoted, upper_triangle};
 use crate::file::Model;
 use std::fmt::Write;
 
@@ -21,14 +21,14 @@ use std::fmt::Write;
 ///
 /// # Errors
 /// Fails for a pair without coefficients, and if the number of masses differs from that of species.
-pub fn lucy_mdpd_text(
+pub(super) fn lucy_mdpd_text(
     species: &[String],
     pairs: &[Option<WarrenPair>],
     masses: &[f64],
     dimensions: usize,
 ) -> Result<String, PresetError> {
     let count = species.len();
-    let upper = upper_triangle(count, pairs)?;
+    let upper = upper_triangle(count, pairs, None)?;
     if masses.len() != count {
         return Err(PresetError::Shape);
     }
@@ -44,7 +44,7 @@ pub fn lucy_mdpd_text(
         table[j * count + i] = (density, *pair);
     }
 
-    let names: Vec<String> = species.iter().map(|s| format!("\"{s}\"")).collect();
+    let names = quoted(species);
     let mut text = format!(
         "title = \"LAMMPS's mdpd: Warren's A/B model with Lucy's kernel\"\n\
          reference = \"P. B. Warren, Phys. Rev. E 68, 066702 (2003), and 87, 045303 (2013)\"\n\
@@ -100,10 +100,11 @@ fn strength(pair: WarrenPair, dimensions: usize) -> String {
     if dimensions == 2 { format!("(pi/24*{rd:?}^3*({b:?}))") } else { format!("(pi/30*{rd:?}^4*({b:?}))") }
 }
 
-/// Builds the model of [`lucy_mdpd_text`].
+/// Builds the model of the law of LAMMPS's `mdpd` for species `species` of masses `masses`, with `pairs` a row-major table of
+/// the coefficients (the upper triangle is read). `A`, `B`, `γ`, `r_c` and `r_d` may all differ by pair.
 ///
 /// # Errors
-/// Fails as [`lucy_mdpd_text`]; also for a range that is not positive, a negative γ, or more than 16 different `r_d`.
+/// Fails for a pair without coefficients, and if the number of masses differs from that of species; also for a range that is not positive, a negative γ, or more than 16 different `r_d`.
 pub fn lucy_mdpd(
     species: &[String],
     pairs: &[Option<WarrenPair>],

@@ -6,6 +6,6 @@ mod spline;
 mod warren;
 
 pub use coefficients::{PresetError, WarrenPair};
-pub use lucy::{lucy_mdpd, lucy_mdpd_text};
-pub use spline::{SplinePair, spline_dpd, spline_dpd_text};
+pub use lucy::lucy_mdpd;
+pub use spline::{SplinePair, spline_dpd};
 pub use warren::{ForceLaw, warren_ab, warren_ab_text};

@@ -1,7 +1,7 @@
 //! DPD with a repulsive–attractive pair potential, from the coefficients of a LAMMPS style, written as
 //! a model file: `φ = a [A W(r, r_A) − B W(r, r_B)]`.
 
-use super::coefficients::PresetError;
+use super::coefficients::{PresetError, quoted, upper_triangle};
 use crate::file::Model;
 use std::fmt::Write;
 
@@ -22,23 +22,19 @@ pub struct SplinePair {
     pub gamma: f64,
 }
 
-/// Writes the model file of spline DPD for species `species`. `pairs` is a row-major table of the
+/// Builds the model of spline DPD for species `species`, as a model file. `pairs` is a row-major table of the
 /// coefficients, of which the upper triangle is read; pairs without coefficients do not interact. All
 /// pairs share the range of the thermostat.
 ///
 /// # Errors
-/// Fails for a table that is not square, or without any coefficients.
-pub fn spline_dpd_text(
+/// Fails for a table that is not square, or empty; also for a range that is not positive or a negative γ.
+pub fn spline_dpd(
     species: &[String],
     pairs: &[Option<SplinePair>],
     thermostat_range: f64,
     dimensions: usize,
-) -> Result<String, PresetError> {
-    let count = species.len();
-    if count == 0 || pairs.len() != count * count {
-        return Err(PresetError::Shape);
-    }
-    let names: Vec<String> = species.iter().map(|s| format!("\"{s}\"")).collect();
+) -> Result<Model, PresetError> {
+    let names = quoted(species);
     let mut text = format!(
         "title = \"DPD with a spline potential\"\ndimensions = {dimensions}\nspecies = [{}]\n",
         names.join(", "),
@@ -51,39 +47,17 @@ pub fn spline_dpd_text(
         attraction_range: thermostat_range,
         gamma: 0.0,
     };
-    for i in 0..count {
-        for j in i..count {
-            let pair = pairs[i * count + j].unwrap_or(nothing);
-            let between = format!("between = [{}, {}]", names[i], names[j]);
-            // Writing to a String cannot fail.
-            let _ = write!(
-                text,
-                "\n[[pair]]\n{between}\nform = \"spline\"\nstrength = {:?}\nA = {:?}\nB = {:?}\n\
-                 range_A = {:?}\nrange_B = {:?}\n\n[[thermostat]]\n{between}\ngamma = {:?}\n\
-                 range = {thermostat_range:?}\n",
-                pair.strength,
-                pair.repulsion,
-                pair.attraction,
-                pair.repulsion_range,
-                pair.attraction_range,
-                pair.gamma,
-            );
-        }
+    for (i, j, pair) in upper_triangle(species.len(), pairs, Some(nothing))? {
+        let between = format!("between = [{}, {}]", names[i], names[j]);
+        let SplinePair { strength, repulsion, attraction, repulsion_range, attraction_range, gamma } = pair;
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "\n[[pair]]\n{between}\nform = \"spline\"\nstrength = {strength:?}\nA = {repulsion:?}\n\
+             B = {attraction:?}\nrange_A = {repulsion_range:?}\nrange_B = {attraction_range:?}\n\n\
+             [[thermostat]]\n{between}\ngamma = {gamma:?}\nrange = {thermostat_range:?}\n",
+        );
     }
-    Ok(text)
-}
-
-/// Builds the model of [`spline_dpd_text`].
-///
-/// # Errors
-/// Fails as [`spline_dpd_text`]; also for a range that is not positive or a negative γ.
-pub fn spline_dpd(
-    species: &[String],
-    pairs: &[Option<SplinePair>],
-    thermostat_range: f64,
-    dimensions: usize,
-) -> Result<Model, PresetError> {
-    let text = spline_dpd_text(species, pairs, thermostat_range, dimensions)?;
     Ok(Model::parse("dpd/spline", &text)?)
 }
 

@@ -4,7 +4,7 @@
 //! With the quadratic kernel it is the gradient of `φ = ½ A r_c (1 − r/r_c)²` and `ψ = c_d r_d^{d+1} B n²`, `c_3 =
 //! π/30`, `c_2 = π/24` (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) / (2 c_d r_d^{d+1})`.
 
-use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
+use super::coefficients::{PresetError, WarrenPair, pair_text, quoted, upper_triangle};
 use super::lucy::lucy_mdpd_text;
 use crate::file::Model;
 use std::fmt::Write;
@@ -33,7 +33,7 @@ pub fn warren_ab_text(
     if law == ForceLaw::LucyLammps {
         return lucy_mdpd_text(species, pairs, &vec![1.0; species.len()], dimensions);
     }
-    let upper = upper_triangle(species.len(), pairs)?;
+    let upper = upper_triangle(species.len(), pairs, None)?;
     let first = upper[0].2;
     for (_, _, pair) in &upper {
         if pair.b != first.b {
@@ -44,7 +44,7 @@ pub fn warren_ab_text(
         }
     }
     let coefficient = if dimensions == 2 { "pi/24 * rd^3" } else { "pi/30 * rd^4" };
-    let names: Vec<String> = species.iter().map(|s| format!("\"{s}\"")).collect();
+    let names = quoted(species);
     let mut text = format!(
         "title = \"Warren A/B model\"\n\
          reference = \"P. B. Warren, Phys. Rev. E 68, 066702 (2003)\"\n\

@@ -1,18 +1,20 @@
 //! Tests the choice of the path, and that all paths give the same results.
 
+mod special;
+
 use super::*;
 use crate::engine::{Around, Images, Newton, PairsOfHost, Precision, Step};
 use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 use psidpd_passes::noise::threefry2x32;
 
 /// A fluid whose ψ is not linear in its only density.
-pub(super) fn warren() -> Fluid {
+fn warren() -> Fluid {
     let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
     warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap().at(1.0).unwrap()
 }
 
 /// A fluid whose ψ is linear in m, which needs no pass.
-pub(super) fn two_densities() -> Fluid {
+fn two_densities() -> Fluid {
     let text = "title = \"two\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
         [density.m]\nkernel = \"lucy\"\nrange = 1.0\nself = true\n[excess_free_energy]\nA = \"n^2 + m_B\"\n\
         B = \"n*n_A - 2*m\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
@@ -20,13 +22,13 @@ pub(super) fn two_densities() -> Fluid {
 }
 
 /// A fluid whose forces need both densities, one with a self term.
-pub(super) fn two_passes() -> Fluid {
+fn two_passes() -> Fluid {
     let text = "title = \"two\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
         [density.m]\nkernel = \"lucy\"\nrange = 1.0\nself = true\n[excess_free_energy]\nA = \"n^2 + m^2\"\n";
     Model::parse("passes", text).unwrap().at(1.0).unwrap()
 }
 
-pub(super) struct Cloud {
+struct Cloud {
     pub domain: PeriodicBox,
     pub x: Vec<[f64; 3]>,
     v: Vec<[f64; 3]>,
@@ -37,7 +39,7 @@ pub(super) struct Cloud {
 const STEP: Step = Step { seed: 3, number: 5, dt: 0.01 };
 
 impl Cloud {
-    pub(super) fn new(lengths: [f64; 3], count: u32, species: i32) -> Cloud {
+    fn new(lengths: [f64; 3], count: u32, species: i32) -> Cloud {
         let domain = PeriodicBox::orthogonal([-1.0, 0.5, 2.0], lengths, [true; 3]).unwrap();
         let uniform = |k: u32| f64::from(threefry2x32::<20>([k, 0], [5, 9])[0]) / 4_294_967_296.0;
         Cloud {
@@ -49,13 +51,13 @@ impl Cloud {
         }
     }
 
-    pub(super) fn request(&self, want: Want) -> Request<'_> {
+    fn request(&self, want: Want) -> Request<'_> {
         let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
         Request { particles, v: &self.v, step: Some(STEP), want }
     }
 
     /// Adds images along `along` as ghosts; returns the owners of the ghosts too.
-    pub(super) fn with_ghosts(&self, along: [bool; 3]) -> (Cloud, Images) {
+    fn with_ghosts(&self, along: [bool; 3]) -> (Cloud, Images) {
         let lengths = self.domain.lengths();
         let domain = PeriodicBox::orthogonal(self.domain.origin(), lengths, along).unwrap();
         let mut all = Cloud {
@@ -74,20 +76,20 @@ impl Cloud {
     }
 }
 
-pub(super) fn engine(fluid: &Fluid) -> Engine {
+fn engine(fluid: &Fluid) -> Engine {
     Engine::new(fluid, Settings { precision: Precision::Double, ..Settings::default() }).unwrap()
 }
 
-pub(super) type Outcome = (Tally, Vec<[f64; 3]>, Vec<f64>);
+type Outcome = (Tally, Vec<[f64; 3]>, Vec<f64>);
 
-pub(super) fn in_box(engine: &mut Engine, cloud: &Cloud, want: Want) -> Outcome {
+fn in_box(engine: &mut Engine, cloud: &Cloud, want: Want) -> Outcome {
     let mut force = vec![[7.0; 3]; cloud.x.len()];
     let tally = engine.forces(&cloud.domain, &cloud.request(want), &mut force, false).unwrap();
     (tally, force, engine.results().densities.to_vec())
 }
 
 /// Runs both halves; copies slopes to ghosts and, if ghosts get forces, returns these to the owners.
-pub(super) fn with_ghosts(
+fn with_ghosts(
     engine: &mut Engine,
     surroundings: Surroundings,
     all: &Cloud,
@@ -109,7 +111,7 @@ pub(super) fn with_ghosts(
     (tally, force, engine.results().densities.to_vec())
 }
 
-pub(super) fn agree(a: &Outcome, b: &Outcome) {
+fn agree(a: &Outcome, b: &Outcome) {
     let close =
         |a: f64, b: f64, what: &str| assert!((a - b).abs() < 1e-8 * (100.0 + b.abs()), "{what}: {a} {b}");
     close(a.0.energy(), b.0.energy(), "energy");

@@ -13,7 +13,7 @@ use crate::model::expression::TooLarge;
 use crate::model::pair::PairForm;
 use crate::model::{Fluid, PairTerm};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::tally::{Tally, Want};
+use psidpd_passes::tally::Tally;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Evaluates configurations of one fluid at one temperature.
@@ -128,17 +128,7 @@ impl Evaluator {
             pair_force: &mut pair_forces,
             tally: Tally::default(),
         };
-        let input = ForceInput {
-            plan: &self.plan,
-            list: pairs.force(),
-            newton: Newton::On,
-            owned,
-            slopes: &psi.slopes,
-            v: &[],
-            tag: &[],
-            thermostat: None,
-            want: Want::TOTALS,
-        };
+        let input = ForceInput::conservative(&self.plan, pairs.force(), owned, &psi.slopes);
         add_forces(&input, &mut output);
         let tally = output.tally;
         let mut excess = vec![0.0; self.fluid.species.len()];

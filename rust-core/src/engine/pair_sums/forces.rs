@@ -28,6 +28,19 @@ pub struct ForceInput<'a> {
     pub want: Want,
 }
 
+impl<'a> ForceInput<'a> {
+    /// Input for conservative forces on all particles of a list.
+    pub fn conservative(
+        plan: &'a Plan,
+        list: &'a PairList,
+        owned: usize,
+        slopes: &'a [f64],
+    ) -> ForceInput<'a> {
+        let (newton, want) = (Newton::On, Want::TOTALS);
+        ForceInput { plan, list, newton, owned, slopes, v: &[], tag: &[], thermostat: None, want }
+    }
+}
+
 /// Arrays that a force pass adds to.
 pub struct ForceOutput<'a> {
     pub force: &'a mut [[f64; 3]],

@@ -3,8 +3,6 @@
 use super::PairSums;
 use super::forces::{Block, ForceInput};
 use super::pairs::PairList;
-use crate::engine::surroundings::Newton;
-use psidpd_passes::tally::Want;
 
 impl PairSums {
     /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the distance `r`, with the given
@@ -26,17 +24,7 @@ impl PairSums {
         };
         let mut list = PairList::default();
         list.push(0, 1, [r, 0.0, 0.0], &[a, b]);
-        let input = ForceInput {
-            plan: &self.plan,
-            list: &list,
-            newton: Newton::On,
-            owned: 2,
-            slopes: &both,
-            v: &[],
-            tag: &[],
-            thermostat: None,
-            want: Want::TOTALS,
-        };
+        let input = ForceInput::conservative(&self.plan, &list, 2, &both);
         let mut pair = Block::<1>::new();
         pair.conserve(&input, 0, 1, true);
         (pair.excess_i[0] + pair.excess_j[0] + pair.pair[0], pair.conservative[0])

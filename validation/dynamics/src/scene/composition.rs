@@ -29,7 +29,7 @@ impl Composition {
         let mut fractions = vec![0.0; count];
         for (name, value) in section.entries() {
             let Some(index) = species.iter().position(|s| *s == name.value) else {
-                return Err(name.error(section.source(), unknown_species(&name.value, species)));
+                return Err(name.error(unknown_species(&name.value, species)));
             };
             let fraction = value.number()?.value;
             if !(0.0..=1.0).contains(&fraction) {

@@ -15,7 +15,7 @@ pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec
     for (name, value) in section.entries() {
         let Some(index) = species.iter().position(|s| *s == name.value) else {
             let kind = unknown_species(&name.value, species);
-            return Err(name.error(section.source(), kind));
+            return Err(name.error(kind));
         };
         mass[index] = value.positive()?;
     }

@@ -1,4 +1,4 @@
-use super::*;
+use super::super::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 

@@ -1,6 +1,5 @@
 //! Compares pairs with reduced strength, on every path, with a list of all pairs and their factors.
 
-use super::tests::*;
 use super::*;
 use crate::engine::{Around, Instructions, Mark, Newton, PairsOfHost, Precision};
 use std::collections::HashMap;

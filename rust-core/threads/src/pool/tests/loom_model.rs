@@ -1,7 +1,7 @@
 //! Tests the pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test
 //! --release -p psidpd-threads`. Loom finds data races, missed wake-ups and deadlocks.
 
-use super::*;
+use super::super::*;
 use loom::cell::UnsafeCell;
 
 /// Numbers that a piece of work writes; loom detects concurrent access to them.
