@@ -108,7 +108,8 @@ impl GpuForces {
         }
         let domain = self.region(around.domain, &x[..owned])?;
         let machine = &mut self.machine;
-        let geometry = Geometry::new(&domain, machine.fluid.dimensions, machine.fluid.cutoff()).map_err(failed)?;
+        let geometry =
+            Geometry::new(&domain, machine.fluid.dimensions, machine.fluid.cutoff()).map_err(failed)?;
         for k in 0..x.len() {
             let species = usize::try_from(kind[k]).ok().and_then(|kind| self.species_of_kind.get(kind));
             let species = *species.ok_or(EngineError::Kind { tag: tag[k], kind: kind[k] })?;
@@ -159,20 +160,19 @@ impl GpuForces {
     }
 
     /// Reads `width` numbers of each owned particle and, if asked for, the totals; fails if a kernel found a fault.
-    fn collect(
-        &mut self,
-        width: usize,
-        totals: bool,
-    ) -> Result<(Vec<f32>, Status, Totals), EngineError> {
+    fn collect(&mut self, width: usize, totals: bool) -> Result<(Vec<f32>, Status, Totals), EngineError> {
         let numbers = self.owned * width;
         let machine = &mut self.machine;
-        let Some(arrays) = &machine.arrays else { return Err(EngineError::Host("nothing has been evaluated")) };
+        let Some(arrays) = &machine.arrays else {
+            return Err(EngineError::Host("nothing has been evaluated"));
+        };
         let sums = if totals { machine.bytes_of_sums() } else { 0 };
         let status = size_of::<Status>();
         let parts = [(EXCHANGE, 4 * numbers as u64), (STATUS, status as u64), (SUMS, sums)]
             .map(|(k, bytes)| (&arrays.buffers[k], bytes));
         let mut found: Vec<f32> = read(&machine.device, &parts).map_err(failed)?;
-        let status: Status = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&found[numbers..][..status / 4]));
+        let status: Status =
+            bytemuck::pod_read_unaligned(bytemuck::cast_slice(&found[numbers..][..status / 4]));
         match machine.fault(&status).map(|fault| fault(0)) {
             None => {}
             Some(Stop::Force { tag, .. }) => return Err(EngineError::Force { tag }),
@@ -208,7 +208,12 @@ impl GpuForces {
     }
 
     /// The last kernels of an evaluation. Adds the forces to those of the host.
-    fn finish(&mut self, request: &Request, force: &mut [[f64; 3]], densities: bool) -> Result<Tally, EngineError> {
+    fn finish(
+        &mut self,
+        request: &Request,
+        force: &mut [[f64; 3]],
+        densities: bool,
+    ) -> Result<Tally, EngineError> {
         if self.places.is_empty() {
             return Ok(Tally::default());
         }
