@@ -217,10 +217,12 @@ impl Engine {
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
         let fits = match surroundings {
             Surroundings::Listed(..) => return Path::PairSums(Reason::ListedPairs),
-            Surroundings::Box(domain) | Surroundings::Ghosts(Around { domain, .. }, _) => match &self.device {
-                Some(device) => device.fits(domain),
-                None => self.sweep.sweep.fits(domain),
-            },
+            Surroundings::Box(domain) | Surroundings::Ghosts(Around { domain, .. }, _) => {
+                match &self.device {
+                    Some(device) => device.fits(domain),
+                    None => self.sweep.sweep.fits(domain),
+                }
+            }
         };
         if self.pair_sums_only {
             Path::PairSums(Reason::Asked)
@@ -299,11 +301,7 @@ impl Engine {
     }
 
     /// Chooses the path of a new evaluation.
-    fn begin(
-        &mut self,
-        surroundings: Surroundings,
-        want: Want,
-    ) -> Result<&mut dyn Evaluate, EngineError> {
+    fn begin(&mut self, surroundings: Surroundings, want: Want) -> Result<&mut dyn Evaluate, EngineError> {
         static NUMBER: AtomicU64 = AtomicU64::new(1);
         self.number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = self.path_for(surroundings, want);
@@ -346,7 +344,10 @@ impl Engine {
         // Densities after an evaluation on a GPU are summed by this engine.
         let last: &dyn Evaluate = if self.path == Some(Path::Device) { &self.sweep } else { self.last() };
         let results = last.results();
-        Results { order: results.order.filter(|_| self.path.is_some_and(|path| path != Path::Device)), ..results }
+        Results {
+            order: results.order.filter(|_| self.path.is_some_and(|path| path != Path::Device)),
+            ..results
+        }
     }
 
     /// Every density of the model in the last evaluation, for `particles` that have not moved since;
