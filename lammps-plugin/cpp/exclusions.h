@@ -30,6 +30,8 @@ class Exclusions {
   int rules() const { return rules_at_setup; }
   // Whether there are as many rules as at setup.
   bool are_known(const LAMMPS_NS::Neighbor *neighbor) const { return count(neighbor) == rules_at_setup; }
+  // Whether any pairs are excluded; all ranks agree.
+  bool exclude(int **setflag) const { return rules_at_setup > 0 || !pairs_elsewhere(setflag).empty(); }
   // LAMMPS asked for the cut-off of a pair of types: a hybrid asks for its own pairs only.
   void ask(int i, int j) { asked[static_cast<size_t>(i - 1) * types + j - 1] = 1; }
   // Pairs of types with coefficients that a hybrid gives to other styles alone.

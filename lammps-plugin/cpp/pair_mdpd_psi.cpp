@@ -42,7 +42,7 @@ class PairMDPDPsi : public PairTable {
     return true;
   }
 
-  std::string keywords() const override { return "'law', 'precision' or 'threads'"; }
+  std::string keywords() const override { return "'law', 'precision', 'threads' or 'device'"; }
 
   void check(const Coefficients &given) override
   {

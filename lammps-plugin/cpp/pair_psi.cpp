@@ -125,6 +125,8 @@ void PairPsi::read_keywords(int first, int narg, char **arg)
 {
   given.mixed = false;
   given.threads = 1;
+  given.device = "cpu";
+  bool asks_double = false;
   for (int k = first; k < narg; k += 2) {
     const std::string key = arg[k];
     if (k + 1 >= narg) stop("keyword '" + key + "' needs a value");
@@ -134,6 +136,9 @@ void PairPsi::read_keywords(int first, int narg, char **arg)
       if (value != "mixed" && value != "double")
         stop("unknown precision '" + value + "': expected 'mixed' or 'double'");
       given.mixed = value == "mixed";
+      asks_double = value == "double";
+    } else if (key == "device") {
+      given.device = value;
     } else if (key == "threads") {
       const int count = utils::inumeric(FLERR, value.c_str(), false, lmp);
       given.threads = std::max(count, 0);
@@ -141,6 +146,7 @@ void PairPsi::read_keywords(int first, int narg, char **arg)
       stop("unknown keyword '" + key + "': expected " + keywords());
     }
   }
+  if (has_device() && asks_double) stop("a GPU computes in single precision: leave out 'precision double'");
 }
 
 void PairPsi::settings(int narg, char **arg)
@@ -167,6 +173,7 @@ void PairPsi::refresh()
     else
       (*style)->set_temperature(kt());
     (*style)->configure(given.mixed, given.threads);
+    (*style)->use_device(given.device);
   } catch (const std::exception &e) {
     trouble = e.what();
   }
@@ -203,6 +210,7 @@ void PairPsi::init_style()
       if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
   }
   if (!why_listed.empty()) listed.full = request_list(neighbor, this, instance_me, 0);
+  check_device();
   // With newton off a half list contains the pairs of owned atoms with ghosts on both sides, which is sufficient.
   if (!why_listed.empty() && !listed.full && force->newton_pair)
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
@@ -230,7 +238,7 @@ std::string PairPsi::advice()
 {
   std::string text;
   const auto add = [&text](const std::string &line) { text += "  advice        " + line + "\n"; };
-  if (why_listed.empty() && !given.mixed) add("'precision mixed' evaluates forces some 1.3 times faster");
+  if (why_listed.empty() && !given.mixed && !has_device()) add("'precision mixed' evaluates forces some 1.3 times faster");
   // Bonds and other styles leave forces on ghosts, and need them.
   if (why_listed.empty() && force->pair == this && atom->molecular == Atom::ATOMIC) {
     if (force->newton)

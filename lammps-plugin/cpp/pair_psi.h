@@ -80,7 +80,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Reads a keyword of this style alone; returns whether it is known.
   virtual bool read_keyword(const std::string & /*key*/, const std::string & /*value*/) { return false; }
   // Names of the keywords, for messages.
-  virtual std::string keywords() const { return "'precision' or 'threads'"; }
+  virtual std::string keywords() const { return "'precision', 'threads' or 'device'"; }
 
   void allocate();
   // Read and check the temperature and the seed of pair_style.
@@ -119,6 +119,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   void check_ghosts();
   void check_lost();
   void check_callers();
+  bool has_device() const { return given.device != "cpu"; }
+  void check_device();
   void advise();
   std::string advice();
   // Whether the last evaluation contained this pair.
@@ -145,6 +147,7 @@ class PairPsi : public LAMMPS_NS::Pair {
     uint64_t seed = 0;
     bool mixed = false;
     size_t threads = 1;
+    std::string device;
     std::vector<std::string> arguments;
   };
   Given given;

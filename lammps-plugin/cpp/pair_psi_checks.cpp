@@ -73,6 +73,16 @@ void PairPsi::check_callers()
            "a many-body style");
 }
 
+// Stops at what only the CPU computes. Exclusions are checked when they are found.
+void PairPsi::check_device()
+{
+  if (!has_device()) return;
+  if (SpecialPairs::are_scaled(atom, force))
+    stop("device gpu computes all pairs at full strength: use 'special_bonds lj 1 1 1', or device cpu");
+  if (!why_listed.empty())
+    stop("device gpu takes no pairs from a neighbor list, which this run needs because of " + why_listed + ": use device cpu");
+}
+
 // Two images of one pair would draw the same noise in a box shorter than twice its range.
 void PairPsi::check_box()
 {

@@ -123,6 +123,9 @@ void PairPsi::compute(int eflag, int vflag)
     special.find(atom, force, why_listed.empty());
     const std::string trouble = exclusions.find(atom, neighbor, group, setflag, why_listed.empty());
     if (!trouble.empty()) stop(trouble);
+    if (has_device() && exclusions.exclude(setflag))
+      stop("device gpu computes all pairs: it cannot leave out those of neigh_modify exclude, or those that a hybrid gives "
+           "to other styles; use device cpu");
   }
 
   const size_t owned = atom->nlocal;
@@ -270,6 +273,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (!density && strcmp(what, "psi") != 0) return nullptr;
   refresh();
   columns = 0;
+  if (!density && has_device()) stop("device gpu has no psi of single atoms: use device cpu");
   if (!density) return attempt([&] { return const_cast<double *>((*style)->excess_of_owned().data()); });
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;

@@ -181,6 +181,8 @@ mod ffi {
         fn noise_range(self: &Style) -> f64;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
+        /// Evaluates on the device of a name: `cpu`, `gpu` or `gpu:N`.
+        fn use_device(self: &mut Style, name: &str) -> Result<()>;
         fn threads(self: &Style) -> usize;
         /// Sets the pairs with reduced strength for all later evaluations, unless LAMMPS lists the pairs.
         fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
@@ -528,7 +530,7 @@ impl Style {
             let domain = self.scale().domain(domain);
             self.engine().path_for(Surroundings::Box(&domain), want)
         };
-        guard(|| Ok(domain_of(extent).is_ok_and(|domain| path(domain) == Path::Sweep)))
+        guard(|| Ok(domain_of(extent).is_ok_and(|domain| matches!(path(domain), Path::Sweep | Path::Device))))
     }
 
     fn fetch_slopes(&mut self, all: usize) -> Result<(), StyleError> {

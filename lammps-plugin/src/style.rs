@@ -1,5 +1,6 @@
 //! The engine of one pair style, and the mapping from LAMMPS's types to species.
 
+mod device;
 mod model;
 
 use crate::converted::{Converted, times};
@@ -107,7 +108,12 @@ impl Style {
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
         self.effort_before = self.effort();
-        self.engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
+        let mut engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
+        if let Some(mut device) = self.engine.use_device(None) {
+            device.set_fluid(&self.model.at(self.kt).map_err(|e| StyleError(e.to_string()))?)?;
+            engine.use_device(Some(device));
+        }
+        self.engine = engine;
         self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &self.settings);
         Ok(())
     }
@@ -213,12 +219,16 @@ impl Style {
             text.push_str("  arithmetic    double precision, 1 thread a rank\n");
         } else {
             let exception = EnginePath::PairSums(Reason::ParticleValues);
-            let _ = writeln!(text, "  evaluation    {}; on some steps {exception}", EnginePath::Sweep);
-            let Settings { precision, instructions, threads } = self.engine.settings();
-            let _ = writeln!(
-                text,
-                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
-            );
+            let (path, arithmetic) = match self.engine.device_name() {
+                Some(name) => (name, "single precision".to_owned()),
+                None => {
+                    let Settings { precision, instructions, threads } = self.engine.settings();
+                    let text = format!("{precision} precision, {instructions}, {threads} thread(s) a rank");
+                    (EnginePath::Sweep.to_string(), text)
+                }
+            };
+            let _ = writeln!(text, "  evaluation    {path}; on some steps {exception}");
+            let _ = writeln!(text, "  arithmetic    {arithmetic}");
         }
         text
     }

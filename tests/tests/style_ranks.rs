@@ -83,7 +83,7 @@ fn grid(random: &mut StdRng, ranks: usize, dimensions: usize) -> [usize; 3] {
 }
 
 impl Deck {
-    fn new(random: &mut StdRng, name: &str, ranks: usize, models: &[(String, &str)]) -> Deck {
+    fn new(random: &mut StdRng, name: &str, ranks: usize, models: &[(String, &str)], on_gpu: bool) -> Deck {
         let (path, text) = &models[random.random_range(0..models.len())];
         let model = Model::parse("random", text).unwrap();
         let (dimensions, types) = (model.dimensions(), model.species().len());
@@ -126,6 +126,8 @@ impl Deck {
             if mixed { "mixed" } else { "double" },
             1 + random.random_range(0..2)
         );
+        let (style, mixed) =
+            if on_gpu { (format!("dpd/psi 1.0 {SEED} device gpu"), true) } else { (style, mixed) };
         let names = model.species().join(" ");
         let style = match hybrid {
             true => format!("pair_style hybrid {style}\npair_coeff * * dpd/psi \"{path}\" {names}\n"),
@@ -207,7 +209,7 @@ const MIXED: f64 = 2e-4;
 
 /// Boxes from 2.4 cut-offs, tilted ones and such with open sides, in two and three dimensions; any division among ranks,
 /// skins, newton on and off, drops in a corner, hybrids, tiled and balanced layouts.
-fn random_decks(for_each_number_of_ranks: usize) {
+fn random_decks(all_ranks: &[usize], for_each_number_of_ranks: usize, on_gpu: bool) {
     let folder = tempfile::tempdir().unwrap();
     let shipped = |name: &str| std::fs::read_to_string(root().join("validation/models").join(name)).unwrap();
     let texts =
@@ -220,10 +222,11 @@ fn random_decks(for_each_number_of_ranks: usize) {
         })
         .collect();
     let mut random = StdRng::seed_from_u64(30);
-    for ranks in RANKS {
+    for &ranks in all_ranks {
         let name = |k: usize| format!("deck-{k}");
-        let decks: Vec<Deck> =
-            (0..for_each_number_of_ranks).map(|k| Deck::new(&mut random, &name(k), ranks, &models)).collect();
+        let decks: Vec<Deck> = (0..for_each_number_of_ranks)
+            .map(|k| Deck::new(&mut random, &name(k), ranks, &models, on_gpu))
+            .collect();
         let texts: Vec<String> = decks.iter().map(|deck| deck.text.clone()).collect();
         run_all(folder.path(), &texts, ranks);
         for (k, deck) in decks.iter().enumerate() {
@@ -234,14 +237,21 @@ fn random_decks(for_each_number_of_ranks: usize) {
 
 #[test]
 fn random_decks_have_the_forces_of_the_model_on_any_ranks() {
-    random_decks(3);
+    random_decks(&RANKS, 3, false);
 }
 
 /// Eight ranks on two cores wait for each other most of the time: ten minutes and more.
 #[test]
 #[ignore = "takes over ten minutes on two cores"]
 fn a_hundred_random_decks_have_the_forces_of_the_model_on_any_ranks() {
-    random_decks(20);
+    random_decks(&RANKS, 20, false);
+}
+
+/// Ranks share one device.
+#[test]
+#[ignore = "needs a plugin with `device gpu`, and Vulkan: .ci/gpu"]
+fn random_decks_have_the_forces_of_the_model_on_a_gpu() {
+    random_decks(&[1, 2, 3], 8, true);
 }
 
 /// A balanced drop keeps the style's own search in a tiled layout, and the log says what such a layout costs.

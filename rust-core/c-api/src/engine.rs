@@ -249,7 +249,8 @@ pub unsafe extern "C" fn psidpd_engine_path(
         engine.path_text = c_text(&path.to_string());
         out_text.put(engine.path_text.as_ptr());
         out.put(match path {
-            engine::Path::Sweep => Path::Sweep,
+            // This interface has no GPU.
+            engine::Path::Sweep | engine::Path::Device => Path::Sweep,
             engine::Path::PairSums(_) => Path::Reference,
         });
         Ok(())

@@ -1,7 +1,8 @@
 //! The devices of this machine.
 
 use crate::GpuError;
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, Mutex};
 use wgpu::{Adapter, Backend, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
 
 /// A device that can run simulations.
@@ -17,6 +18,13 @@ pub struct DeviceInfo {
     pub kind: String,
     /// Name and version of the driver.
     pub driver: String,
+}
+
+impl fmt::Display for DeviceInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let DeviceInfo { index, name, backend, driver, .. } = self;
+        write!(f, "gpu:{index}, {name} ({backend}, {driver})")
+    }
 }
 
 /// Lists the devices: graphics cards first, then devices that share the processor's memory, then software.
@@ -67,6 +75,8 @@ pub struct Device {
     pub(crate) queue: wgpu::Queue,
     pub(crate) limits: Arc<Limits>,
     pub(crate) has_timestamps: bool,
+    /// Memory that both sides see, through which results come back.
+    pub(crate) staging: Arc<Mutex<Option<wgpu::Buffer>>>,
 }
 
 /// Storage buffers that the kernels bind.
@@ -106,7 +116,8 @@ impl Device {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| failed(error.to_string()))?;
         let has_timestamps = required_features.contains(Features::TIMESTAMP_QUERY);
-        Ok(Device { info, device, queue, limits: Arc::new(limits), has_timestamps })
+        let (limits, staging) = (Arc::new(limits), Arc::default());
+        Ok(Device { info, device, queue, limits, has_timestamps, staging })
     }
 
     /// Describes the device.

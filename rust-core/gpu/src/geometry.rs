@@ -1,6 +1,6 @@
 //! The box in fixed-point coordinates, and its cells.
 
-use crate::{GpuError, Settings, Unsupported};
+use crate::{GpuError, Unsupported};
 use psidpd_core::engine::PeriodicBox;
 
 /// Most cells along a direction, for the 20 leading bits of coordinates decide.
@@ -16,8 +16,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    pub fn new(settings: &Settings, dimensions: usize, cutoff: f64) -> Result<Geometry, GpuError> {
-        let domain = settings.domain.clone();
+    pub fn new(domain: &PeriodicBox, dimensions: usize, cutoff: f64) -> Result<Geometry, GpuError> {
+        let domain = domain.clone();
         let walls = [0, 1, 2].map(|k| k < dimensions && !domain.periodic()[k]);
         let is_tilted = (0..3).any(|k| (0..3).any(|c| c != k && domain.edge(k)[c] != 0.0));
         let refuse = |what: &str| Err(GpuError::Unsupported(Unsupported { what: what.to_owned() }));

@@ -260,22 +260,27 @@ fn module(device: &Device, shader: &Shader) -> Result<wgpu::ShaderModule, GpuErr
     }
 }
 
-/// Copies a part of a buffer to the host.
-pub fn read<T: bytemuck::Pod>(
-    device: &Device,
-    buffer: &wgpu::Buffer,
-    bytes: u64,
-) -> Result<Vec<T>, GpuError> {
-    let staging = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: bytes,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
+/// Copies the beginnings of buffers to the host, one after the other.
+pub fn read<T: bytemuck::Pod>(device: &Device, parts: &[(&wgpu::Buffer, u64)]) -> Result<Vec<T>, GpuError> {
+    let bytes = parts.iter().map(|(_, bytes)| bytes).sum();
+    let mut staging = device.staging.lock().map_err(|error| device.failed(error))?;
+    let staging = match &mut *staging {
+        Some(buffer) if buffer.size() >= bytes => buffer,
+        other => other.insert(device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })),
+    };
     let mut encoder = device.device.create_command_encoder(&Default::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, bytes);
+    let mut to = 0;
+    for (buffer, bytes) in parts.iter().filter(|(_, bytes)| *bytes > 0) {
+        encoder.copy_buffer_to_buffer(buffer, 0, staging, to, *bytes);
+        to += bytes;
+    }
     device.queue.submit([encoder.finish()]);
-    read_mapped(device, &staging, bytes)
+    read_mapped(device, staging, bytes)
 }
 
 fn read_mapped<T: bytemuck::Pod>(

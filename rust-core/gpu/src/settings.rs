@@ -67,6 +67,8 @@ pub enum Rule {
     TwoStage {
         /// The parameter λ.
         lambda: f64,
+        /// The parameter ξ of the force-gradient step: the middle kick has the forces at `x + ξ Δt² F/m`. 0 without.
+        gradient: f64,
         /// Steps from one action of the thermostat to the next.
         every: u64,
     },

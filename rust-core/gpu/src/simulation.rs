@@ -1,6 +1,7 @@
 //! Particles that stay on the device.
 
 mod arrays;
+pub(crate) mod forces;
 mod schedule;
 mod status;
 
@@ -61,7 +62,7 @@ impl GpuSimulation {
     /// along a period, or tilted ones with walls.
     pub fn new(device: &Device, fluid: &Fluid, settings: Settings) -> Result<GpuSimulation, GpuError> {
         check(&settings, fluid)?;
-        let geometry = Geometry::new(&settings, fluid.dimensions, fluid.cutoff())?;
+        let geometry = Geometry::new(&settings.domain, fluid.dimensions, fluid.cutoff())?;
         Ok(GpuSimulation {
             kernels: Kernels::new(device, Shader::new(fluid)?, geometry.is_tilted)?,
             device: device.clone(),
@@ -159,11 +160,14 @@ impl GpuSimulation {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(GpuError::Host("the time step must be positive and finite"));
         }
-        if let Rule::TwoStage { every, .. } = rule {
+        if let Rule::TwoStage { every, gradient, .. } = rule {
             if every == 0 {
                 return Err(GpuError::Host("the thermostat must act every step, or every n-th"));
             }
-            if self.heats(rule) {
+            if gradient != 0.0 && self.geometry.walls() != [0; 3] {
+                return Err(Unsupported { what: "displaced forces between walls".into() }.into());
+            }
+            if self.heats(rule) || gradient != 0.0 {
                 self.allocate(true)?;
             }
         }
@@ -229,21 +233,11 @@ impl GpuSimulation {
         let list = self.record(|runs| runs.all("measure", [0.0; 4], 0));
         self.submit(&list)?;
         let Some(arrays) = &self.arrays else { return Ok(Totals::default()) };
-        let blocks = groups_of(self.count) as usize;
-        let bytes = (blocks * ENTRIES as usize * 4) as u64;
-        let partial: Vec<f32> = read(&self.device, &arrays.buffers[SUMS], bytes)?;
-        let entries = || partial.chunks_exact(ENTRIES as usize);
-        let sum = |k: usize| entries().map(|block| f64::from(block[k])).sum::<f64>();
-        Ok(Totals {
-            excess: sum(0),
-            pair: sum(1),
-            virial: std::array::from_fn(|k| sum(2 + k)),
-            thermostat_virial: std::array::from_fn(|k| sum(8 + k)),
-            momentum_flux: std::array::from_fn(|k| sum(14 + k)),
-            momentum: std::array::from_fn(|k| sum(20 + k)),
-            support_force: std::array::from_fn(|k| sum(23 + k)),
-            largest_force: entries().map(|block| f64::from(block[26])).fold(0.0, f64::max),
-        })
+        Ok(sums_of(&read(&self.device, &[(&arrays.buffers[SUMS], self.bytes_of_sums())])?))
+    }
+
+    fn bytes_of_sums(&self) -> u64 {
+        4 * u64::from(groups_of(self.count) * ENTRIES)
     }
 
     /// Copies all particles to the host, in the device's order, and reuses the memory of the lists. Uploaded again, they
@@ -255,10 +249,10 @@ impl GpuSimulation {
         let Some(arrays) = &self.arrays else { return Ok(()) };
         let bytes = 16 * self.count as u64;
         let buffer = |k: usize| &arrays.buffers[if k == FORCES { k } else { k + 3 * self.side }];
-        let positions: Vec<[u32; 4]> = read(&self.device, buffer(POSITIONS), bytes)?;
-        let velocities: Vec<[f32; 4]> = read(&self.device, buffer(VELOCITIES), bytes)?;
-        let boxes: Vec<[i32; 4]> = read(&self.device, buffer(BOXES), bytes)?;
-        let forces: Vec<[f32; 4]> = read(&self.device, buffer(FORCES), bytes)?;
+        let positions: Vec<[u32; 4]> = read(&self.device, &[(buffer(POSITIONS), bytes)])?;
+        let velocities: Vec<[f32; 4]> = read(&self.device, &[(buffer(VELOCITIES), bytes)])?;
+        let boxes: Vec<[i32; 4]> = read(&self.device, &[(buffer(BOXES), bytes)])?;
+        let forces: Vec<[f32; 4]> = read(&self.device, &[(buffer(FORCES), bytes)])?;
         let Particles { x, v, force, species, tag, image, marks } = to;
         let vector = |[x, y, z, _]: [f32; 4]| [x, y, z].map(f64::from);
         let bits = |v: &[f32; 4]| v[3].to_bits();
@@ -282,7 +276,7 @@ impl GpuSimulation {
     /// As [`GpuSimulation::new`].
     pub fn set_fluid(&mut self, fluid: &Fluid) -> Result<(), GpuError> {
         check(&self.settings, fluid)?;
-        self.geometry = Geometry::new(&self.settings, fluid.dimensions, fluid.cutoff())?;
+        self.geometry = Geometry::new(&self.settings.domain, fluid.dimensions, fluid.cutoff())?;
         let shader = Shader::new(fluid)?;
         let old = self.kernels.shader();
         let fits = shader.variables == old.variables
@@ -306,7 +300,7 @@ impl GpuSimulation {
     /// As [`GpuSimulation::new`] and [`GpuSimulation::upload`].
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), GpuError> {
         check(&settings, &self.fluid)?;
-        let geometry = Geometry::new(&settings, self.fluid.dimensions, self.fluid.cutoff())?;
+        let geometry = Geometry::new(&settings.domain, self.fluid.dimensions, self.fluid.cutoff())?;
         self.kernels.set_tilted(geometry.is_tilted);
         let mut particles = Particles::default();
         self.download(&mut particles)?;
@@ -364,6 +358,22 @@ impl GpuSimulation {
     /// Times since the last call of [`GpuSimulation::measure_time`], longest first.
     pub fn timings(&self) -> Vec<Timing> {
         self.kernels.timings()
+    }
+}
+
+/// The sums of all workgroups.
+fn sums_of(partial: &[f32]) -> Totals {
+    let entries = || partial.chunks_exact(ENTRIES as usize);
+    let sum = |k: usize| entries().map(|block| f64::from(block[k])).sum::<f64>();
+    Totals {
+        excess: sum(0),
+        pair: sum(1),
+        virial: std::array::from_fn(|k| sum(2 + k)),
+        thermostat_virial: std::array::from_fn(|k| sum(8 + k)),
+        momentum_flux: std::array::from_fn(|k| sum(14 + k)),
+        momentum: std::array::from_fn(|k| sum(20 + k)),
+        support_force: std::array::from_fn(|k| sum(23 + k)),
+        largest_force: entries().map(|block| f64::from(block[26])).fold(0.0, f64::max),
     }
 }
 

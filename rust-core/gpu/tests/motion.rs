@@ -15,8 +15,9 @@ use psidpd_gpu::{
 };
 
 const VERLET: Rule = Rule::VelocityVerlet;
-const TWO_STAGE: Rule = Rule::TwoStage { lambda: 0.21, every: 1 };
-const EVERY_THIRD: Rule = Rule::TwoStage { lambda: 0.21, every: 3 };
+const TWO_STAGE: Rule = Rule::TwoStage { lambda: 0.21, gradient: 0.0, every: 1 };
+const EVERY_THIRD: Rule = Rule::TwoStage { lambda: 0.21, gradient: 0.0, every: 3 };
+const FORCE_GRADIENT: Rule = Rule::TwoStage { lambda: 0.17, gradient: 1.0 / 24.0, every: 2 };
 
 fn cube(edge: f64) -> PeriodicBox {
     PeriodicBox::orthogonal([-0.5, 0.0, 3.0], [edge; 3], [true; 3]).unwrap()
@@ -78,7 +79,7 @@ fn trajectories_follow_the_cpu() {
     let fluid = model("warren2003-set6.toml").at(1.0).unwrap();
     let domain = cube(6.0);
     let particles = particles(&mut Random(1), &fluid, &domain, 6.0);
-    for rule in [VERLET, TWO_STAGE, EVERY_THIRD] {
+    for rule in [VERLET, TWO_STAGE, EVERY_THIRD, FORCE_GRADIENT] {
         follows(&fluid, &settings(&fluid, &domain), &particles, 0.01, rule);
     }
 }
@@ -102,7 +103,7 @@ fn mixtures_in_a_tilted_plane_follow_the_cpu() {
         BodyForce { acceleration: [2.0, 0.0, 0.0], reversed_along: Some(1) },
     ];
     let settings = Settings { body_forces, ..settings(&fluid, &domain) };
-    for rule in [VERLET, TWO_STAGE] {
+    for rule in [VERLET, TWO_STAGE, FORCE_GRADIENT] {
         follows(&fluid, &settings, &particles, 0.005, rule);
     }
 }
@@ -130,7 +131,7 @@ fn runs_repeat_and_continue_with_the_same_bits() {
         tag: order.iter().map(|k| first.tag[*k]).collect(),
         ..first.clone()
     };
-    for rule in [VERLET, TWO_STAGE] {
+    for rule in [VERLET, TWO_STAGE, FORCE_GRADIENT] {
         let mut whole = start(&fluid, settings(&fluid, &domain), &first, 0.01, rule);
         whole.advance(40, 0.01, rule, true).unwrap();
         let (expected, totals) = (state(&mut whole), whole.totals().unwrap());

@@ -32,7 +32,7 @@ fn errors(device: &Device, fluid: &Fluid, domain: &PeriodicBox, particles: &Part
     let mut gpu = GpuSimulation::new(device, fluid, settings(fluid, domain)).unwrap();
     gpu.upload(particles, 7).unwrap();
     let mut found = Particles::default();
-    let two_stage = Rule::TwoStage { lambda: 0.21, every: 1 };
+    let two_stage = Rule::TwoStage { lambda: 0.21, gradient: 0.0, every: 1 };
     gpu.prepare(DT, two_stage, true).unwrap();
     gpu.download(&mut found).unwrap();
     let totals = gpu.totals().unwrap();

@@ -50,6 +50,9 @@ pub enum EngineError {
     /// A range is much longer than the box.
     #[error(transparent)]
     Reach(#[from] ReachError),
+    /// A GPU failed, or cannot do what was asked for.
+    #[error("{0}")]
+    Device(String),
     /// The host has passed arrays of different lengths, or made calls in the wrong order.
     #[error("host error: {0}")]
     Host(&'static str),

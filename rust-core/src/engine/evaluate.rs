@@ -1,10 +1,12 @@
-//! The calls of the engine to either of its two paths.
+//! The calls of the engine to each of its paths.
 
 use super::error::EngineError;
 use super::request::{Request, Results};
 use super::surroundings::Surroundings;
+use crate::model::Fluid;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::Tally;
+use std::fmt::Debug;
 
 /// A way to compute forces. A host with ghosts calls [`Evaluate::first`], copies slopes from owners to ghosts, and calls
 /// [`Evaluate::second`].
@@ -43,4 +45,27 @@ pub trait Evaluate {
 
     /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
     fn excess(&mut self) -> &[f64];
+}
+
+/// A path of another crate, for a GPU: [`Engine::use_device`](super::Engine::use_device).
+///
+/// It computes forces and totals, adds forces to those of the host, and no values of single particles.
+pub trait DevicePath: Evaluate + Debug + Send + Sync {
+    /// The device, for the log.
+    fn name(&self) -> String;
+
+    /// Whether it can compute in this box: see [`Surroundings`].
+    fn fits(&self, domain: &PeriodicBox) -> bool;
+
+    /// Takes the same model at another temperature.
+    ///
+    /// # Errors
+    /// The device cannot compute it.
+    fn set_fluid(&mut self, fluid: &Fluid) -> Result<(), EngineError>;
+
+    /// The species of each type, as in [`Engine::map_kinds`](super::Engine::map_kinds).
+    fn map_kinds(&mut self, kinds: &[i32]);
+
+    /// Numbers of evaluations of ψ with a density below its bounds, and above.
+    fn out_of_bounds(&self) -> [u64; 2];
 }

@@ -2,14 +2,14 @@
 
 use super::counts::PassCounts;
 use super::error::EngineError;
-use super::evaluate::Evaluate;
+use super::evaluate::{DevicePath, Evaluate};
 use super::fault::Fault;
 use super::pair_sums::PairSums;
 use super::particles::Particles;
 use super::path::{Path, Reason};
 use super::plan::Plan;
 use super::request::{Evaluated, Request, Results};
-use super::surroundings::{SpecialPair, Surroundings};
+use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::{Pool, Sweep, Times};
 use super::sweep_path::SweepPath;
 use crate::model::Fluid;
@@ -27,10 +27,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// calls [`Engine::first`], copies the [`Pending::slopes_mut`] from owners to ghosts, and calls [`Pending::finish`].
 ///
 /// Every evaluation takes the fastest [`Path`] that can compute its request.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Engine {
     pair_sums: PairSums,
     sweep: SweepPath,
+    device: Option<Box<dyn DevicePath>>,
     pair_sums_only: bool,
     /// Path of the last evaluation.
     path: Option<Path>,
@@ -121,6 +122,7 @@ impl Engine {
         Engine {
             pair_sums: PairSums::of_plan(plan.clone()),
             sweep: SweepPath::new(Sweep::of_plan(plan, settings, pool)),
+            device: None,
             pair_sums_only: false,
             path: None,
             number: 0,
@@ -151,10 +153,11 @@ impl Engine {
     pub fn statistics(&self) -> Statistics {
         let (sweep, sums) = (&self.sweep.sweep, &self.pair_sums);
         let (a, b) = (sums.out_of_bounds(), sweep.out_of_bounds());
+        let c = self.device.as_ref().map_or([0; 2], |device| device.out_of_bounds());
         Statistics {
             times: sweep.times(),
             counts: sums.counts() + sweep.counts(),
-            out_of_bounds: [a[0] + b[0], a[1] + b[1]],
+            out_of_bounds: [a[0] + b[0] + c[0], a[1] + b[1] + c[1]],
         }
     }
 
@@ -165,7 +168,23 @@ impl Engine {
     /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
         self.pair_sums.map_kinds(kinds)?;
+        if let Some(device) = &mut self.device {
+            device.map_kinds(kinds);
+        }
         self.sweep.sweep.map_kinds(kinds)
+    }
+
+    /// Makes later evaluations on a GPU, or on none, and returns the one before. The host then maps its types again.
+    ///
+    /// The GPU computes forces and totals; sums over pairs compute what else is requested. There may be no special
+    /// pairs and no exclusions.
+    pub fn use_device(&mut self, device: Option<Box<dyn DevicePath>>) -> Option<Box<dyn DevicePath>> {
+        std::mem::replace(&mut self.device, device)
+    }
+
+    /// The GPU in words, if there is one.
+    pub fn device_name(&self) -> Option<String> {
+        self.device.as_ref().map(|device| device.name())
     }
 
     /// Sets the pairs with reduced strength for later evaluations, until the host changes them or renumbers its particles.
@@ -198,17 +217,23 @@ impl Engine {
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
         let fits = match surroundings {
             Surroundings::Listed(..) => return Path::PairSums(Reason::ListedPairs),
-            Surroundings::Box(domain) => self.sweep.sweep.fits(domain),
-            Surroundings::Ghosts(around, _) => self.sweep.sweep.fits(around.domain),
+            Surroundings::Box(domain) | Surroundings::Ghosts(Around { domain, .. }, _) => {
+                match &self.device {
+                    Some(device) => device.fits(domain),
+                    None => self.sweep.sweep.fits(domain),
+                }
+            }
         };
         if self.pair_sums_only {
             Path::PairSums(Reason::Asked)
         } else if want.of_particles() {
             Path::PairSums(Reason::ParticleValues)
-        } else if want.densities && !self.sweep.has_all_densities() {
+        } else if want.densities && (self.device.is_some() || !self.sweep.has_all_densities()) {
             Path::PairSums(Reason::Densities)
         } else if !fits {
             Path::PairSums(Reason::Box)
+        } else if self.device.is_some() {
+            Path::Device
         } else {
             Path::Sweep
         }
@@ -254,7 +279,7 @@ impl Engine {
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
-        self.begin(Surroundings::Box(domain), request.want).whole(domain, request, force, add)
+        self.begin(Surroundings::Box(domain), request.want)?.whole(domain, request, force, add)
     }
 
     /// The first half of an evaluation, which needs no slopes of ghosts. The second half, [`Pending::finish`], has the
@@ -270,36 +295,41 @@ impl Engine {
         request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<Pending, EngineError> {
-        let path = self.begin(surroundings, request.want);
+        let path = self.begin(surroundings, request.want)?;
         path.first(surroundings, request, force)?;
         Ok(Pending { slopes: std::mem::take(path.slopes_mut()), number: self.number })
     }
 
     /// Chooses the path of a new evaluation.
-    fn begin(&mut self, surroundings: Surroundings, want: Want) -> &mut dyn Evaluate {
+    fn begin(&mut self, surroundings: Surroundings, want: Want) -> Result<&mut dyn Evaluate, EngineError> {
         static NUMBER: AtomicU64 = AtomicU64::new(1);
         self.number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = self.path_for(surroundings, want);
+        if path == Path::Device && self.sweep.leaves_out() {
+            return Err(EngineError::Device("a GPU leaves no pairs out and scales none".to_owned()));
+        }
         self.path = Some(path);
         self.sweep.forget();
         if path != Path::Sweep {
             self.sweep.sweep.ask_for_pairs(None);
             self.tell_pair_sums();
         }
-        self.last_mut()
+        Ok(self.last_mut())
     }
 
     /// The path of the last evaluation.
     fn last(&self) -> &dyn Evaluate {
-        match self.path {
-            Some(Path::PairSums(_)) => &self.pair_sums,
+        match (self.path, &self.device) {
+            (Some(Path::PairSums(_)), _) => &self.pair_sums,
+            (Some(Path::Device), Some(device)) => &**device,
             _ => &self.sweep,
         }
     }
 
     fn last_mut(&mut self) -> &mut dyn Evaluate {
-        match self.path {
-            Some(Path::PairSums(_)) => &mut self.pair_sums,
+        match (self.path, &mut self.device) {
+            (Some(Path::PairSums(_)), _) => &mut self.pair_sums,
+            (Some(Path::Device), Some(device)) => &mut **device,
             _ => &mut self.sweep,
         }
     }
@@ -311,8 +341,13 @@ impl Engine {
 
     /// Values of single particles in the last evaluation.
     pub fn results(&self) -> Results<'_> {
-        let results = self.last().results();
-        Results { order: results.order.filter(|_| self.path.is_some()), ..results }
+        // Densities after an evaluation on a GPU are summed by this engine.
+        let last: &dyn Evaluate = if self.path == Some(Path::Device) { &self.sweep } else { self.last() };
+        let results = last.results();
+        Results {
+            order: results.order.filter(|_| self.path.is_some_and(|path| path != Path::Device)),
+            ..results
+        }
     }
 
     /// Every density of the model in the last evaluation, for `particles` that have not moved since;
@@ -330,7 +365,8 @@ impl Engine {
             // The list of pairs still exists.
             Some(Path::PairSums(_)) => return self.pair_sums.sum_all_densities(None),
             Some(Path::Sweep) if self.sweep.fetch_densities() => {}
-            Some(Path::Sweep) => {
+            Some(Path::Device) if !self.sweep.densities_mut().is_empty() => {}
+            Some(Path::Sweep | Path::Device) => {
                 self.tell_pair_sums();
                 let all = self.pair_sums.sum_all_densities(Some((surroundings, particles)))?;
                 self.sweep.densities_mut().extend_from_slice(all);

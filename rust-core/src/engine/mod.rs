@@ -12,7 +12,7 @@
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
 //! sweep_path     the sweep, and special pairs
-//! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
+//! facade         Engine: chooses between the two, or a GPU, for each evaluation, and says which and why (path)
 //! ```
 //!
 //! Both compute the same sums: local densities `n` over pairs, `ψ` and `∂ψ/∂n` of each particle, then the force of
@@ -43,6 +43,7 @@ pub mod vectors;
 
 pub use counts::PassCounts;
 pub use error::EngineError;
+pub use evaluate::{DevicePath, Evaluate};
 pub use facade::{Engine, Pending, Statistics};
 #[doc(hidden)]
 pub use fault::Fault;

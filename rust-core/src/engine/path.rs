@@ -8,6 +8,8 @@ use std::fmt;
 pub enum Path {
     /// The sweep over cells, with vector instructions and threads.
     Sweep,
+    /// A GPU, in single precision.
+    Device,
     /// Sums over a list of pairs, in double precision and on one thread: slower, for the given reason.
     PairSums(Reason),
 }
@@ -33,6 +35,7 @@ impl Path {
         let Settings { precision, instructions, threads } = settings;
         match self {
             Path::Sweep => format!("{self}, {precision} precision, {instructions}, {threads} thread(s)"),
+            Path::Device => format!("{self}, single precision"),
             Path::PairSums(_) => format!("{self}; double precision, 1 thread"),
         }
     }
@@ -42,6 +45,7 @@ impl fmt::Display for Path {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Path::Sweep => f.write_str("cell sweep"),
+            Path::Device => f.write_str("GPU"),
             Path::PairSums(reason) => write!(f, "sums over pairs one by one, because {reason}"),
         }
     }

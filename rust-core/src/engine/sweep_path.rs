@@ -46,6 +46,11 @@ impl SweepPath {
         self.excludes_special = false;
     }
 
+    /// Whether special or excluded pairs are set.
+    pub fn leaves_out(&self) -> bool {
+        !(self.special.is_empty() && self.sweep.exclusions().marks().is_empty())
+    }
+
     /// Discards ψ and densities of the last evaluation.
     pub fn forget(&mut self) {
         self.excess.clear();

@@ -121,13 +121,17 @@ pub fn gpus() -> Result<Vec<Found>, DeviceError> {
 pub fn refused_step(integrator: Integrator) -> Option<String> {
     match integrator {
         Integrator::VelocityVerlet => None,
-        Integrator::TwoStage { coupling, .. } if coupling.update != Update::Midpoint => {
+        Integrator::TwoStage { coupling, .. } | Integrator::ForceGradient { coupling, .. }
+            if coupling.update != Update::Midpoint =>
+        {
             Some(format!("thermostat_step = \"{}\"", coupling.name()))
         }
-        Integrator::TwoStage { coupling, .. } if coupling.noise != Law::Gaussian => {
+        Integrator::TwoStage { coupling, .. } | Integrator::ForceGradient { coupling, .. }
+            if coupling.noise != Law::Gaussian =>
+        {
             Some("noise = \"uniform\"".into())
         }
-        Integrator::TwoStage { .. } => None,
+        Integrator::TwoStage { .. } | Integrator::ForceGradient { .. } => None,
         other => Some(format!("integrator = \"{}\"", other.name())),
     }
 }

@@ -8,11 +8,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Folders and files of the checkout that a plugin is built from.
-const SOURCES: [&str; 11] = [
+const SOURCES: [&str; 12] = [
     "Cargo.toml",
     "Cargo.lock",
     "rust-core/Cargo.toml",
     "rust-core/src",
+    "rust-core/gpu",
     "rust-core/model",
     "rust-core/passes",
     "rust-core/threads",
@@ -33,6 +34,7 @@ pub(super) fn digest(host: &Host, root: &Path, compiler: &[String]) -> Result<St
     for name in SETTINGS {
         std::env::var_os(name).hash(&mut hasher);
     }
+    super::plugin::with_gpu().hash(&mut hasher);
     for part in SOURCES.iter().chain(&CPP) {
         add(&root.join(part), &root.join(part), &mut hasher)?;
     }

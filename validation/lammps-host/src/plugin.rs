@@ -169,10 +169,12 @@ fn build_with(
         "building the plugin for LAMMPS {}: minutes the first time, then seconds",
         version.name
     ));
+    let features = if with_gpu() { &["--features", "psidpd/gpu,psidpd-lammps/gpu"][..] } else { &[] };
     let out = cargo_command(cargo)
         // The program is built too, which gives the shared crates the same features.
         .args(["build", "--release", "--lib", "-p", "psidpd", "-p", "psidpd-lammps"])
         .args(["-p", "psidpd-lammps-entry"])
+        .args(features)
         .arg("--message-format=json-render-diagnostics")
         .arg("--target-dir")
         .arg(builds)
@@ -216,6 +218,11 @@ fn build_with(
     fs::rename(&temp, &note).map_err(LammpsError::io("write", &note))?;
     progress("the plugin is built");
     Ok(plugin)
+}
+
+/// Whether the plugin shall have `device gpu`, by the variable of the Python package.
+pub(super) fn with_gpu() -> bool {
+    std::env::var_os("PSIDPD_WITH_GPU").is_some_and(|value| !value.is_empty() && value != "0")
 }
 
 /// The cargo command, without variables that an enclosing cargo set for another package.

@@ -16,6 +16,8 @@ pub(super) struct Arrays {
     /// Workgroups of the scan.
     pub(super) scans: u32,
     pub(super) has_thermostat: bool,
+    /// Particles and cells that fit in.
+    pub(super) room: (usize, u64),
 }
 
 /// Bindings of `wgsl/common.wgsl`.
@@ -28,6 +30,7 @@ pub(super) const FORCES: usize = 8;
 pub(super) const COUNTS: usize = 9;
 pub(super) const STATUS: usize = 14;
 pub(super) const SUMS: usize = 15;
+pub(super) const EXCHANGE: usize = 17;
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -50,14 +53,23 @@ impl GpuSimulation {
         if self.arrays.as_ref().is_some_and(|arrays| arrays.has_thermostat || !thermostat) {
             return Ok(());
         }
-        let count = self.count as u64;
-        let cells = self
-            .geometry
-            .cells(self.fluid.cutoff(), self.count)
-            .iter()
-            .map(|n| u64::from(*n))
-            .product::<u64>()
-            + 1;
+        self.allocate_room((self.count, self.cells()), thermostat, 0)
+    }
+
+    /// Number of cells.
+    pub(super) fn cells(&self) -> u64 {
+        let along = self.geometry.cells(self.fluid.cutoff(), self.count);
+        along.iter().map(|n| u64::from(*n)).product()
+    }
+
+    /// Creates the buffers for numbers of particles and cells; `exchange` numbers of each particle go to the host.
+    pub(super) fn allocate_room(
+        &mut self,
+        room: (usize, u64),
+        thermostat: bool,
+        exchange: u64,
+    ) -> Result<(), GpuError> {
+        let (count, cells) = (room.0 as u64, room.1 + 1);
         let scans = cells.div_ceil(u64::from(SCAN));
         let shader = self.kernels.shader();
         let vectors = 16 * count;
@@ -78,10 +90,10 @@ impl GpuSimulation {
             8 * count,
             4 * count * shader.variables.max(1) as u64,
             size_of::<Status>() as u64,
-            u64::from(4 * ENTRIES * groups_of(self.count)),
+            u64::from(4 * ENTRIES * groups_of(room.0)),
             4 * shader.tables.len() as u64,
         ];
-        sizes.extend([of_thermostat; 4]);
+        sizes.extend([of_thermostat.max(4 * exchange * count), of_thermostat, of_thermostat, of_thermostat]);
         let limits = &self.device.limits;
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         if let Some(size) = sizes.iter().find(|size| **size > most) {
@@ -128,7 +140,7 @@ impl GpuSimulation {
                 entries: &entries,
             })
         });
-        self.arrays = Some(Arrays { buffers, groups, scans: scans as u32, has_thermostat: thermostat });
+        self.arrays = Some(Arrays { buffers, groups, scans: scans as u32, has_thermostat: thermostat, room });
         self.write_constants();
         Ok(())
     }

@@ -40,10 +40,18 @@ impl Runs<'_> {
         *self.side = 1 - *self.side;
     }
 
-    pub(super) fn forces(&mut self, totals: bool, noise: Option<(f32, [u32; 2])>) {
+    pub(super) fn densities(&mut self, totals: bool) {
         if self.passes || totals {
             self.push("densities", totals, self.groups, Arguments::default());
         }
+    }
+
+    pub(super) fn forces(&mut self, totals: bool, noise: Option<(f32, [u32; 2])>) {
+        self.densities(totals);
+        self.pair_forces(totals, noise);
+    }
+
+    pub(super) fn pair_forces(&mut self, totals: bool, noise: Option<(f32, [u32; 2])>) {
         let (a, key) = noise.unwrap_or_default();
         let flags = if noise.is_some() { NOISE } else { 0 };
         self.push(
@@ -81,11 +89,17 @@ impl GpuSimulation {
                     runs.all("kick", [single(0.5 * dt), 0.0, 0.0, 0.0], 0);
                 }
             }
-            Rule::TwoStage { lambda, .. } => {
+            Rule::TwoStage { lambda, gradient, .. } => {
                 let half = single(0.5 * dt);
                 runs.all("kick_drift", [single(lambda * dt), half, 0.0, 0.0], deferred);
                 runs.sort();
                 runs.forces(false, None);
+                if gradient != 0.0 {
+                    runs.all("displace", [single(gradient * dt * dt), 0.0, 0.0, 0.0], 0);
+                    runs.sort();
+                    runs.forces(false, None);
+                    runs.all("step_back", [0.0; 4], 0);
+                }
                 runs.all("kick_drift", [single((1.0 - 2.0 * lambda) * dt), half, 0.0, 0.0], 0);
                 runs.sort();
                 runs.forces(totals, None);
@@ -102,9 +116,12 @@ impl GpuSimulation {
 
     /// The factor and the key of noise in the forces.
     pub(super) fn noise_of(&self, rule: Rule, dt: f64, number: u64) -> Option<(f32, [u32; 2])> {
-        let acts = rule == Rule::VelocityVerlet && self.has_drag();
-        let key = PairNoise::new(self.settings.seed, number).key();
-        acts.then(|| ((2.0 * self.fluid.kt / dt).sqrt() as f32, key))
+        (rule == Rule::VelocityVerlet).then(|| self.noise(self.settings.seed, dt, number)).flatten()
+    }
+
+    pub(super) fn noise(&self, seed: u64, dt: f64, number: u64) -> Option<(f32, [u32; 2])> {
+        let key = PairNoise::new(seed, number).key();
+        self.has_drag().then(|| ((2.0 * self.fluid.kt / dt).sqrt() as f32, key))
     }
 
     pub(super) fn has_drag(&self) -> bool {

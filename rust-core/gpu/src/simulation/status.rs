@@ -37,12 +37,15 @@ impl GpuSimulation {
     /// Reads and clears what kernels reported.
     pub(super) fn status(&mut self) -> Result<Status, GpuError> {
         let Some(arrays) = &self.arrays else { return Err(GpuError::Host("there are no particles")) };
-        let found: Vec<Status> = read(&self.device, &arrays.buffers[STATUS], size_of::<Status>() as u64)?;
-        let status = found[0];
+        let found = read(&self.device, &[(&arrays.buffers[STATUS], size_of::<Status>() as u64)])?;
+        self.count_status(&found[0]);
+        self.clear_status();
+        Ok(found[0])
+    }
+
+    pub(super) fn count_status(&mut self, status: &Status) {
         (0..2).for_each(|k| self.out_of_bounds[k] += u64::from(status.out_of_bounds[k]));
         (0..3).for_each(|k| self.effort[k] += u64::from(status.effort[k]));
-        self.clear_status();
-        Ok(status)
     }
 
     /// The fault that kernels reported, of a step.

@@ -61,7 +61,7 @@ struct Status {
 
 @group(0) @binding(0) var<uniform> P: Params;
 @group(0) @binding(1) var<uniform> K: Constants;
-// Coordinates and tag; velocity, with species and marks; boxes travelled.
+// Coordinates and tag; velocity, with species and marks; boxes travelled, with the host's number of the particle.
 @group(0) @binding(2) var<storage, read_write> pos: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read_write> vel: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> box_of: array<vec4<i32>>;
@@ -79,6 +79,9 @@ struct Status {
 @group(0) @binding(16) var<storage, read_write> table: array<f32>;
 // Conjugate gradients: residual, solution, direction and its image.
 @group(0) @binding(17) var<storage, read_write> residual: array<vec4<f32>>;
+// The same memory in steps and evaluations without them: undisplaced coordinates; forces or slopes for the host.
+@group(0) @binding(17) var<storage, read_write> kept: array<vec4<u32>>;
+@group(0) @binding(17) var<storage, read_write> exchange: array<f32>;
 @group(0) @binding(18) var<storage, read_write> solution: array<vec4<f32>>;
 @group(0) @binding(19) var<storage, read_write> direction: array<vec4<f32>>;
 @group(0) @binding(20) var<storage, read_write> image: array<vec4<f32>>;
@@ -106,11 +109,18 @@ fn halted() -> bool {
     return failed != 0u && failed < I.sequence;
 }
 
+// Whether i is a particle of this rank.
+fn is_owned(i: u32) -> bool {
+    if (halted() || i >= P.count) { return false; }
+    return !is_ghost(vel[i]);
+}
+
 fn fail() {
     atomicStore(&status.failed, I.sequence);
 }
 
-fn species_of(v: vec4<f32>) -> u32 { return bitcast<u32>(v.w) & 0xffffu; }
+fn species_of(v: vec4<f32>) -> u32 { return bitcast<u32>(v.w) & 0x7fffu; }
+fn is_ghost(v: vec4<f32>) -> bool { return (bitcast<u32>(v.w) & 0x8000u) != 0u; }
 fn marks_of(v: vec4<f32>) -> u32 { return bitcast<u32>(v.w) >> 16u; }
 fn is_frozen(v: vec4<f32>) -> bool { return (bitcast<u32>(v.w) & 0x10000u) != 0u; }
 fn inverse_mass(v: vec4<f32>) -> f32 { return select(P.mass[species_of(v)].y, 0.0, is_frozen(v)); }

@@ -5,7 +5,7 @@
 fn densities(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) lane: u32) {
     let i = index_of(group, groups, lane);
-    let acts = !halted() && i < P.count;
+    let acts = is_owned(i);
     var psi = 0.0;
     if (acts) {
         let own = pos[i];
@@ -37,7 +37,7 @@ fn densities(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
 fn forces(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) lane: u32) {
     let i = index_of(group, groups, lane);
-    let acts = !halted() && i < P.count;
+    let acts = is_owned(i);
     var sum = vec3(0.0);
     var energy = 0.0;
     var virial: array<f32, 6>;
@@ -102,4 +102,29 @@ fn add_virial(to: ptr<function, array<f32, 6>>, e: vec3<f32>, factor: f32) {
     (*to)[3] += f.x * e.y;
     (*to)[4] += f.x * e.z;
     (*to)[5] += f.y * e.z;
+}
+
+// Where the host keeps the particles: slopes of its own, slopes of its ghosts, and forces.
+@compute @workgroup_size(LANES)
+fn give_slopes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (!is_owned(i)) { return; }
+    for (var k = 0u; k < V; k++) { exchange[u32(box_of[i].w) * V + k] = slopes[i * V + k]; }
+}
+
+@compute @workgroup_size(LANES)
+fn take_slopes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count || !is_ghost(vel[i])) { return; }
+    for (var k = 0u; k < V; k++) { slopes[i * V + k] = exchange[u32(box_of[i].w) * V + k]; }
+}
+
+@compute @workgroup_size(LANES)
+fn give_forces(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (!is_owned(i)) { return; }
+    for (var k = 0u; k < 3u; k++) { exchange[u32(box_of[i].w) * 3u + k] = force[i][k]; }
 }

@@ -55,13 +55,45 @@ fn kick_drift(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     slots[i].x = atomicAdd(&counts[cell], 1u);
 }
 
-// Counts the particles of each cell, where none moves.
+// Counts the particles of each cell, where none moves, and numbers them as the host does.
 @compute @workgroup_size(LANES)
 fn count_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) lane: u32) {
     let i = index_of(group, groups, lane);
     if (halted() || i >= P.count) { return; }
+    box_of[i].w = i32(i);
     slots[i].x = atomicAdd(&counts[cell_index(cell_of(pos[i]))], 1u);
+}
+
+// Puts particles at x + a F/m for an evaluation of forces, in a box without walls.
+@compute @workgroup_size(LANES)
+fn displace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    var s = pos[i];
+    kept[i] = s;
+    let way = (I.a * inverse_mass(vel[i])) * force[i].xyz;
+    for (var k = 0u; k < D; k++) {
+        let move_by = dot(P.row[k].xyz, way);
+        if (!(abs(move_by) < 2147483000.0)) {
+            atomicMin(&status.runaway, s.w);
+            fail();
+            return;
+        }
+        s[k] += bitcast<u32>(i32(round(move_by)));
+    }
+    pos[i] = s;
+    slots[i].x = atomicAdd(&counts[cell_index(cell_of(s))], 1u);
+}
+
+// Puts particles back, which have been sorted since.
+@compute @workgroup_size(LANES)
+fn step_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let i = index_of(group, groups, lane);
+    if (halted() || i >= P.count) { return; }
+    pos[i] = kept[slots[i].x];
 }
 
 // v += a F/m.
@@ -145,7 +177,7 @@ fn list_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     slots[first_of(cell_index(cell_of(pos[i]))) + slots[i].x].y = i;
 }
 
-// Moves each particle to its place: by cell, and within a cell by tag.
+// Moves each particle to its place: by cell, and within a cell by tag; images of one particle share a tag.
 @compute @workgroup_size(LANES)
 fn sort(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
         @builtin(local_invocation_index) lane: u32) {
@@ -157,8 +189,11 @@ fn sort(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     let to = first_of(cell + 1u);
     var place = begin;
     for (var k = begin; k < to; k++) {
-        if (pos[slots[k].y].w < own.w) { place += 1u; }
+        let other = slots[k].y;
+        let tag = pos[other].w;
+        if (tag < own.w || (tag == own.w && other < i)) { place += 1u; }
     }
+    slots[place].x = i;
     sorted_pos[place] = own;
     sorted_vel[place] = vel[i];
     sorted_box[place] = box_of[i];

@@ -88,10 +88,18 @@ impl Cpu {
                 self.forces(dt, true);
                 self.kick(0.5 * dt);
             }
-            Rule::TwoStage { lambda, every } => {
+            Rule::TwoStage { lambda, gradient, every } => {
                 self.kick(lambda * dt);
                 self.drift(0.5 * dt);
                 self.forces(dt, false);
+                if gradient != 0.0 {
+                    let Particles { x, v, image, .. } = self.particles.clone();
+                    self.particles.v.fill([0.0; 3]);
+                    self.kick(gradient * dt * dt);
+                    self.drift(1.0);
+                    self.forces(dt, false);
+                    self.particles = Particles { x, v, image, ..self.particles.clone() };
+                }
                 self.kick((1.0 - 2.0 * lambda) * dt);
                 self.drift(0.5 * dt);
                 self.forces(dt, false);

@@ -1,4 +1,5 @@
 //! Particles without a pattern, and the device that tests run on.
+#![allow(dead_code)]
 
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::{Fluid, Model};

@@ -9,7 +9,7 @@ use psidpd_core::engine::{
 };
 use psidpd_core::model::Model;
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Forces {
     model: Model,
     kt: f64,

@@ -65,18 +65,14 @@ fn rule(integrator: Integrator) -> Result<Rule, RunError> {
     match (integrator, refused_step(integrator)) {
         (Integrator::VelocityVerlet, None) => Ok(Rule::VelocityVerlet),
         (Integrator::TwoStage { lambda, coupling }, None) => {
-            Ok(Rule::TwoStage { lambda, every: coupling.every })
+            Ok(Rule::TwoStage { lambda, gradient: 0.0, every: coupling.every })
+        }
+        (Integrator::ForceGradient { lambda, gradient, coupling }, None) => {
+            Ok(Rule::TwoStage { lambda, gradient, every: coupling.every })
         }
         (other, refused) => {
             Err(DeviceError::Lacks(refused.unwrap_or_else(|| other.name().to_owned())).into())
         }
-    }
-}
-
-impl Gpu {
-    fn describe(&self) -> String {
-        let gpu::DeviceInfo { index, name, backend, driver, .. } = self.device.info();
-        format!("gpu:{index}, {name} ({backend}, {driver})")
     }
 }
 
@@ -112,7 +108,7 @@ impl Simulation {
 
     /// The GPU in words; `None` on the CPU.
     pub fn gpu_name(&self) -> Option<String> {
-        self.gpu.as_ref().map(|gpu| gpu.describe())
+        self.gpu.as_ref().map(|gpu| gpu.device.info().to_string())
     }
 
     fn conditions(&self) -> Conditions {
