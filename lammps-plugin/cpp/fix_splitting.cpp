@@ -236,9 +236,12 @@ void FixSplitting::post_run()
   const uint64_t updates = now.updates - before.updates;
   if (updates > 0 && comm->me == 0) {
     const double mean = static_cast<double>(now.iterations - before.iterations) / static_cast<double>(updates);
-    char text[200];
-    snprintf(text, sizeof text, "Fix %s: the thermostat acted %llu times, with %.1f iterations on average, %zu at most\n", style,
-             static_cast<unsigned long long>(updates), mean, static_cast<size_t>(now.most));
+    char text[300];
+    snprintf(text, sizeof text,
+             "Fix %s: the thermostat acted %llu times, with %.1f iterations on average, %zu at most; its pairs were those of the "
+             "forces %llu times\n",
+             style, static_cast<unsigned long long>(updates), mean, static_cast<size_t>(now.most),
+             static_cast<unsigned long long>(now.listed - before.listed));
     utils::logmesg(lmp, std::string(text));
   }
 }

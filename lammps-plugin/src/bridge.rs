@@ -124,6 +124,8 @@ mod ffi {
         iterations: u64,
         /// The most iterations of one update.
         most: usize,
+        /// Updates of pairs that forces had listed.
+        listed: u64,
         /// Updates that ended before they were accurate.
         inaccurate: u64,
     }
@@ -307,8 +309,8 @@ fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleE
 }
 
 fn effort(style: &mut Style) -> ffi::Effort {
-    let Effort { updates, iterations, most, inaccurate, .. } = style.effort();
-    ffi::Effort { updates, iterations, most, inaccurate }
+    let Effort { updates, iterations, most, listed, inaccurate } = style.effort();
+    ffi::Effort { updates, iterations, most, listed, inaccurate }
 }
 
 fn round(need: Need) -> ffi::Round {

@@ -369,8 +369,8 @@ fn a_large_step_keeps_temperature_and_momentum() {
     }
 }
 
-/// The log has the iterations of the thermostat, those of several ranks as of one, and says where drag is too
-/// strong: with γ 10¹² half a step times drag is 10⁹ times the inertia.
+/// The log has the iterations of the thermostat, those of several ranks as of one, and how often the forces had listed its pairs;
+/// it says where drag is too strong: with γ 10¹² half a step times drag is 10⁹ times the inertia.
 #[test]
 fn iterations_are_counted() {
     let folder = tempfile::tempdir().unwrap();
@@ -380,14 +380,26 @@ fn iterations_are_counted() {
         std::fs::write(&path, script).unwrap();
         lammps().0.run_script(ranks, folder.path(), &path, &[], LIMIT).unwrap().stdout
     };
-    let line = |ranks| {
+    let line = |ranks, precision: &str| {
+        let settings = format!("pair_style dpd/psi 1.0 {SEED} {precision}\n");
+        let head = head.replace(&format!("pair_style dpd/psi 1.0 {SEED}\n"), &settings);
         let said = said(&format!("{head}run 9\n"), ranks);
         let line = said.lines().find(|line| line.contains("the thermostat acted")).map(str::to_owned);
         assert!(!said.contains("the thermostat is inaccurate"), "{said}");
         line.unwrap_or_else(|| panic!("{said}"))
     };
-    assert!(line(1).contains("acted 4 times, with "), "{}", line(1));
-    assert_eq!(line(1), line(2));
+    assert!(line(1, "").contains("acted 4 times, with "), "{}", line(1, ""));
+    assert_eq!(line(1, ""), line(2, ""));
+    // In mixed precision the forces list the pairs each time, on several ranks too; in double precision never.
+    for ranks in [1, 2] {
+        assert!(
+            line(ranks, "").ends_with("its pairs were those of the forces 0 times"),
+            "{}",
+            line(ranks, "")
+        );
+        let mixed = line(ranks, "precision mixed");
+        assert!(mixed.ends_with("its pairs were those of the forces 4 times"), "{ranks} ranks: {mixed}");
+    }
     let strong = head.replace(&warren(), &folder.path().join("strong.toml").display().to_string());
     let model = std::fs::read_to_string(warren()).unwrap().replace("gamma = 18.0", "gamma = 1e12");
     assert!(model.contains("1e12"));
