@@ -1,5 +1,6 @@
 //! Scratch arrays and result of the pair search.
 
+use super::cell_ranges::WHOLE;
 use super::clusters::{ICluster, JCluster, MASKS_PER_CLUSTER, SEARCH_GROUP, SLOT_BLOCK};
 use crate::simd::BroadcastPair;
 
@@ -8,6 +9,8 @@ use crate::simd::BroadcastPair;
 pub struct SearchBuffers {
     /// First i-particle of the group.
     pub first: usize,
+    /// Whether the j-particles are ghosts.
+    pub with_ghosts: bool,
     /// Index of the first pair of each i-particle; the last entry is one past the last pair.
     pub begin: [u32; SEARCH_GROUP + 1],
     /// The j-particle of each pair: its index in the order of cells, shifted by `OFFSET_BITS`.
@@ -30,9 +33,9 @@ pub struct SearchBuffers {
     capacity: usize,
 }
 
-/// Number of j-clusters with which a group usually fits: two for each of five cell ranges, in up to
+/// Number of j-clusters with which a group usually fits: two for each of nine cell ranges, in up to
 /// three periods, of every i-particle.
-const USUAL_J_CLUSTERS: usize = SEARCH_GROUP * 5 * 3 * 2 + 2;
+const USUAL_J_CLUSTERS: usize = SEARCH_GROUP * WHOLE * 3 * 2 + 2;
 
 /// Number of elements after the last pair that whole vectors may read or write.
 const PADDING: usize = 64;
@@ -41,6 +44,7 @@ impl Default for SearchBuffers {
     fn default() -> SearchBuffers {
         let mut buffers = SearchBuffers {
             first: 0,
+            with_ghosts: false,
             begin: [0; SEARCH_GROUP + 1],
             j_offsets: Vec::new(),
             i_in_batch: Vec::new(),

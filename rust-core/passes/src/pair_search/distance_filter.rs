@@ -11,16 +11,15 @@ use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
 use crate::simd::{BroadcastPair, Isa, OFFSET_BITS};
 
-/// Lists the pairs of a search group, those of one i-particle after those of another; batches have
-/// `batch_size` Lists the pairs of a search group, one i-particle after the other; a batch has
+/// Lists the pairs of a search group, one i-particle after the other; a batch has
 /// `batch_size` i-particles, a power of two.
 /// # Safety
 /// The caller fulfils the contract of `simd`. The buffers contain the clusters of the group,
 /// formed with the same `CLUSTER`.
 #[inline(always)]
-pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usize>(
+pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usize, const COLUMNS: usize>(
     cells: &SortedCells,
-    group: &SearchGroup,
+    group: &SearchGroup<COLUMNS>,
     batch_size: usize,
     buffers: &mut SearchBuffers,
 ) {
@@ -72,7 +71,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
             let slot = cluster.slot_and_shift as usize >> 8;
             let block = masks_each * (slot / SLOT_BLOCK);
             let shift = if SHIFTS {
-                *group.stencil.shift.get_unchecked(cluster.slot_and_shift as usize & 0xff)
+                *group.stencil.shift.as_flattened().get_unchecked(cluster.slot_and_shift as usize & 0xff)
             } else {
                 [0; 3]
             };

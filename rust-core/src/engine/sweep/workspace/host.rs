@@ -46,8 +46,8 @@ impl<P: PairPrecision> Workspace<P> {
             tally += *plane;
         }
         if self.totals {
-            for (s, excess) in self.results.excess.iter().enumerate() {
-                if self.particles.ghost.get(s).is_none_or(|g| !*g) {
+            for (k, excess) in self.order.order.iter().zip(&self.results.excess) {
+                if (*k as usize) < self.order.owned {
                     tally.excess += excess;
                 }
             }

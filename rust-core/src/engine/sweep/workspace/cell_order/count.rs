@@ -17,6 +17,8 @@ pub struct Count<'a> {
     pub fractions: Fractions<'a>,
     /// Result of [`Count::first_kind`].
     pub first_kind: u32,
+    /// Number of a ghost's cell minus that of an owned particle's at the same place.
+    pub to_ghosts: u32,
 }
 
 /// The particles of one thread: their cells, each of the grid or [`NO_CELL`], the fractions of
@@ -120,10 +122,13 @@ impl Count<'_> {
     ) {
         for (lane, [a, b, c]) in cells.iter().enumerate() {
             let mut to = a + b + c;
+            if GHOSTS && first + lane >= self.input.particles.owned {
+                to += self.to_ghosts;
+            }
             if GHOSTS && self.is_unneeded(first + lane, &x[lane]) {
                 to = NO_CELL;
             } else {
-                // SAFETY: `Fractions::cells` returns cells of the grid, each of which has a count.
+                // SAFETY: `Fractions::cells` returns cells of the grid, each of which, and that of its ghosts, has a count.
                 unsafe { *counts.get_unchecked_mut(to as usize) += 1 };
             }
             cell[lane] = to;
@@ -156,6 +161,9 @@ impl Count<'_> {
                 continue;
             }
             *cell = cells[lane].iter().sum();
+            if k >= input.particles.owned {
+                *cell += self.to_ghosts;
+            }
             *unit = fixed32[lane];
             counts[*cell as usize] += 1;
         }
