@@ -1,6 +1,6 @@
 //! Scratch arrays and result of the pair search.
 
-use super::cell_ranges::WHOLE;
+use super::cell_ranges::{CellRanges, WHOLE};
 use super::clusters::{ICluster, JCluster, MASKS_PER_CLUSTER, SEARCH_GROUP, SLOT_BLOCK};
 use crate::simd::BroadcastPair;
 
@@ -29,6 +29,8 @@ pub struct SearchBuffers {
     pub masks: Vec<u64>,
     /// Offset of the first candidate of each slot.
     pub j_bases: Vec<u32>,
+    /// Scratch array of the search among ghosts.
+    pub ranges_of_ghosts: Option<Box<CellRanges<WHOLE>>>,
     /// Number of pairs that fit into the lists.
     capacity: usize,
 }
@@ -56,6 +58,7 @@ impl Default for SearchBuffers {
             i_positions: Vec::new(),
             masks: Vec::new(),
             j_bases: Vec::new(),
+            ranges_of_ghosts: None,
             capacity: 0,
         };
         buffers.reserve_j_clusters(0);

@@ -127,6 +127,7 @@ impl StencilColumns<WHOLE> {
 pub type CellIndices<const COLUMNS: usize> = [[i32; SEARCH_GROUP]; COLUMNS];
 
 /// Cell ranges of a search group.
+#[derive(Debug)]
 pub struct CellRanges<const COLUMNS: usize> {
     /// Index of the first cell, and one past the last.
     pub low: CellIndices<COLUMNS>,

@@ -100,6 +100,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
         while t < i_clusters {
             let cluster = *buffers.i_clusters.get_unchecked(t);
             let [from, to] = cluster.slot_blocks.map(|block| block as usize);
+            let end_half = cluster.end_half as usize;
             let mut block = masks_each * from;
             while block < masks_each * to {
                 I::transpose_masks(masks.add(SLOT_BLOCK * block));
@@ -114,7 +115,9 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
                     let masks = masks.add(SLOT_BLOCK * four + k % I_PER_MASK);
                     let j_bases = j_bases.add(SLOT_BLOCK * block);
                     pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
-                    pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
+                    if 2 * block + 1 < end_half {
+                        pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
+                    }
                     block += 1;
                 }
                 if !cells.excluded.is_empty() {

@@ -85,8 +85,12 @@ pub unsafe fn form_j_clusters<I: Isa, const CLUSTER: usize, const COLUMNS: usize
             }
             // Among the owned particles every i-cluster has at least one j-cluster.
             let next = slot_blocks + (found - begin).div_ceil(SLOT_BLOCK);
-            *buffers.i_clusters.get_unchecked_mut(clusters) =
-                ICluster { first: a as u8, size: size as u8, slot_blocks: [slot_blocks as u32, next as u32] };
+            *buffers.i_clusters.get_unchecked_mut(clusters) = ICluster {
+                first: a as u8,
+                size: size as u8,
+                slot_blocks: [slot_blocks as u32, next as u32],
+                end_half: (2 * slot_blocks + (found - begin).div_ceil(SLOT_BLOCK / 2)) as u32,
+            };
             slot_blocks = next;
             clusters += 1;
             a += size;

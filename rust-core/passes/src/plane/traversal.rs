@@ -38,8 +38,10 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
     unsafe {
         let search = PlaneSearch::new(cells, plane);
         let mut ranges = CellRanges::<HALF>::default();
-        // The ranges are kept apart, as a box without ghosts need not clear them.
-        let mut ranges_of_ghosts = (cells.grid.layers > 1).then(Box::<CellRanges<WHOLE>>::default);
+        let mut ranges_of_ghosts = match cells.grid.layers {
+            1 => None,
+            _ => Some(buffers.ranges_of_ghosts.take().unwrap_or_default()),
+        };
         let mut groups = 0;
         let mut column = columns.start;
         while column < columns.end {
@@ -88,6 +90,7 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
             }
             column += 1;
         }
+        buffers.ranges_of_ghosts = ranges_of_ghosts.or(buffers.ranges_of_ghosts.take());
         groups
     }
 }

@@ -54,8 +54,12 @@ impl<P: PairPrecision> super::Scheduler<'_, P> {
         let (rim, tally) = slab.rim(self.order, unit);
         let batches = batches_of(rim);
         let particles = self.order.particles_of_unit(unit);
-        forces.clear();
-        forces.resize(if batches.is_empty() { 0 } else { particles.len() }, Accumulator::default());
+        if forces.len() < particles.len() {
+            forces.resize(particles.len(), Accumulator::default());
+        }
+        for [first, members] in &batches {
+            forces[first - particles.start..][..*members].iter_mut().for_each(|force| force.0 = [0.0; 4]);
+        }
         let sums =
             PlaneSums::new(particles.start, forces.as_mut_ptr(), std::ptr::null_mut(), self.fluid.width());
         let virial = &mut tally.virial;

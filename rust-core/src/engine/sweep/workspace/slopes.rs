@@ -65,8 +65,14 @@ impl<T: Scalar> SlopeArrays<T> {
                 // SAFETY: each ghost is in one plane, and each plane in the part of one thread.
                 unsafe {
                     let to = shared.rows_mut(ghosts.clone());
-                    for (to, k) in to.chunks_exact_mut(width).zip(&order.order[ghosts.clone()]) {
-                        to.copy_from_slice(&rows[width * *k as usize..][..width]);
+                    let numbers = &order.order[ghosts.clone()];
+                    match width {
+                        1 => to.iter_mut().zip(numbers).for_each(|(to, k)| *to = rows[*k as usize]),
+                        _ => {
+                            for (to, k) in to.chunks_exact_mut(width).zip(numbers) {
+                                to.copy_from_slice(&rows[width * *k as usize..][..width]);
+                            }
+                        }
                     }
                     shared.pack(ghosts, to);
                 }
