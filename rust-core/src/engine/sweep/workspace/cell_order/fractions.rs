@@ -50,7 +50,10 @@ impl<'a> Fractions<'a> {
             lowest: std::array::from_fn(|c| end(c % 3, 0.0, -FAR)),
             highest: std::array::from_fn(|c| end(c % 3, TWO_TO_32 - 1.0, FAR)),
             is_open: !geometry.periodic.iter().all(|p| *p),
-            outside: std::array::from_fn(|c| if geometry.periodic[c % 3] { 0 } else { OUTSIDE }),
+            outside: std::array::from_fn(|c| match c % 3 {
+                c if c < geometry.dimensions && !geometry.periodic[c] => OUTSIDE,
+                _ => 0,
+            }),
             of: std::array::from_fn(|c| of[c % 3]),
             step: std::array::from_fn(|c| step[c % 3]),
         }
