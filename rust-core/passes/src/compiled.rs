@@ -8,7 +8,6 @@ use crate::pair_batch::in_range_pairs::InRangePairs;
 use crate::plane::buffers::PairBuffers;
 use crate::plane::data::PassData;
 use crate::plane::first::first_pass;
-use crate::plane::rim::Rim;
 use crate::plane::second::second_pass;
 use crate::simd::{Isa, Kernel, Scalar, run};
 use crate::tally::Tally;
@@ -124,6 +123,8 @@ pub struct First<'a, P: PairPrecision> {
     pub sums: PlaneSums<'a>,
     pub buffers: &'a mut PairBuffers<P::Scalar>,
     pub in_range: &'a mut InRangePairs<P::Scalar>,
+    /// The pairs with ghosts.
+    pub rim: &'a mut InRangePairs<P::Scalar>,
 }
 
 impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
@@ -133,10 +134,10 @@ impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) -> Tally {
-        let First { data, plane, columns, sums, buffers, in_range } = self.0;
+        let First { data, plane, columns, sums, buffers, in_range, rim } = self.0;
         // SAFETY: the caller of `PairPrecision::first` fulfils the contract of `first_pass`.
         unsafe {
-            first_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, plane, columns, sums, buffers, in_range)
+            first_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, plane, columns, sums, buffers, in_range, rim)
         }
     }
 }
@@ -146,10 +147,8 @@ pub struct Second<'a, P: PairPrecision> {
     pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
     pub sums: PlaneSums<'a>,
     pub in_range: &'a InRangePairs<P::Scalar>,
-    /// The rim, emptied for this plane; it is listed if `near_rim`.
-    pub rim: &'a mut Rim<P::Scalar>,
-    /// Whether there are ghosts in this plane or in the next.
-    pub near_rim: bool,
+    /// Whether these pairs are those with ghosts.
+    pub is_rim: bool,
     pub virial: &'a mut [f64; 6],
 }
 
@@ -160,13 +159,13 @@ impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let Second { data, sums, in_range, rim, near_rim, virial } = self.0;
+        let Second { data, sums, in_range, is_rim, virial } = self.0;
         // SAFETY: the caller of `PairPrecision::second` fulfils the contract of `second_pass`.
         unsafe {
-            if near_rim {
-                second_pass::<I, P::On<I>, MULTISPECIES, TALLY, true>(data, sums, in_range, rim, virial);
+            if is_rim {
+                second_pass::<I, P::On<I>, MULTISPECIES, TALLY, true>(data, sums, in_range, virial);
             } else {
-                second_pass::<I, P::On<I>, MULTISPECIES, TALLY, false>(data, sums, in_range, rim, virial);
+                second_pass::<I, P::On<I>, MULTISPECIES, TALLY, false>(data, sums, in_range, virial);
             }
         }
     }

@@ -2,5 +2,4 @@
 //! `workspace::sorted_particles` sorts them.
 
 pub mod excluded;
-pub mod ghosts;
 pub mod sorted;

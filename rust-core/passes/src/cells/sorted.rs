@@ -1,7 +1,6 @@
 //! Positions in the order of cells.
 
 use super::excluded::Excluded;
-use super::ghosts::Ghosts;
 use crate::ground::box_geometry::BoxGeometry;
 use crate::ground::cell_grid::CellGrid;
 use crate::ground::fixed_point::FixedPoint16;
@@ -20,25 +19,30 @@ pub struct SortedCells<'a> {
     pub geometry: &'a BoxGeometry,
     pub grid: &'a CellGrid,
     /// Index of the first particle of each cell, and one past the last particle; then the same
-    /// for the copy of the first plane.
+    /// for the copy of the first plane. In each plane the cells of ghosts, if there are any, follow the others.
     pub start: &'a [u32],
     /// Positions relative to the origin of the box geometry.
     pub x: [SharedSlice<'a, f32>; 3],
     /// Positions in 16-bit fixed point.
     pub fixed16: [SharedSlice<'a, u16>; 3],
     pub fixed16_scale: FixedPoint16,
-    pub ghosts: Ghosts<'a>,
     pub excluded: Excluded<'a>,
 }
 
 impl SortedCells<'_> {
-    /// Number of the first cell of a column.
+    /// Number of the first cell of a column; the cells of its owned particles come first in their plane.
     #[inline(always)]
     pub fn first_cell(&self, plane: usize, column: usize) -> usize {
-        (plane * self.grid.columns_per_plane + column) * self.grid.cells_per_column
+        plane * self.grid.cells_per_plane() + column * self.grid.cells_per_column
     }
 
-    /// The particles of a column: index of the first, and one past the last.
+    /// Number of the first cell of a column's ghosts, where there are ghosts.
+    #[inline(always)]
+    pub fn first_ghost_cell(&self, plane: usize, column: usize) -> usize {
+        self.first_cell(plane, self.grid.columns_per_plane + column)
+    }
+
+    /// The owned particles of a column: index of the first, and one past the last.
     ///
     /// # Safety
     /// The column is one of the grid.

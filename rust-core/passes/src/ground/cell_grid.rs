@@ -44,6 +44,11 @@ pub struct CellGrid {
     pub search_cutoff: f64,
     /// The search cutoff along x, as a fraction of the box.
     pub range_half_width: f64,
+    /// 2 if there are ghosts, which are in cells of their own: those of a plane follow its other cells. Else 1.
+    pub layers: usize,
+    /// Cells along x, from the first to one past the last, that have ghosts only in columns beside or above the owned
+    /// particles: elsewhere ghosts are beyond the ends of these. Any range is right, and this one makes the search fast.
+    pub interior: [usize; 2],
     /// Particles of an i-cluster.
     pub i_cluster_size: usize,
     /// Most cells between the first and the last particle of an i-cluster.
@@ -102,6 +107,8 @@ impl CellGrid {
                     plane_axis,
                     search_cutoff,
                     range_half_width,
+                    layers: 1,
+                    interior: [0, cells_per_column],
                     i_cluster_size,
                     i_cluster_extent,
                 });
@@ -115,8 +122,14 @@ impl CellGrid {
         if axis == self.plane_axis { self.planes } else { self.columns_per_plane }
     }
 
+    /// Number of cells of a plane, those of ghosts included.
+    #[inline(always)]
+    pub fn cells_per_plane(&self) -> usize {
+        self.cells_per_column * self.columns_per_plane * self.layers
+    }
+
     pub fn cell_count(&self) -> usize {
-        self.cells_per_column * self.columns_per_plane * self.planes
+        self.cells_per_plane() * self.planes
     }
 
     /// Number of cells along each axis.
@@ -131,7 +144,7 @@ impl CellGrid {
     pub fn steps(&self) -> [u32; 3] {
         let mut steps = [1; 3];
         let column = self.cells_per_column as u32;
-        (steps[self.column_axis], steps[self.plane_axis]) = (column, column * self.columns_per_plane as u32);
+        (steps[self.column_axis], steps[self.plane_axis]) = (column, self.cells_per_plane() as u32);
         steps
     }
 }

@@ -9,6 +9,8 @@ pub struct Batch<'a> {
     /// First i-particle of the batch.
     pub first: usize,
     pub members: usize,
+    /// Whether the j-particles are ghosts: they get no forces.
+    pub with_ghosts: bool,
     /// Number of pairs.
     pub count: usize,
     /// Index of the first pair of each i-particle in its search group, and one past the last pair of the last one.
@@ -35,12 +37,19 @@ impl<'a> Batch<'a> {
             (first < end).then_some(Batch {
                 first: search.first + slots[0],
                 members,
+                with_ghosts: search.with_ghosts,
                 count: end - first,
                 begin,
                 i_in_batch: search.i_in_batch.get_unchecked(first..),
                 j_offsets: search.j_offsets.get_unchecked(first..),
             })
         }
+    }
+
+    /// The weight of a pair on this rank: 1, or ½ of a pair with a ghost. The rank that owns the ghost counts the other
+    /// half.
+    pub fn pair_weight(&self) -> f64 {
+        if self.with_ghosts { 0.5 } else { 1.0 }
     }
 
     pub fn pair(&self, p: usize) -> [usize; 2] {

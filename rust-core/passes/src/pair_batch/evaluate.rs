@@ -10,7 +10,7 @@ use super::pair_terms::{PairSums, add_linear, add_soft, add_spline, forces, sum_
 use super::scalar_fallback::scalar_fallback;
 use super::step_constants::StepConstants;
 use super::thermostat::draw;
-use crate::ground::arithmetic::{Arithmetic, PackedParticle, PairVector};
+use crate::ground::arithmetic::{Arithmetic, PairVector};
 use crate::ground::species_pairs::SpeciesPair;
 use crate::simd::{Isa, Reals, Scalar, Words};
 use crate::tally::Tally;
@@ -37,7 +37,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
         measure_pairs::<I, A, MULTISPECIES>(inputs, constants, buffers, batch);
         let mut sums = PairSums::<A::Reals>::zero();
         if TALLY {
-            pair_weights(inputs, buffers, batch);
+            pair_weights(buffers, batch);
         }
         if inputs.terms.has_more() {
             further_terms::<I, A, MULTISPECIES, TALLY>(inputs, buffers, batch, &mut sums, tally);
@@ -158,15 +158,8 @@ unsafe fn further_terms<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, cons
 
 /// Pair weights; padding lanes are zero.
 #[inline(never)]
-fn pair_weights<T: Scalar>(
-    inputs: &PairInputs<T, impl PackedParticle>,
-    buffers: &mut BatchBuffers<T>,
-    batch: Batch,
-) {
-    for p in 0..batch.count {
-        let [i, j] = batch.pair(p);
-        buffers.pair_weight[p] = T::of(inputs.ghosts.pair_weight(i, j));
-    }
+fn pair_weights<T: Scalar>(buffers: &mut BatchBuffers<T>, batch: Batch) {
+    buffers.pair_weight[..batch.count].fill(T::of(batch.pair_weight()));
     // No vector has more than sixteen lanes.
     buffers.pair_weight[batch.count..batch.count + 16].fill(T::default());
 }

@@ -1,6 +1,5 @@
 //! The input of the evaluation of a batch.
 
-use crate::cells::ghosts::Ghosts;
 use crate::ground::box_geometry::BoxGeometry;
 use crate::ground::terms::Terms;
 use crate::noise::PairNoise;
@@ -17,7 +16,6 @@ pub struct PairInputs<'a, T, R> {
     pub packed: SharedSlice<'a, R>,
     /// Species of the particles; empty with one species.
     pub species: SharedSlice<'a, u8>,
-    pub ghosts: Ghosts<'a>,
 }
 
 impl<T, R> PairInputs<'_, T, R> {

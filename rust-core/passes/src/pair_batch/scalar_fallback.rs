@@ -64,8 +64,7 @@ fn each<T: Scalar, const MULTISPECIES: bool>(
             let k = fallback.index[n] as usize;
             buffers.conservative[k] = T::of(buffers.conservative[k].wide() - fallback.slope[n]);
             if let Some(tally) = &mut tally {
-                let [i, j] = batch.pair(k);
-                tally.pair += fallback.phi[n] * inputs.ghosts.pair_weight(i, j);
+                tally.pair += fallback.phi[n] * batch.pair_weight();
             }
         }
     }

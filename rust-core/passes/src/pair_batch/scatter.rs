@@ -19,13 +19,16 @@ pub struct ScatterPairs {
     /// First i-particle.
     pub first: usize,
     pub members: usize,
+    /// Whether the j-particles are ghosts: nothing is added to them.
+    pub with_ghosts: bool,
 }
 
 impl From<Batch<'_>> for ScatterPairs {
     #[inline(always)]
     fn from(batch: Batch) -> ScatterPairs {
-        let Batch { first, members, .. } = batch;
-        ScatterPairs { j_offsets: batch.j_offsets.as_ptr(), begin: batch.begin.as_ptr(), first, members }
+        let Batch { first, members, with_ghosts, .. } = batch;
+        let (j_offsets, begin) = (batch.j_offsets.as_ptr(), batch.begin.as_ptr());
+        ScatterPairs { j_offsets, begin, first, members, with_ghosts }
     }
 }
 
@@ -54,7 +57,7 @@ pub unsafe fn scatter_forces<I: Isa, A: Arithmetic<I>>(
     }
 }
 
-/// Adds `i_quads` times `sign` to the i-particles of pairs, and subtracts `quads` from the j-particles.
+/// Adds `i_quads` times `sign` to the i-particles of pairs, and subtracts `quads` from the j-particles unless they are ghosts.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. The accumulators include both particles of each pair;
@@ -72,12 +75,15 @@ pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
     // has made; `BatchBuffers::reserve` and `second_pass_cached` leave room after the last pair.
     unsafe {
         let sign = I::Quad::load(sign.as_ptr());
-        let ScatterPairs { j_offsets, begin, first, members } = pairs;
+        let ScatterPairs { j_offsets, begin, first, members, with_ghosts } = pairs;
         // One loop runs over all pairs: the processor would mispredict the end of a loop for each
         // i-particle. The sum of an i-particle is the difference of two running sums, of which every
         // second one is stored. A zero follows an odd number of pairs.
         let zeroth = *begin as usize;
         let count = *begin.add(members) as usize - zeroth;
+        if with_ghosts {
+            return add_to_first::<I, A>(to, i_quads, running, sign, pairs);
+        }
         quads.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
         i_quads.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
         let mut sum = I::Quad::zero();
@@ -106,6 +112,41 @@ pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
             let even = end & !1;
             let odd = A::load_quad(i_quads.add(4 * even)).mul(I::Quad::splat((end & 1) as f64));
             let all = I::Quad::load(running.add(2 * even)).add(odd);
+            add_quad(to.at((first + m) << OFFSET_BITS), all.sub(before).mul(sign));
+            before = all;
+            m += 1;
+        }
+    }
+}
+
+/// Adds `i_quads` times `sign` to the i-particles of pairs.
+///
+/// # Safety
+/// As that of [`scatter_quads`].
+#[inline(always)]
+unsafe fn add_to_first<I: Isa, A: Arithmetic<I>>(
+    to: PlaneAccumulators,
+    i_quads: *const A::Scalar,
+    running: *mut f64,
+    sign: I::Quad,
+    ScatterPairs { begin, first, members, .. }: ScatterPairs,
+) {
+    // SAFETY: the caller promises quads of all pairs, with room for as many running sums and one more.
+    unsafe {
+        let zeroth = *begin as usize;
+        let count = *begin.add(members) as usize - zeroth;
+        let mut sum = I::Quad::zero();
+        let mut p = 0;
+        while p < count {
+            sum = sum.add(A::load_quad(i_quads.add(4 * p)));
+            p += 1;
+            sum.store(running.add(4 * p));
+        }
+        I::Quad::zero().store(running);
+        let mut before = I::Quad::zero();
+        let mut m = 0;
+        while m < members {
+            let all = I::Quad::load(running.add(4 * (*begin.add(m + 1) as usize - zeroth)));
             add_quad(to.at((first + m) << OFFSET_BITS), all.sub(before).mul(sign));
             before = all;
             m += 1;

@@ -1,5 +1,6 @@
 //! Scratch arrays and result of the pair search.
 
+use super::cell_ranges::{CellRanges, WHOLE};
 use super::clusters::{ICluster, JCluster, MASKS_PER_CLUSTER, SEARCH_GROUP, SLOT_BLOCK};
 use crate::simd::BroadcastPair;
 
@@ -8,6 +9,8 @@ use crate::simd::BroadcastPair;
 pub struct SearchBuffers {
     /// First i-particle of the group.
     pub first: usize,
+    /// Whether the j-particles are ghosts.
+    pub with_ghosts: bool,
     /// Index of the first pair of each i-particle; the last entry is one past the last pair.
     pub begin: [u32; SEARCH_GROUP + 1],
     /// The j-particle of each pair: its index in the order of cells, shifted by `OFFSET_BITS`.
@@ -26,13 +29,15 @@ pub struct SearchBuffers {
     pub masks: Vec<u64>,
     /// Offset of the first candidate of each slot.
     pub j_bases: Vec<u32>,
+    /// Scratch array of the search among ghosts.
+    pub ranges_of_ghosts: Option<Box<CellRanges<WHOLE>>>,
     /// Number of pairs that fit into the lists.
     capacity: usize,
 }
 
-/// Number of j-clusters with which a group usually fits: two for each of five cell ranges, in up to
+/// Number of j-clusters with which a group usually fits: two for each of nine cell ranges, in up to
 /// three periods, of every i-particle.
-const USUAL_J_CLUSTERS: usize = SEARCH_GROUP * 5 * 3 * 2 + 2;
+const USUAL_J_CLUSTERS: usize = SEARCH_GROUP * WHOLE * 3 * 2 + 2;
 
 /// Number of elements after the last pair that whole vectors may read or write.
 const PADDING: usize = 64;
@@ -41,6 +46,7 @@ impl Default for SearchBuffers {
     fn default() -> SearchBuffers {
         let mut buffers = SearchBuffers {
             first: 0,
+            with_ghosts: false,
             begin: [0; SEARCH_GROUP + 1],
             j_offsets: Vec::new(),
             i_in_batch: Vec::new(),
@@ -52,6 +58,7 @@ impl Default for SearchBuffers {
             i_positions: Vec::new(),
             masks: Vec::new(),
             j_bases: Vec::new(),
+            ranges_of_ghosts: None,
             capacity: 0,
         };
         buffers.reserve_j_clusters(0);

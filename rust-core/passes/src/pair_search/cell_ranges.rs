@@ -6,43 +6,58 @@ use crate::ground::box_geometry::BoxGeometry;
 use crate::simd::{Isa, Reals};
 use psidpd_model::kernel::Real;
 
-/// The five columns of the half stencil: the particle's own, the next of its plane, and three of the next plane.
-pub struct StencilColumns {
+/// Number of columns of the half stencil: the particle's own, the next of its plane, and three of the next plane.
+pub const HALF: usize = 5;
+
+/// Number of columns of the whole stencil.
+pub const WHOLE: usize = 9;
+
+/// The columns of the stencil, by their distances in columns and in planes from the particle's own. The first five are
+/// the half stencil.
+const NEIGHBOURS: [[i64; 2]; WHOLE] =
+    [[0, 0], [1, 0], [-1, 1], [0, 1], [1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
+
+/// The columns in which particles of one column search: with `COLUMNS` = [`HALF`] their partners among the owned
+/// particles, each pair once; with [`WHOLE`] among the ghosts.
+pub struct StencilColumns<const COLUMNS: usize> {
     /// The number of the particle's own column in its plane.
     number: usize,
     /// For each column a pointer to the array of its cells' first particles.
-    pub start: [*const u32; 5],
+    pub start: [*const u32; COLUMNS],
     /// 1 for columns that exist, 0 for those beyond an open side.
-    present: [f32; 5],
-    /// Periodic shift of positions in the previous, the same and the next period along x: entry `w
-    /// + 5 (period + 1)` for column `w`.
-    pub shift: [[u32; 3]; 15],
-    /// Whether a column lies across a period in the direction of `column_axis`.
+    present: [f32; COLUMNS],
+    /// Periodic shift of positions for each column, in the previous, the same and the next period along x.
+    pub shift: [[[u32; 3]; COLUMNS]; 3],
+    /// Whether a column lies across a period in the direction of `column_axis`, or of `plane_axis` below the first plane
+    /// or, for ghosts, above the last.
     pub wraps: bool,
-    /// The owned particles of each column: index of the first, and one past the last.
-    pub owned: [[u32; 2]; 5],
-    /// Whether the particle's own column has ghosts.
-    pub with_ghosts: bool,
 }
 
-impl StencilColumns {
-    pub fn new(cells: &SortedCells, search: &PlaneSearch, plane: usize, column: usize) -> StencilColumns {
+impl<const COLUMNS: usize> StencilColumns<COLUMNS> {
+    pub fn new(
+        cells: &SortedCells,
+        search: &PlaneSearch,
+        plane: usize,
+        column: usize,
+    ) -> StencilColumns<COLUMNS> {
         let (geometry, grid) = (cells.geometry, cells.grid);
-        let own = &cells.start[cells.first_cell(plane, column)..];
+        let of_ghosts = COLUMNS == WHOLE;
+        let first_cell = |plane: usize, column: usize| match of_ghosts {
+            true => cells.first_ghost_cell(plane, column),
+            false => cells.first_cell(plane, column),
+        };
+        let own = &cells.start[first_cell(plane, column)..];
         let mut stencil = StencilColumns {
             number: column,
-            start: [own.as_ptr(); 5],
-            present: [0.0; 5],
-            shift: [[0; 3]; 15],
+            start: [own.as_ptr(); COLUMNS],
+            present: [0.0; COLUMNS],
+            shift: [[[0; 3]; COLUMNS]; 3],
             wraps: false,
-            owned: [[0; 2]; 5],
-            with_ghosts: false,
         };
-        let columns = grid.columns_per_plane as i64;
-        let neighbours = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
-        for (w, (across, up)) in neighbours.into_iter().enumerate() {
-            let (mut to, above) = (column as i64 + across, plane + up);
-            let mut wrap = 0;
+        let (columns, planes) = (grid.columns_per_plane as i64, grid.planes as i64);
+        for (w, [across, up]) in NEIGHBOURS.into_iter().take(COLUMNS).enumerate() {
+            let (mut to, mut above) = (column as i64 + across, plane as i64 + up);
+            let (mut wrap, mut turn) = (0, 0);
             let mut present = true;
             if to < 0 || to >= columns {
                 // In two dimensions a plane is one column and has no neighbours beside it.
@@ -50,47 +65,84 @@ impl StencilColumns {
                 wrap = to.div_euclid(columns);
                 to = to.rem_euclid(columns);
             }
-            if above >= grid.planes {
-                // The next plane may be the copy of the first plane.
+            if above < 0 || above >= planes {
                 present &= geometry.periodic[grid.plane_axis];
+                // For owned particles the next plane may be the copy of the first plane.
+                if of_ghosts {
+                    turn = above.div_euclid(planes);
+                    above = above.rem_euclid(planes);
+                }
             }
             if !present {
                 continue;
             }
             stencil.present[w] = 1.0;
-            stencil.wraps |= wrap != 0;
-            let cell = cells.first_cell(above, to as usize);
-            stencil.start[w] = cells.start[cell..].as_ptr();
-            if let Some(owned) = cells.ghosts.owned_of_column.get(cell / grid.cells_per_column) {
-                stencil.owned[w] = owned.range;
-                stencil.with_ghosts |= w == 0 && owned.with_ghosts;
-            }
+            stencil.wraps |= (wrap | turn) != 0;
+            stencil.start[w] = cells.start[first_cell(above as usize, to as usize)..].as_ptr();
             for period in 0..3 {
-                stencil.shift[w + 5 * period] = search.shift[(wrap + 1) as usize][period];
+                stencil.shift[period][w] = search.shift(wrap, period, turn);
             }
         }
         stencil
     }
 
-    /// Whether all particles of the five columns are ghosts: then this rank counts none of their pairs.
-    pub fn only_ghosts(&self) -> bool {
-        self.owned.iter().all(|[first, end]| first == end)
+    /// The index of the periodic shift of column `w`, across `period - 1` periods along x.
+    pub const fn shift_index(w: usize, period: usize) -> usize {
+        w + COLUMNS * period
+    }
+}
+
+impl StencilColumns<WHOLE> {
+    /// The particles of the column that ghosts may be near: up to two ranges, one behind the other.
+    ///
+    /// # Safety
+    /// The stencil is that of this column, and there are ghosts.
+    pub unsafe fn near_ghosts(&self, cells: &SortedCells, plane: usize, column: usize) -> [[usize; 2]; 2] {
+        let grid = cells.grid;
+        let ([from, to], all) = (grid.interior, grid.cells_per_column);
+        let mut ghosts = [0; 3];
+        for (start, present) in self.start.iter().zip(self.present) {
+            if present > 0.0 {
+                // SAFETY: `start` has an entry for each cell of a column, and one more.
+                let [a, b, c, d] = [0, from, to, all].map(|cell| unsafe { *start.add(cell) });
+                ghosts = [ghosts[0] + b - a, ghosts[1] + c - b, ghosts[2] + d - c];
+            }
+        }
+        let reach = (grid.range_half_width * all as f64).ceil() as usize;
+        let (low, high) = (from + reach, to.saturating_sub(reach));
+        let own = &cells.start[cells.first_cell(plane, column)..][..all + 1];
+        let [first, end] = [own[0], own[all]].map(|place| place as usize);
+        match ghosts {
+            [0, 0, 0] => [[first, first]; 2],
+            [a, 0, c] if low < high => [
+                [first, if a > 0 { own[low] as usize } else { first }],
+                [if c > 0 { own[high] as usize } else { end }, end],
+            ],
+            _ => [[first, end], [end, end]],
+        }
     }
 }
 
 /// A cell for each stencil column and i-particle of a search group.
-pub type CellIndices = [[i32; SEARCH_GROUP]; 5];
+pub type CellIndices<const COLUMNS: usize> = [[i32; SEARCH_GROUP]; COLUMNS];
 
 /// Cell ranges of a search group.
-#[derive(Default)]
-pub struct CellRanges {
+#[derive(Debug)]
+pub struct CellRanges<const COLUMNS: usize> {
     /// Index of the first cell, and one past the last.
-    pub low: CellIndices,
-    pub end: CellIndices,
+    pub low: CellIndices<COLUMNS>,
+    pub end: CellIndices<COLUMNS>,
     /// Cells of ranges that cross a period along x: from `before` to the end of the column in the
     /// previous period, and from the beginning of the column to `after` in the next one.
-    pub before: CellIndices,
-    pub after: CellIndices,
+    pub before: CellIndices<COLUMNS>,
+    pub after: CellIndices<COLUMNS>,
+}
+
+impl<const COLUMNS: usize> Default for CellRanges<COLUMNS> {
+    fn default() -> CellRanges<COLUMNS> {
+        let none = [[0; SEARCH_GROUP]; COLUMNS];
+        CellRanges { low: none, end: none, before: none, after: none }
+    }
 }
 
 /// Properties of the cell ranges of a search group.
@@ -104,9 +156,9 @@ pub struct RangeFlags {
 }
 
 /// Up to [`SEARCH_GROUP`] i-particles of one column, with their cell ranges.
-pub struct SearchGroup<'a> {
+pub struct SearchGroup<'a, const COLUMNS: usize> {
     pub plane: &'a PlaneSearch,
-    pub stencil: &'a StencilColumns,
+    pub stencil: &'a StencilColumns<COLUMNS>,
     pub flags: RangeFlags,
     /// First i-particle.
     pub first: usize,
@@ -117,8 +169,8 @@ pub struct SearchGroup<'a> {
 pub struct PlaneSearch {
     cutoff_squared: f32,
     column_width: f32,
-    /// Coordinate at which the next plane begins.
-    plane_edge: f32,
+    /// Coordinates at which this plane and the next one begin.
+    plane_edges: [f32; 2],
     /// The search cutoff along x, in cells.
     half_range: f32,
     cells_per_length: f32,
@@ -130,6 +182,13 @@ pub struct PlaneSearch {
     /// Periodic shifts in 16-bit fixed point, repeated in both halves of a word: one period back, none
     /// and one ahead along `column_axis`, and for each of these the same along x.
     shift: [[[u32; 3]; 3]; 3],
+    /// The shift of one period back and of one ahead along `plane_axis`, if there are ghosts.
+    turn: [[u32; 3]; 2],
+}
+
+/// Adds both halves of words.
+fn add_halves(a: u32, b: u32) -> u32 {
+    0x1_0001 * u32::from((a as u16).wrapping_add(b as u16))
 }
 
 impl PlaneSearch {
@@ -141,7 +200,7 @@ impl PlaneSearch {
         PlaneSearch {
             cutoff_squared: (grid.search_cutoff * grid.search_cutoff) as f32,
             column_width: (geometry.height(grid.column_axis) / grid.columns_per_plane as f64) as f32,
-            plane_edge: ((plane + 1) as f64 * plane_width) as f32,
+            plane_edges: [plane, plane + 1].map(|plane| (plane as f64 * plane_width) as f32),
             half_range: (grid.range_half_width * grid.cells_per_column as f64) as f32,
             cells_per_length: cells_per_length as f32,
             periodic: geometry.periodic[0],
@@ -155,7 +214,24 @@ impl PlaneSearch {
                     [x + along, y, z].map(|shift| 0x1_0001 * u32::from(scale.shift(shift)))
                 })
             }),
+            turn: match grid.layers {
+                1 => [[0; 3]; 2],
+                _ => [-1.0, 1.0].map(|turn| {
+                    let edge = geometry.edge(grid.plane_axis);
+                    edge.map(|e| 0x1_0001 * u32::from(scale.shift(turn * e)))
+                }),
+            },
         }
+    }
+
+    /// The shift across `wrap` periods along `column_axis`, `period - 1` along x, and `turn` along `plane_axis`.
+    fn shift(&self, wrap: i64, period: usize, turn: i64) -> [u32; 3] {
+        let in_plane = self.shift[(wrap + 1) as usize][period];
+        if turn == 0 {
+            return in_plane;
+        }
+        let turn = self.turn[(turn > 0) as usize];
+        std::array::from_fn(|c| add_halves(in_plane[c], turn[c]))
     }
 
     /// Finds the cell ranges of `count` i-particles, beginning with `first`, in i-clusters of `CLUSTER`.
@@ -164,12 +240,12 @@ impl PlaneSearch {
     /// The caller fulfils the contract of `simd`. The particles are of one column of this plane, at
     /// most [`SEARCH_GROUP`] of them.
     #[inline(always)]
-    pub unsafe fn cell_ranges<I: Isa, const CLUSTER: usize>(
+    pub unsafe fn cell_ranges<I: Isa, const CLUSTER: usize, const COLUMNS: usize>(
         &self,
         cells: &SortedCells,
-        stencil: &StencilColumns,
+        stencil: &StencilColumns<COLUMNS>,
         [first, count]: [usize; 2],
-        out: &mut CellRanges,
+        out: &mut CellRanges<COLUMNS>,
     ) -> RangeFlags {
         // SAFETY: the caller promises the particles; vectors that reach beyond the last one are loaded from `lanes`.
         unsafe {
@@ -188,7 +264,7 @@ impl PlaneSearch {
                     }
                 }
                 let x = [I::F32::load(x[0]), I::F32::load(x[1]), I::F32::load(x[2])];
-                self.ranges_of_vector::<I, CLUSTER>(cells, stencil, x, at, out, &mut flags);
+                self.ranges_of_vector::<I, CLUSTER, COLUMNS>(cells, stencil, x, at, out, &mut flags);
                 at += I::F32::LANES;
             }
             flags
@@ -200,20 +276,20 @@ impl PlaneSearch {
     /// # Safety
     /// The caller fulfils the contract of `simd`. `at` is a multiple of the number of lanes, below [`SEARCH_GROUP`].
     #[inline(always)]
-    unsafe fn ranges_of_vector<I: Isa, const CLUSTER: usize>(
+    unsafe fn ranges_of_vector<I: Isa, const CLUSTER: usize, const COLUMNS: usize>(
         &self,
         cells: &SortedCells,
-        stencil: &StencilColumns,
+        stencil: &StencilColumns<COLUMNS>,
         [x, y, z]: [I::F32; 3],
         at: usize,
-        out: &mut CellRanges,
+        out: &mut CellRanges<COLUMNS>,
         flags: &mut RangeFlags,
     ) {
         // SAFETY: the number of lanes divides `SEARCH_GROUP`, so that a vector at `at` is inside the arrays of `out`.
         unsafe {
             let zero = I::F32::constant(0.0);
             let longest = I::F32::splat(self.half_range);
-            let mut half_range = [longest; 5];
+            let mut half_range = [longest; COLUMNS];
             let mut cell = x * I::F32::splat(self.cells_per_length);
             if self.tilted {
                 cell = fraction_along::<I>(cells.geometry, x, y, z)
@@ -225,7 +301,7 @@ impl PlaneSearch {
                 let high_edge = I::F32::splat((stencil.number + 1) as f32 * self.column_width);
                 let below = (across - low_edge).larger(zero);
                 let above = (high_edge - across).larger(zero);
-                let over = (I::F32::splat(self.plane_edge) - up).larger(zero);
+                let over = (I::F32::splat(self.plane_edges[1]) - up).larger(zero);
                 let (below, above) = (below * below, above * above);
                 let all = I::F32::splat(self.cutoff_squared);
                 let left = all - over * over;
@@ -234,6 +310,14 @@ impl PlaneSearch {
                 half_range[2] = I::root_or_more(left - below) * cells_per_length;
                 half_range[3] = I::root_or_more(left) * cells_per_length;
                 half_range[4] = I::root_or_more(left - above) * cells_per_length;
+                if COLUMNS == WHOLE {
+                    let under = (up - I::F32::splat(self.plane_edges[0])).larger(zero);
+                    let right = all - under * under;
+                    half_range[5] = I::root_or_more(all - below) * cells_per_length;
+                    half_range[6] = I::root_or_more(right - below) * cells_per_length;
+                    half_range[7] = I::root_or_more(right) * cells_per_length;
+                    half_range[8] = I::root_or_more(right - above) * cells_per_length;
+                }
             }
             let most = I::F32::constant(self.cells_per_column as f64);
             let one = I::F32::constant(1.0);
@@ -249,7 +333,7 @@ impl PlaneSearch {
             let close = (x - first).mask_below(far) & (first - x).mask_below(far);
             let together = close.trailing_ones() as usize >= I::F32::LANES;
             let mut w = 0;
-            while w < 5 {
+            while w < COLUMNS {
                 // Missing columns get an empty range.
                 let h = *half_range.get_unchecked(w) * I::F32::splat(*stencil.present.get_unchecked(w));
                 let (mut low, mut end) = (cell - h, cell + h + one);

@@ -32,4 +32,6 @@ pub struct ICluster {
     pub size: u8,
     /// Its blocks of slots: index of the first, and one past the last.
     pub slot_blocks: [u32; 2],
+    /// One past its last half block of slots that has a j-cluster.
+    pub end_half: u32,
 }

@@ -11,16 +11,15 @@ use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
 use crate::simd::{BroadcastPair, Isa, OFFSET_BITS};
 
-/// Lists the pairs of a search group, those of one i-particle after those of another; batches have
-/// `batch_size` Lists the pairs of a search group, one i-particle after the other; a batch has
+/// Lists the pairs of a search group, one i-particle after the other; a batch has
 /// `batch_size` i-particles, a power of two.
 /// # Safety
 /// The caller fulfils the contract of `simd`. The buffers contain the clusters of the group,
 /// formed with the same `CLUSTER`.
 #[inline(always)]
-pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usize>(
+pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usize, const COLUMNS: usize>(
     cells: &SortedCells,
-    group: &SearchGroup,
+    group: &SearchGroup<COLUMNS>,
     batch_size: usize,
     buffers: &mut SearchBuffers,
 ) {
@@ -72,7 +71,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
             let slot = cluster.slot_and_shift as usize >> 8;
             let block = masks_each * (slot / SLOT_BLOCK);
             let shift = if SHIFTS {
-                *group.stencil.shift.get_unchecked(cluster.slot_and_shift as usize & 0xff)
+                *group.stencil.shift.as_flattened().get_unchecked(cluster.slot_and_shift as usize & 0xff)
             } else {
                 [0; 3]
             };
@@ -101,6 +100,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
         while t < i_clusters {
             let cluster = *buffers.i_clusters.get_unchecked(t);
             let [from, to] = cluster.slot_blocks.map(|block| block as usize);
+            let end_half = cluster.end_half as usize;
             let mut block = masks_each * from;
             while block < masks_each * to {
                 I::transpose_masks(masks.add(SLOT_BLOCK * block));
@@ -115,7 +115,9 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
                     let masks = masks.add(SLOT_BLOCK * four + k % I_PER_MASK);
                     let j_bases = j_bases.add(SLOT_BLOCK * block);
                     pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
-                    pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
+                    if 2 * block + 1 < end_half {
+                        pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
+                    }
                     block += 1;
                 }
                 if !cells.excluded.is_empty() {

@@ -1,22 +1,19 @@
 //! Runs the three steps of the search.
 
 use super::buffers::SearchBuffers;
-use super::cell_ranges::{CellRanges, PlaneSearch, SearchGroup, StencilColumns};
-use super::clusters::SEARCH_GROUP;
+use super::cell_ranges::{CellRanges, PlaneSearch, SearchGroup, StencilColumns, WHOLE};
 use super::distance_filter::filter_by_distance;
 use super::j_clusters::form_j_clusters;
-use crate::cells::ghosts::MOST_OF_ANY;
 use crate::cells::sorted::SortedCells;
 use crate::simd::{Isa, Kernel};
 
-const _: () = assert!(SEARCH_GROUP <= MOST_OF_ANY);
-
-/// Lists the pairs of a search group: of `count` i-particles of a column, beginning with `first`.
-pub struct FindPairs<'a> {
+/// Lists the pairs of a search group: of `count` i-particles of a column, beginning with `first`. With the half stencil
+/// these are the pairs of owned particles, with the whole one those of an owned particle and a ghost.
+pub struct FindPairs<'a, const COLUMNS: usize> {
     pub cells: &'a SortedCells<'a>,
     pub plane: &'a PlaneSearch,
-    pub stencil: &'a StencilColumns,
-    pub ranges: &'a mut CellRanges,
+    pub stencil: &'a StencilColumns<COLUMNS>,
+    pub ranges: &'a mut CellRanges<COLUMNS>,
     /// The pair `[first, count]`.
     pub group: [usize; 2],
     /// Number of i-particles of a batch.
@@ -24,7 +21,7 @@ pub struct FindPairs<'a> {
     pub buffers: &'a mut SearchBuffers,
 }
 
-impl Kernel for FindPairs<'_> {
+impl<const COLUMNS: usize> Kernel for FindPairs<'_, COLUMNS> {
     type Out = ();
     const VBMI2: bool = true;
 
@@ -42,7 +39,7 @@ impl Kernel for FindPairs<'_> {
     }
 }
 
-impl FindPairs<'_> {
+impl<const COLUMNS: usize> FindPairs<'_, COLUMNS> {
     /// Runs the search with i-clusters of `CLUSTER` particles.
     ///
     /// # Safety
@@ -53,18 +50,14 @@ impl FindPairs<'_> {
         // SAFETY: `SortedParticles::make_room` pads particles; the caller promises a group of at most
         // `SEARCH_GROUP`, for which ranges and buffers have room.
         unsafe {
-            let flags = plane.cell_ranges::<I, CLUSTER>(cells, stencil, [first, count], ranges);
+            let flags = plane.cell_ranges::<I, CLUSTER, COLUMNS>(cells, stencil, [first, count], ranges);
             let group = SearchGroup { plane, stencil, flags, first, count };
-            // Ghost masks are applied only to groups that contain ghosts: owned particles pair with every candidate.
-            if stencil.with_ghosts && cells.ghosts.any_of([first, count]) {
-                form_j_clusters::<I, true, CLUSTER>(cells, &group, ranges, buffers);
-            } else {
-                form_j_clusters::<I, false, CLUSTER>(cells, &group, ranges, buffers);
-            }
+            buffers.with_ghosts = COLUMNS == WHOLE;
+            form_j_clusters::<I, CLUSTER, COLUMNS>(cells, &group, ranges, buffers);
             if stencil.wraps || flags.before | flags.after != 0 {
-                filter_by_distance::<I, true, CLUSTER>(cells, &group, batch_size, buffers);
+                filter_by_distance::<I, true, CLUSTER, COLUMNS>(cells, &group, batch_size, buffers);
             } else {
-                filter_by_distance::<I, false, CLUSTER>(cells, &group, batch_size, buffers);
+                filter_by_distance::<I, false, CLUSTER, COLUMNS>(cells, &group, batch_size, buffers);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Divides the cell ranges of i-clusters into j-clusters of sixteen candidates, with a bit for each possible pair.
 
 use super::buffers::SearchBuffers;
-use super::cell_ranges::{CellIndices, CellRanges, SearchGroup};
+use super::cell_ranges::{CellIndices, CellRanges, HALF, SearchGroup, StencilColumns};
 use super::clusters::{I_PER_MASK, ICluster, JCluster, MASKS_PER_CLUSTER, SLOT_BLOCK};
 use crate::cells::sorted::SortedCells;
 use crate::simd::{Isa, Reals};
@@ -11,16 +11,18 @@ use crate::simd::{Isa, Reals};
 /// # Safety
 /// The caller fulfils the contract of `simd`. `ranges` are those of the group, found with the same `CLUSTER`.
 #[inline(always)]
-pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
+pub unsafe fn form_j_clusters<I: Isa, const CLUSTER: usize, const COLUMNS: usize>(
     cells: &SortedCells,
-    group: &SearchGroup,
-    ranges: &mut CellRanges,
+    group: &SearchGroup<COLUMNS>,
+    ranges: &mut CellRanges<COLUMNS>,
     buffers: &mut SearchBuffers,
 ) {
     // SAFETY: `ranges_of_vector` clamps cells to the column, or one past its last, for which `start`
     // has entries; a group has no more than `SEARCH_GROUP` i-clusters.
     unsafe {
         let SearchGroup { plane, stencil, count, flags, .. } = *group;
+        // Among the owned particles each pair is found once.
+        let once = COLUMNS == HALF;
         let mut found = 0;
         let mut clusters = 0;
         let mut slot_blocks = 0;
@@ -37,69 +39,58 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
             let masks = ClusterMasks {
                 slots: (SLOT_BLOCK * slot_blocks).wrapping_sub(found),
                 members: *MEMBERS.get_unchecked(size),
-                ghosts: match GHOSTS {
-                    true => {
-                        let flags = cells.ghosts.flags.as_ptr().add(group.first + a);
-                        // SAFETY: `SortedParticles::make_room` pads the flags by a vector.
-                        ghost_mask(flags.cast::<u64>().read_unaligned())
-                    }
-                    false => [0; MASKS_PER_CLUSTER],
-                },
             };
-            // In its own column a particle pairs with the particles after it.
-            let start = *stencil.start.get_unchecked(0);
-            let range = [(group.first + a + 1) as u32, *start.add(cell_of(&ranges.end, 0, a))];
-            found = append_range::<GHOSTS, CLUSTER, true>(cells, group, buffers, found, range, 5, &masks);
-            let mut w = 1;
-            while w < 5 {
+            let mut w = 0;
+            if once {
+                // In its own column a particle pairs with the particles after it.
+                let start = *stencil.start.get_unchecked(0);
+                let range = [(group.first + a + 1) as u32, *start.add(cell_of(&ranges.end, 0, a))];
+                let shift = StencilColumns::<COLUMNS>::shift_index(0, 1);
+                found = append_range::<CLUSTER, true, false>(buffers, found, range, shift, &masks);
+                w = 1;
+            }
+            while w < COLUMNS {
                 let start = *stencil.start.get_unchecked(w);
                 let range = [*start.add(cell_of(&ranges.low, w, a)), *start.add(cell_of(&ranges.end, w, a))];
-                found = append_range::<GHOSTS, CLUSTER, false>(
-                    cells,
-                    group,
-                    buffers,
-                    found,
-                    range,
-                    w + 5,
-                    &masks,
-                );
+                let shift = StencilColumns::<COLUMNS>::shift_index(w, 1);
+                found = if once {
+                    append_range::<CLUSTER, false, false>(buffers, found, range, shift, &masks)
+                } else {
+                    append_range::<CLUSTER, false, true>(buffers, found, range, shift, &masks)
+                };
                 w += 1;
             }
             // The bits mark ranges that continue in the previous, and in the next, period.
             let bits = (1u32 << size) - 1;
             if flags.before >> a & bits != 0 {
-                let mut w = 1;
-                while w < 5 {
+                let mut w = once as usize;
+                while w < COLUMNS {
                     let start = *stencil.start.get_unchecked(w);
                     let end = *start.add(plane.cells_per_column as usize);
                     let range = [*start.add(cell_of(&ranges.before, w, a)), end];
-                    found = append_range::<GHOSTS, CLUSTER, false>(
-                        cells, group, buffers, found, range, w, &masks,
-                    );
+                    let shift = StencilColumns::<COLUMNS>::shift_index(w, 0);
+                    found = append_range::<CLUSTER, false, false>(buffers, found, range, shift, &masks);
                     w += 1;
                 }
             }
             if flags.after >> a & bits != 0 {
                 let mut w = 0;
-                while w < 5 {
+                while w < COLUMNS {
                     let start = *stencil.start.get_unchecked(w);
                     let range = [*start, *start.add(cell_of(&ranges.after, w, a))];
-                    found = append_range::<GHOSTS, CLUSTER, false>(
-                        cells,
-                        group,
-                        buffers,
-                        found,
-                        range,
-                        w + 10,
-                        &masks,
-                    );
+                    let shift = StencilColumns::<COLUMNS>::shift_index(w, 2);
+                    found = append_range::<CLUSTER, false, false>(buffers, found, range, shift, &masks);
                     w += 1;
                 }
             }
-            // Every i-cluster has at least one j-cluster.
+            // Among the owned particles every i-cluster has at least one j-cluster.
             let next = slot_blocks + (found - begin).div_ceil(SLOT_BLOCK);
-            *buffers.i_clusters.get_unchecked_mut(clusters) =
-                ICluster { first: a as u8, size: size as u8, slot_blocks: [slot_blocks as u32, next as u32] };
+            *buffers.i_clusters.get_unchecked_mut(clusters) = ICluster {
+                first: a as u8,
+                size: size as u8,
+                slot_blocks: [slot_blocks as u32, next as u32],
+                end_half: (2 * slot_blocks + (found - begin).div_ceil(SLOT_BLOCK / 2)) as u32,
+            };
             slot_blocks = next;
             clusters += 1;
             a += size;
@@ -112,9 +103,9 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
 /// The cell of i-particle `a` in stencil column `w`.
 ///
 /// # Safety
-/// `w` is below 5, and `a` below the size of a search group.
+/// The stencil has column `w`, and `a` below the size of a search group.
 #[inline(always)]
-unsafe fn cell_of(indices: &CellIndices, w: usize, a: usize) -> usize {
+unsafe fn cell_of<const COLUMNS: usize>(indices: &CellIndices<COLUMNS>, w: usize, a: usize) -> usize {
     // SAFETY: the caller promises indices below the sizes of these arrays.
     unsafe { *indices.get_unchecked(w).get_unchecked(a) as usize }
 }
@@ -123,10 +114,15 @@ unsafe fn cell_of(indices: &CellIndices, w: usize, a: usize) -> usize {
 /// their cell ranges into that of `a`. Returns the number of these particles.
 #[cold]
 #[inline(never)]
-fn merge_ranges(x: &[f32], extent: f32, ranges: &mut CellRanges, a: usize) -> usize {
+fn merge_ranges<const COLUMNS: usize>(
+    x: &[f32],
+    extent: f32,
+    ranges: &mut CellRanges<COLUMNS>,
+    a: usize,
+) -> usize {
     let size = x.iter().take_while(|other| (**other - x[0]).abs() <= extent).count().max(1);
     let all = a..a + size;
-    for w in 0..5 {
+    for w in 0..COLUMNS {
         for lowest in [&mut ranges.low[w], &mut ranges.before[w]] {
             lowest[a] = lowest[all.clone()].iter().copied().fold(lowest[a], i32::min);
         }
@@ -143,8 +139,6 @@ struct ClusterMasks {
     slots: usize,
     /// Sixteen set bits for each member of the i-cluster.
     members: [u64; MASKS_PER_CLUSTER],
-    /// Sixteen set bits for each member that is a ghost.
-    ghosts: [u64; MASKS_PER_CLUSTER],
 }
 
 /// `ClusterMasks::members` for each size of an i-cluster.
@@ -185,46 +179,33 @@ const fn first_bits() -> [[u64; 2]; 33] {
 }
 
 /// Appends the j-clusters of the particles `first..end`, and at least one in the own column; returns the new
-/// number of j-clusters. `shift` is the index of the periodic shift, which modulo 5 is the stencil column.
+/// number of j-clusters. `shift` is the index of the periodic shift. With `OFTEN_EMPTY` an empty range is passed over.
 ///
 /// # Safety
 /// Particles up to `end + 16` are inside the padding of `SortedParticles::make_room`.
 #[inline(always)]
-unsafe fn append_range<const GHOSTS: bool, const CLUSTER: usize, const OWN_COLUMN: bool>(
-    cells: &SortedCells,
-    group: &SearchGroup,
+unsafe fn append_range<const CLUSTER: usize, const OWN_COLUMN: bool, const OFTEN_EMPTY: bool>(
     buffers: &mut SearchBuffers,
     found: usize,
-    [mut first, mut end]: [u32; 2],
+    [first, end]: [u32; 2],
     shift: usize,
     masks: &ClusterMasks,
 ) -> usize {
     // SAFETY: the buffers always have room for two more j-clusters at each range of a group
     // (`USUAL_J_CLUSTERS`); `append_long_range` makes room for more than two.
     unsafe {
-        let mut owned = [[u64::MAX; MASKS_PER_CLUSTER]; 2];
-        if GHOSTS {
-            // Ghost–ghost pairs are skipped: a cluster of ghosts pairs with owned particles only.
-            if and(masks.ghosts, masks.members) == masks.members {
-                let [first_owned, end_owned] = *group.stencil.owned.get_unchecked(shift % 5);
-                if !OWN_COLUMN {
-                    first = first.max(first_owned);
-                }
-                end = end.min(end_owned);
-            }
-            let first = first as usize;
-            owned = [first, first + 16]
-                .map(|first| not_both_ghosts(masks.ghosts, cells.ghosts.owned_of_sixteen(first)));
+        if OFTEN_EMPTY && first >= end {
+            return found;
         }
         let length = end.saturating_sub(first) as usize;
         let slot_and_shift = (masks.slots.wrapping_add(found) << 8 | shift) as u32;
         let members = if OWN_COLUMN { and(masks.members, LATER) } else { masks.members };
         if length > 32 {
-            return append_long_range(cells, buffers, found, [first, end], members, masks, slot_and_shift);
+            return append_long_range(buffers, found, [first, end], members, masks, slot_and_shift);
         }
         // Two j-clusters are written and those in use counted, so that there is no branch to predict.
         let bits = FIRST_BITS.get_unchecked(length).map(|bits| [bits; MASKS_PER_CLUSTER]);
-        let [one, two] = [and(bits[0], and(members, owned[0])), and(bits[1], and(masks.members, owned[1]))];
+        let [one, two] = [and(bits[0], members), and(bits[1], masks.members)];
         let out = buffers.j_clusters.as_mut_ptr().add(found);
         *out = JCluster { candidates: one[0], first, slot_and_shift };
         *out.add(1) =
@@ -242,28 +223,10 @@ fn and(a: [u64; MASKS_PER_CLUSTER], b: [u64; MASKS_PER_CLUSTER]) -> [u64; MASKS_
     std::array::from_fn(|f| a[f] & b[f])
 }
 
-/// Candidate bits of pairs with at least one owned particle; `owned` has a bit for each of the sixteen candidates.
-#[inline(always)]
-fn not_both_ghosts(ghosts: [u64; MASKS_PER_CLUSTER], owned: u32) -> [u64; MASKS_PER_CLUSTER] {
-    let owned = EACH * u64::from(owned);
-    ghosts.map(|ghosts| !ghosts | owned)
-}
-
-/// Sixteen set bits for each ghost among eight particles, whose flags are one byte each.
-#[inline(always)]
-fn ghost_mask(flags: u64) -> [u64; MASKS_PER_CLUSTER] {
-    [flags & 0xffff_ffff, flags >> 32].map(|four| {
-        let spread =
-            four & 0xff | (four & 0xff00) << 8 | (four & 0xff_0000) << 16 | (four & 0xff00_0000) << 24;
-        0xffff * spread
-    })
-}
-
 /// Appends more than two j-clusters; `members` are the masks for the first one.
 #[cold]
 #[inline(never)]
 fn append_long_range(
-    cells: &SortedCells,
     buffers: &mut SearchBuffers,
     mut found: usize,
     [first, end]: [u32; 2],
@@ -274,12 +237,7 @@ fn append_long_range(
     buffers.reserve_j_clusters(found + (end - first).div_ceil(16) as usize);
     for begin in (first..end).step_by(16) {
         let bits = [FIRST_BITS[(end - begin).min(16) as usize][0]; MASKS_PER_CLUSTER];
-        let mut candidates = and(bits, if begin == first { members } else { masks.members });
-        if !cells.ghosts.is_empty() {
-            // SAFETY: `begin` is the index of a particle.
-            let owned = unsafe { cells.ghosts.owned_of_sixteen(begin as usize) };
-            candidates = and(candidates, not_both_ghosts(masks.ghosts, owned));
-        }
+        let candidates = and(bits, if begin == first { members } else { masks.members });
         buffers.j_clusters[found] = JCluster { candidates: candidates[0], first: begin, slot_and_shift };
         buffers.high_candidates[found] = candidates[1];
         slot_and_shift += ONE_SLOT;

@@ -1,6 +1,7 @@
-//! Finds the pairs within the search cutoff, up to thirty-two i-particles of a column at a time:
+//! Finds the pairs within the search cutoff, up to thirty-two i-particles of a column at a time. All i-particles are
+//! owned: their partners are owned particles in five columns, and then ghosts in nine.
 //!
-//! 1. [`cell_ranges`] computes in which cells of the five stencil columns each i-particle searches
+//! 1. [`cell_ranges`] computes in which cells of the stencil columns each i-particle searches
 //!    partners;
 //! 2. [`j_clusters`]: four or eight neighbouring i-particles form an i-cluster; the cell ranges of a cluster are cut into
 //!    j-clusters of sixteen particles;

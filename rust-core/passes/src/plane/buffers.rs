@@ -1,6 +1,6 @@
 //! Scratch arrays of a thread for the first pass.
 
-use super::list::PairList;
+use super::list::Listed;
 use crate::pair_batch::buffers::BatchBuffers;
 use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::Scalar;
@@ -10,8 +10,8 @@ use crate::simd::Scalar;
 pub struct PairBuffers<T> {
     pub search: SearchBuffers,
     pub batch: BatchBuffers<T>,
-    /// The pairs of the present plane that are listed for the thermostat.
-    pub list: PairList,
+    /// The pairs of the present plane that are listed for the thermostat, and those with ghosts.
+    pub lists: Listed,
 }
 
 impl<T: Scalar> PairBuffers<T> {
@@ -20,7 +20,7 @@ impl<T: Scalar> PairBuffers<T> {
         PairBuffers {
             search: SearchBuffers::default(),
             batch: BatchBuffers::new(passes),
-            list: PairList::default(),
+            lists: Listed::default(),
         }
     }
 }

@@ -1,10 +1,9 @@
-//! The first pass over columns of a plane: the pairs of their particles with each other, with the next column
-//! and with the next plane, the
-//! forces without density terms, and the weights.
+//! The first pass over columns of a plane: the pairs of their particles with each other, with the next column, with the
+//! next plane and with ghosts, the forces without density terms, and the weights.
 
 use super::buffers::PairBuffers;
 use super::data::PassData;
-use super::list::{ListTerms, PairList, PairsAt, VectorsOfPairs, append_batch};
+use super::list::{ListTerms, Listed, PairList, PairsAt, VectorsOfPairs, append_batch};
 use super::traversal::{BatchVisitor, each_batch};
 use crate::ground::arithmetic::{Arithmetic, PairVector};
 use crate::instruction_set::InstructionSet;
@@ -21,8 +20,8 @@ use crate::simd::{Isa, Kernel, Reals, Words, run};
 use crate::tally::Tally;
 use std::ops::Range;
 
-/// Does the first pass over `columns` of `plane`, writes to `in_range` the pairs that the second pass needs, and appends
-/// those that are listed to the list of the plane.
+/// Does the first pass over `columns` of `plane`, writes the pairs that the second pass needs to `in_range`, those with
+/// ghosts to `rim`, and appends those that are listed to the lists of the plane.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. Arrays have the sizes that the types in [`PassData`]
@@ -37,6 +36,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
     sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
+    rim: &mut InRangePairs<A::Scalar>,
 ) -> Tally {
     let (cells, inputs, listed) = (&data.cells, &data.inputs, data.listed);
     let passes = inputs.terms.passes.len();
@@ -44,10 +44,13 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
     unsafe {
         if MULTISPECIES && inputs.caches_all_pairs() {
             in_range.full_cache.clear(passes, TALLY);
+            rim.full_cache.clear(passes, TALLY);
         } else {
             in_range.clear(passes, cells.column(plane, 0)[0] as u32);
+            // The ghosts may be of any plane.
+            rim.clear(passes, 0);
         }
-        let PairBuffers { search, batch, list } = buffers;
+        let PairBuffers { search, batch, lists } = buffers;
         let constants = StepConstants::<I, A>::new(inputs, listed.is_some());
         let mut pass = FirstPass::<I, A, MULTISPECIES, TALLY> {
             inputs,
@@ -55,17 +58,17 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
             sums,
             buffers: &mut *batch,
             in_range,
+            rim,
             listed,
             set: cells.set,
-            plane_first: cells.column(plane, 0)[0],
-            list: &mut *list,
+            lists: &mut *lists,
             tally: Tally::default(),
         };
         let last = columns.end - 1;
         let groups = each_batch::<I, _>(cells, plane, columns, A::Reals::LANES, search, &mut pass);
         let tally = pass.tally;
         if listed.is_some() {
-            list.begin_at(cells.column(plane, last)[1]);
+            lists.own.begin_at(cells.column(plane, last)[1]);
         }
         batch.counts.searched += groups;
         tally
@@ -79,10 +82,10 @@ struct FirstPass<'a, I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
     sums: PlaneSums<'a>,
     buffers: &'a mut BatchBuffers<A::Scalar>,
     in_range: &'a mut InRangePairs<A::Scalar>,
+    rim: &'a mut InRangePairs<A::Scalar>,
     listed: Option<&'a ListTerms>,
     set: InstructionSet,
-    plane_first: usize,
-    list: &'a mut PairList,
+    lists: &'a mut Listed,
     tally: Tally,
 }
 
@@ -110,7 +113,6 @@ impl<I: Isa> VectorsOfPairs<I> for Computed {
 struct Append<'a, const MULTISPECIES: bool> {
     list: &'a mut PairList,
     terms: &'a ListTerms,
-    plane_first: usize,
     batch: Batch<'a>,
     computed: Computed,
 }
@@ -120,9 +122,9 @@ impl<const MULTISPECIES: bool> Kernel for Append<'_, MULTISPECIES> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let Append { list, terms, plane_first, batch, computed } = self;
+        let Append { list, terms, batch, computed } = self;
         // SAFETY: the pass appends its batches in their order, with the arrays of this batch.
-        unsafe { append_batch::<I, MULTISPECIES>(list, terms, plane_first, batch, &computed) }
+        unsafe { append_batch::<I, MULTISPECIES>(list, terms, batch, &computed) }
     }
 }
 
@@ -137,13 +139,14 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
             let (inputs, sums) = (self.inputs, self.sums);
             let Some(batch) = Batch::of_group(search, slots) else { return };
             let buffers = &mut *self.buffers;
+            let in_range = if batch.with_ghosts { &mut *self.rim } else { &mut *self.in_range };
             buffers.reserve(batch.count);
             A::load_i_particles(inputs.packed.as_ptr().add(batch.first), &mut buffers.i_particles);
             evaluate::<I, A, MULTISPECIES, TALLY>(
                 inputs,
                 &self.constants,
                 buffers,
-                self.in_range,
+                in_range,
                 batch,
                 &mut self.tally,
             );
@@ -153,13 +156,13 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 let [a, b] = &buffers.tags;
                 let computed =
                     Computed { pairs: buffers.pairs.as_ptr().cast(), tags: [a.as_ptr(), b.as_ptr()] };
-                let (list, plane_first) = (&mut *self.list, self.plane_first);
-                run(self.set, Append::<MULTISPECIES> { list, terms, plane_first, batch, computed });
+                let list = self.lists.of(batch);
+                run(self.set, Append::<MULTISPECIES> { list, terms, batch, computed });
             }
             // Forces are added first: the quads of weights replace theirs.
             if !(MULTISPECIES && inputs.caches_all_pairs()) {
                 scatter_forces::<I, A>(sums, buffers, batch);
-                self.in_range.add::<TALLY>(&buffers.found, batch);
+                in_range.add::<TALLY>(&buffers.found, batch);
             }
             if sums.variables > 1 {
                 scatter_weights::<I, A, MULTISPECIES>(inputs, sums, buffers, batch);

@@ -21,7 +21,8 @@ use std::ops::Range;
 pub struct Pair {
     /// Vector `ê √(½ Δt γ) w_R` from the second particle to the first.
     pub g: [f32; 3],
-    /// Index of the second particle, counted from the first particle of the first particle's plane, through the next plane.
+    /// Index of the second particle, counted from the first particle of the first particle's plane, through the next plane;
+    /// in a list of [`Listed::with_ghosts`] counted from the first of all.
     pub j: u32,
 }
 
@@ -38,6 +39,8 @@ pub struct ExactPair {
 pub struct PairList {
     /// The first of these particles.
     pub first: usize,
+    /// The particle that indices of second particles count from.
+    j_from: usize,
     /// Index of each particle's first pair; the last entry is one past the last pair.
     pub start: Vec<u32>,
     pub pairs: Vec<Pair>,
@@ -48,6 +51,28 @@ pub struct PairList {
     /// Ratio `r/|g|` of each pair; empty unless requested.
     pub stretch: Vec<f64>,
     scratch: Scratch,
+}
+
+/// The listed pairs of owned particles of a plane, or of a part of it.
+#[derive(Debug, Clone, Default)]
+pub struct Listed {
+    pub own: PairList,
+    /// The pairs of these particles with ghosts, without entries for the last particles.
+    pub with_ghosts: PairList,
+}
+
+impl Listed {
+    /// Empties the lists of a plane that begins with `plane_first`; their first particle will be `first`.
+    pub fn clear(&mut self, first: usize, plane_first: usize) {
+        self.own.clear(first, plane_first);
+        self.with_ghosts.clear(first, 0);
+    }
+
+    /// The list for a batch.
+    #[inline(always)]
+    pub fn of(&mut self, batch: Batch) -> &mut PairList {
+        if batch.with_ghosts { &mut self.with_ghosts } else { &mut self.own }
+    }
 }
 
 /// Scratch arrays of a batch that is listed.
@@ -68,9 +93,9 @@ pub fn pairs_of_each(
 }
 
 impl PairList {
-    /// Empties the list; its first particle will be `first`.
-    pub fn clear(&mut self, first: usize) {
-        self.first = first;
+    /// Empties the list; its first particle will be `first`, and indices of second particles count from `j_from`.
+    pub fn clear(&mut self, first: usize, j_from: usize) {
+        (self.first, self.j_from) = (first, j_from);
         self.start.clear();
         self.start.push(0);
         self.pairs.clear();
@@ -86,6 +111,21 @@ impl PairList {
         self.pairs.extend_from_slice(&next.pairs);
         self.tags.iter_mut().zip(&next.tags).for_each(|(tags, next)| tags.extend_from_slice(next));
         self.stretch.extend_from_slice(&next.stretch);
+    }
+
+    /// Gives the next particle the pairs that have been added since the last one.
+    pub fn end_particle(&mut self) {
+        self.start.push(self.pairs.len() as u32);
+    }
+
+    /// Adds pair `k` of another list, with the index `j` of its second particle; with `swap` its particles change places.
+    pub fn add(&mut self, other: &PairList, k: usize, j: u32, swap: bool) {
+        let sign = if swap { -1.0 } else { 1.0 };
+        self.pairs.push(Pair { g: other.pairs[k].g.map(|g| sign * g), j });
+        let [a, b] = [0, 1].map(|side| other.tags[side ^ usize::from(swap)][k]);
+        self.tags[0].push(a);
+        self.tags[1].push(b);
+        self.stretch.extend(other.stretch.get(k));
     }
 
     /// Gives no pairs to the particles before `place` that are not listed yet.
@@ -136,7 +176,7 @@ pub trait VectorsOfPairs<I: Isa> {
     unsafe fn at(&self, k: usize) -> PairsAt<I>;
 }
 
-/// Appends the pairs of a batch within their range to a list; indices of second particles count from `plane_first`.
+/// Appends the pairs of a batch within their range to a list.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. The list has no particle of the batch or after it yet.
@@ -144,12 +184,12 @@ pub trait VectorsOfPairs<I: Isa> {
 pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
     list: &mut PairList,
     terms: &ListTerms,
-    plane_first: usize,
     batch: Batch,
     vectors: &impl VectorsOfPairs<I>,
 ) {
     type W<I> = <<I as Isa>::F32 as Reals>::Words;
     list.begin_at(batch.first);
+    let j_from = (list.j_from as u32) << OFFSET_BITS;
     let PairList { start, pairs, tags: [a, b], stretch, scratch: Scratch { kept, per_distance }, .. } = list;
     let (lanes, tables) = (I::F32::LANES, &terms.tables);
     let room = batch.count + 16;
@@ -169,7 +209,7 @@ pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
         let before = pairs.len();
         let to_pairs = pairs.as_mut_ptr().add(before);
         let to_tags = [a.as_mut_ptr().add(before), b.as_mut_ptr().add(before)];
-        let plane_first = W::<I>::splat((plane_first as u32) << OFFSET_BITS);
+        let j_from = W::<I>::splat(j_from);
         let mut found = 0;
         let mut k = 0;
         while k < batch.count {
@@ -182,8 +222,7 @@ pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
             }
             *kept.get_unchecked_mut(k / lanes) = [mask, found as u32];
             let [dx, dy, dz] = geometry.d;
-            let j =
-                W::<I>::load(batch.j_offsets.as_ptr().add(k)).sub(plane_first).shift_right::<OFFSET_BITS>();
+            let j = W::<I>::load(batch.j_offsets.as_ptr().add(k)).sub(j_from).shift_right::<OFFSET_BITS>();
             let columns = [factor * dx, factor * dy, factor * dz, I::of_bits(j)];
             I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
             I::of_bits(tags[0]).compress(mask).store(to_tags[0].add(found).cast());
@@ -227,7 +266,8 @@ pub struct ListInputs<'a> {
     pub terms: &'a ListTerms,
 }
 
-/// Lists the pairs of particles of a plane with each other and with the next plane, each pair once.
+/// Lists the pairs of owned particles of a plane with each other and with the next plane, each pair once, and those with
+/// ghosts.
 ///
 /// # Safety
 /// Arrays have the sizes that [`SortedCells`] states, and are filled; no thread writes them.
@@ -236,11 +276,12 @@ pub unsafe fn list_pairs(
     inputs: &ListInputs,
     plane: usize,
     buffers: &mut ListBuffers,
-    list: &mut PairList,
+    lists: &mut Listed,
 ) {
     // SAFETY: the caller promises a plane of the grid.
-    list.clear(unsafe { inputs.cells.column(plane, 0)[0] });
-    let task = ListPairs { inputs, plane, buffers, list };
+    let first = unsafe { inputs.cells.column(plane, 0)[0] };
+    lists.clear(first, first);
+    let task = ListPairs { inputs, plane, buffers, lists };
     // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before it lists any
     // plane, and writes none of them while it lists.
     unsafe {
@@ -255,7 +296,7 @@ struct ListPairs<'a> {
     inputs: &'a ListInputs<'a>,
     plane: usize,
     buffers: &'a mut ListBuffers,
-    list: &'a mut PairList,
+    lists: &'a mut Listed,
 }
 
 struct WithSpecies<'a, const MULTISPECIES: bool>(ListPairs<'a>);
@@ -265,15 +306,15 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let ListPairs { inputs, plane, buffers: ListBuffers { search, i_particles }, list } = self.0;
+        let ListPairs { inputs, plane, buffers: ListBuffers { search, i_particles }, lists } = self.0;
         // SAFETY: the caller of `list_pairs` promises filled arrays; a plane has a first column.
         unsafe {
             let columns = inputs.cells.grid.columns_per_plane;
             let end = inputs.cells.column(plane, columns - 1)[1];
             let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
-            let mut lister = Lister::<I, MULTISPECIES> { inputs, metric, i_particles, list };
+            let mut lister = Lister::<I, MULTISPECIES> { inputs, metric, i_particles, lists };
             each_batch::<I, _>(&inputs.cells, plane, 0..columns, I::F32::LANES, search, &mut lister);
-            list.begin_at(end);
+            lists.own.begin_at(end);
         }
     }
 }
@@ -282,7 +323,7 @@ struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
     inputs: &'a ListInputs<'a>,
     metric: <Mixed as Arithmetic<I>>::Metric,
     i_particles: &'a mut IParticles<f32>,
-    list: &'a mut PairList,
+    lists: &'a mut Listed,
 }
 
 impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISPECIES> {
@@ -297,8 +338,7 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
             <Mixed as Arithmetic<I>>::load_i_particles(packed.add(batch.first), self.i_particles);
             let (metric, i_particles, species) = (self.metric, &*self.i_particles, terms.tables.species);
             let computed = Computed::<I, MULTISPECIES> { metric, packed, i_particles, batch, species };
-            let plane_first = self.list.first;
-            append_batch::<I, MULTISPECIES>(self.list, terms, plane_first, batch, &computed);
+            append_batch::<I, MULTISPECIES>(self.lists.of(batch), terms, batch, &computed);
         }
     }
 }

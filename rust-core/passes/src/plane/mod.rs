@@ -6,7 +6,6 @@ pub mod first;
 pub mod list;
 pub mod listed_noise;
 pub mod pair_sums;
-pub mod rim;
 pub mod second;
 pub mod second_cached;
 pub mod slopes;

@@ -1,8 +1,10 @@
 //! The second pass over a plane: the many-body forces `−(∂ψ_i/∂n + ∂ψ_j/∂n) w′ ê` of the pairs
-//! that the first pass has listed. On a rank it also lists the rim.
+//! that the first pass has listed.
+//!
+//! A rank knows the slopes of ghosts only after its host has sent them. Its rim, which is its pairs of an owned particle
+//! and a ghost, therefore has a second pass of its own then, which adds to the owned particles.
 
 use super::data::PassData;
-use super::rim::Rim;
 use super::second_cached::second_pass_cached;
 use crate::ground::arithmetic::Arithmetic;
 use crate::pair_batch::accumulators::PlaneSums;
@@ -53,7 +55,8 @@ impl ISums {
 /// # Safety
 /// The caller fulfils the contract of `simd`. [`first_pass`](super::first::first_pass) has filled
 /// `in_range` for the plane of these sums, with the same `TALLY`. The slopes of the plane and of the
-/// next one are complete, and no thread writes them. With `RIM` there are ghosts, and their slopes are zero.
+/// next one are complete, and no thread writes them. With `RIM` the second particles of the pairs are ghosts, whose slopes
+/// are complete, and only the first particles have sums.
 #[inline(always)]
 pub unsafe fn second_pass<
     I: Isa,
@@ -65,7 +68,6 @@ pub unsafe fn second_pass<
     data: &PassData<A::Scalar, A::PackedParticle>,
     sums: PlaneSums,
     in_range: &InRangePairs<A::Scalar>,
-    rim: &mut Rim<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
     // SAFETY: the first pass has listed `found` pairs of each density for each batch; codes name particles of the
@@ -73,7 +75,7 @@ pub unsafe fn second_pass<
     unsafe {
         if MULTISPECIES && data.inputs.caches_all_pairs() {
             let cache = &in_range.full_cache;
-            return second_pass_cached::<I, A, MULTISPECIES, TALLY, RIM>(data, sums, cache, rim, virial);
+            return second_pass_cached::<I, A, MULTISPECIES, TALLY>(data, sums, cache, RIM, virial);
         }
         let to = sums.forces();
         let plane_first = in_range.plane_first as usize;
@@ -82,14 +84,11 @@ pub unsafe fn second_pass<
         let species_j = data.inputs.species.as_ptr().wrapping_add(plane_first);
         let passes = in_range.weight_gradients.len();
         let width = passes * species;
-        // Without ghosts there are no flags, and none are read.
-        let plane_flags = data.cells.ghosts.flags.as_ptr().wrapping_add(plane_first);
         let mut i_sums = ISums([[[0.0; 4]; TURNS]; 16]);
         let mut done = vec![0; passes];
         let mut b = 0;
         while b < in_range.batches.len() {
             let [first, members] = in_range.batches.get_unchecked(b).map(|n| n as usize);
-            let i_flags = data.cells.ghosts.flags.as_ptr().wrapping_add(first);
             let mut pass = 0;
             while pass < passes {
                 let gradients = in_range.weight_gradients.get_unchecked(pass).as_ptr();
@@ -100,18 +99,11 @@ pub unsafe fn second_pass<
                 let species_i = data.inputs.species.as_ptr().wrapping_add(first);
                 let begin = *done.get_unchecked(pass);
                 let end = begin + *in_range.found.get_unchecked(b * passes + pass) as usize;
-                let marked = if RIM { rim.marked(end - begin) } else { std::ptr::null_mut() };
-                let mut found = 0;
                 let mut p = begin;
                 while p < end {
                     let gradient = gradients.add(p).cast::<A::Scalar>();
                     let code = (*gradient.add(3)).decode();
                     let (j, m) = ((code >> I_CODE_BITS) as usize, (code & ((1 << I_CODE_BITS) - 1)) as usize);
-                    if RIM {
-                        // There is no branch to predict: near the rim it would often go the other way.
-                        *marked.add(found) = p as u32;
-                        found += (*i_flags.add(m) ^ *plane_flags.add(j)) as usize;
-                    }
                     let j_slopes = plane_slopes.add(width * j);
                     let slope = if MULTISPECIES {
                         let (i, j) = (*species_i.add(m) as usize, *species_j.add(j) as usize);
@@ -120,28 +112,16 @@ pub unsafe fn second_pass<
                         *i_slopes.add(width * m) + *j_slopes
                     };
                     let force = A::load_quad(gradient).mul(I::Quad::splat(slope));
-                    let at = to_plane.add(4 * j);
-                    I::Quad::load(at).sub(force).store(at);
+                    if !RIM {
+                        let at = to_plane.add(4 * j);
+                        I::Quad::load(at).sub(force).store(at);
+                    }
                     let at = i_sums.at(m, p);
                     I::Quad::load(at).add(force).store(at);
                     if TALLY {
                         add_dyad(*separations.add(p), *gradients.add(p), slope, virial);
                     }
                     p += 1;
-                }
-                for k in 0..found {
-                    let p = *marked.add(k) as usize;
-                    let quad = *gradients.add(p);
-                    let code = quad[3].decode() as usize;
-                    let (j, m) = (code >> I_CODE_BITS, code & ((1 << I_CODE_BITS) - 1));
-                    let i_is_ghost = *i_flags.add(m);
-                    let slope = match (MULTISPECIES, i_is_ghost) {
-                        (false, _) => pass,
-                        (true, false) => pass * species + *species_i.add(m) as usize,
-                        (true, true) => pass * species + *species_j.add(j) as usize,
-                    };
-                    let d = if TALLY { Some(*separations.add(p)) } else { None };
-                    rim.push([first + m, plane_first + j], i_is_ghost, slope, quad, d);
                 }
                 *done.get_unchecked_mut(pass) = end;
                 pass += 1;

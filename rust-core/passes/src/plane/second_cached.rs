@@ -1,7 +1,6 @@
 //! The second pass over the full pair cache: whole forces, a vector of pairs at a time.
 
 use super::data::PassData;
-use super::rim::Rim;
 use super::slopes::SLOPES_PER_BLOCK;
 use crate::ground::arithmetic::Arithmetic;
 use crate::ground::species_pairs::table_entry;
@@ -12,25 +11,19 @@ use crate::pair_batch::full_pair_cache::{
 };
 use crate::pair_batch::pair_terms::{add_virial, sum_lanes};
 use crate::pair_batch::scatter::{ScatterPairs, scatter_quads};
-use crate::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
+use crate::simd::{Isa, Reals, Words};
 use psidpd_model::kernel::Real;
 
-/// Does the second pass over `plane`, and adds to the virial with `TALLY`.
+/// Does the second pass over the pairs of a plane, or over its rim `with_ghosts`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
 /// The caller fulfils the contract of [`second_pass`](super::second::second_pass).
 #[inline(always)]
-pub unsafe fn second_pass_cached<
-    I: Isa,
-    A: Arithmetic<I>,
-    const MULTISPECIES: bool,
-    const TALLY: bool,
-    const RIM: bool,
->(
+pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     sums: PlaneSums,
     cache: &FullPairCache<A::Scalar>,
-    rim: &mut Rim<A::Scalar>,
+    with_ghosts: bool,
     virial: &mut [f64; 6],
 ) {
     // SAFETY: scratch arrays have room for whole vectors of the largest batch, and a quad more;
@@ -39,7 +32,7 @@ pub unsafe fn second_pass_cached<
         let to = sums.forces();
         let room = cache.most / 16 + 2;
         let mut quads: Vec<CacheLines<A::Scalar>> = vec![CacheLines::default(); room];
-        let mut running: Vec<Accumulator> = vec![Accumulator::default(); 8 * room];
+        let mut running: Vec<Accumulator> = vec![Accumulator::default(); 16 * room];
         let mut factors: Vec<CacheLines<A::Scalar>> = vec![CacheLines::default(); room];
         let quads = quads.as_mut_ptr().cast::<A::Scalar>();
         let factors = factors.as_mut_ptr().cast::<A::Scalar>();
@@ -62,14 +55,12 @@ pub unsafe fn second_pass_cached<
                 }
             }
             whole_forces::<A::Reals, TALLY>(&pairs, factors, quads, virial);
-            if RIM {
-                list_rim::<A::Scalar, _, TALLY>(data, &pairs, count, rim);
-            }
             let listed = ScatterPairs {
                 j_offsets: pairs.j_offsets(),
                 begin: batch.begin.as_ptr(),
                 first: batch.first as usize,
                 members: batch.members as usize,
+                with_ghosts,
             };
             let running = running.as_mut_ptr().cast();
             scatter_quads::<I, A>(to, quads, quads, running, [1.0, 1.0, 1.0, 0.0], listed);
@@ -105,50 +96,6 @@ impl<T> CachedPairs<'_, T> {
     fn codes(&self) -> *const u32 {
         // SAFETY: `append_to_cache` has written the vectors of the batch to every field.
         unsafe { self.cache.codes.as_ptr().add(self.batch.vector).cast() }
-    }
-}
-
-/// Adds the rim pairs of a batch of `count` pairs to `rim`.
-///
-/// # Safety
-/// The caller fulfils the contract of [`second_pass_cached`], with `RIM`.
-#[inline(always)]
-unsafe fn list_rim<T: Scalar, R, const TALLY: bool>(
-    data: &PassData<T, R>,
-    pairs: &CachedPairs<T>,
-    count: usize,
-    rim: &mut Rim<T>,
-) {
-    // SAFETY: the first pass has stored `count` pairs in every field.
-    unsafe {
-        let (terms, ghosts, first) = (data.inputs.terms, &data.cells.ghosts, pairs.batch.first as usize);
-        let (codes, j_offsets) = (pairs.codes(), pairs.j_offsets());
-        let pair = |p: usize| {
-            let m = *codes.add(p) & ((1 << I_CODE_BITS) - 1);
-            [first + m as usize, (*j_offsets.add(p) >> OFFSET_BITS) as usize]
-        };
-        let (marked, flags) = (rim.marked(count), ghosts.flags.as_ptr());
-        let mut found = 0;
-        for p in 0..count {
-            let [i, j] = pair(p);
-            *marked.add(found) = p as u32;
-            found += (*flags.add(i) ^ *flags.add(j)) as usize;
-        }
-        for k in 0..found {
-            let p = *marked.add(k) as usize;
-            let [x, y, z] = [0, 1, 2].map(|c| *pairs.field(SEPARATION + c).add(p));
-            let i_is_ghost = *flags.add(pair(p)[0]);
-            let owned = pair(p)[i_is_ghost as usize];
-            let species = if terms.species > 1 { *data.inputs.species.at(owned) as usize } else { 0 };
-            for pass in 0..terms.passes.len() {
-                let g = pairs.field(WEIGHT_GRADIENT + pass).add(p).read().wide();
-                if g != 0.0 {
-                    let gradient = [x, y, z, T::default()].map(|d| T::of(g * d.wide()));
-                    let separation = if TALLY { Some([x, y, z, T::default()]) } else { None };
-                    rim.push(pair(p), i_is_ghost, pass * terms.species + species, gradient, separation);
-                }
-            }
-        }
     }
 }
 

@@ -243,8 +243,8 @@ impl Sweep {
         Ok(with!(&self.workspace, m => m.tally()))
     }
 
-    /// Does all of an evaluation on a rank that needs no slopes of ghosts: adds all forces to `force`,
-    /// with these slopes zero, and evaluates ψ; the other arguments are those of [`Sweep::evaluate`].
+    /// Does all of an evaluation on a rank that needs no slopes of ghosts: adds to `force` all forces but the many-body forces
+    /// of pairs with ghosts, and evaluates ψ; the other arguments are those of [`Sweep::evaluate`].
     ///
     /// # Errors
     /// Fails as [`Sweep::evaluate`], except that there may be ghosts.
@@ -319,7 +319,7 @@ impl Sweep {
 
     /// Moves the pairs that the last evaluation has listed, once; returns whether it has listed any. Particles of a cell
     /// are in the order of the host.
-    pub(super) fn take_pairs<T: AsMut<PlanePairs> + Default>(
+    pub(super) fn take_pairs<T: AsMut<PlanePairs> + Default + Send>(
         &mut self,
         lists: &mut PairLists,
         planes: &mut Vec<T>,
@@ -327,11 +327,11 @@ impl Sweep {
         let has_listed = std::mem::take(&mut self.has_listed);
         if has_listed {
             with!(&mut self.workspace, m => {
-                let (cells, ghosts) = m.sorted();
-                lists.follow(cells, ghosts);
+                let cells = m.sorted();
                 planes.resize_with(cells.grid.planes, T::default);
                 planes.iter_mut().enumerate().for_each(|(k, plane)| plane.as_mut().lie_in(cells, k));
-                m.move_lists(planes.iter_mut().map(|plane| &mut plane.as_mut().list));
+                let with_ghosts = m.move_lists(planes.iter_mut().map(|plane| &mut plane.as_mut().list));
+                lists.follow(&self.pool, m.sorted(), planes, &with_ghosts);
             });
         }
         has_listed
@@ -377,7 +377,7 @@ impl Sweep {
         &mut self.slopes
     }
 
-    /// Adds to `force`, which [`Sweep::first`] has added to, the many-body forces of the slopes of ghosts, and
+    /// Adds to `force`, which [`Sweep::first`] has added to, the many-body forces of pairs with ghosts, and
     /// returns the requested totals.
     ///
     /// A pair of an owned particle and a ghost is computed for the owned particle alone, with half of

@@ -3,6 +3,8 @@
 //! Particles are in the order of cells, and within a cell in the order of their tags: the order
 //! depends on positions and tags alone.
 
+mod with_ghosts;
+
 use super::region::region;
 use super::workspace::{CellOrder, Input, SortedParticles};
 use crate::engine::error::EngineError;
@@ -14,7 +16,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, PairList, list_pairs};
+use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, Listed, PairList, list_pairs};
 use psidpd_passes::tally::Want;
 use psidpd_threads::{Pool, part};
 use std::ops::Range;
@@ -52,8 +54,21 @@ pub struct PairLists {
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
+    /// Whether each sorted particle, or copy of one, is a ghost; empty without ghosts.
+    ghosts: Vec<bool>,
+    /// The pairs with ghosts of each plane's owned particles.
+    with_ghosts: Vec<PairList>,
     /// Sorted index by index of the host, or [`NOWHERE`].
     place: Vec<u32>,
+}
+
+/// Whether each sorted particle, or copy of one, is a ghost; empty without ghosts.
+fn flags_of_ghosts(cells: &CellOrder) -> Vec<bool> {
+    if cells.grid.layers == 1 {
+        return Vec::new();
+    }
+    let of_first_plane = &cells.order[..cells.copies()];
+    cells.order.iter().chain(of_first_plane).map(|k| *k as usize >= cells.owned).collect()
 }
 
 /// The sorted index of particles that are left out.
@@ -62,13 +77,15 @@ pub const NOWHERE: u32 = u32::MAX;
 impl Clone for PairLists {
     /// Copies the order; the clone has scratch arrays of its own.
     fn clone(&self) -> PairLists {
-        let PairLists { set, dimensions, cells, particles, place, .. } = self;
+        let PairLists { set, dimensions, cells, particles, ghosts, place, .. } = self;
         PairLists {
             set: *set,
             dimensions: *dimensions,
             cells: cells.clone(),
             particles: particles.clone(),
             buffers: Vec::new(),
+            ghosts: ghosts.clone(),
+            with_ghosts: Vec::new(),
             place: place.clone(),
         }
     }
@@ -82,6 +99,8 @@ impl PairLists {
             cells: CellOrder::new(dimensions),
             particles: SortedParticles::default(),
             buffers: Vec::new(),
+            ghosts: Vec::new(),
+            with_ghosts: Vec::new(),
             place: Vec::new(),
         }
     }
@@ -96,9 +115,9 @@ impl PairLists {
         &self.place
     }
 
-    /// Whether each sorted particle is a ghost; empty without ghosts.
+    /// Whether each sorted particle, or copy of one, is a ghost; empty without ghosts.
     pub fn ghosts(&self) -> &[bool] {
-        &self.particles.ghost
+        &self.ghosts
     }
 
     /// Finds the pairs of `particles` within `range`, extended by the fraction `margin` where the box
@@ -131,7 +150,9 @@ impl PairLists {
         self.cells.sort(pool, set, geometry, grid, &input)?;
         self.sort_by_tags(pool, particles.tag);
         self.fill(pool, &input, terms.tables.species > 1);
+        self.ghosts = flags_of_ghosts(&self.cells);
         planes.resize_with(grid.planes, T::default);
+        self.with_ghosts.resize_with(grid.planes, PairList::default);
         self.buffers.resize_with(pool.threads(), ListBuffers::default);
         let cells = &self.cells;
         let shared = self.particles.share();
@@ -144,7 +165,6 @@ impl PairLists {
                 x: shared.x,
                 fixed16: shared.fixed16,
                 fixed16_scale: shared.fixed16_scale,
-                ghosts: shared.ghosts,
                 excluded: Excluded::default(),
             },
             packed: shared.packed,
@@ -152,7 +172,7 @@ impl PairLists {
         };
         let threads = pool.threads();
         let count = planes.len();
-        let mut rest = planes.iter_mut().enumerate();
+        let mut rest = planes.iter_mut().zip(&mut self.with_ghosts).enumerate();
         let mut work: Vec<_> = self
             .buffers
             .iter_mut()
@@ -162,22 +182,36 @@ impl PairLists {
             })
             .collect();
         pool.each(&mut work, |(buffers, planes)| {
-            for (number, plane) in planes {
+            for (number, (plane, with_ghosts)) in planes {
                 let plane = (*plane).as_mut();
                 plane.lie_in(cells, *number);
+                let [own, with_ghosts_here] = [&mut plane.list, with_ghosts].map(std::mem::take);
+                let mut lists = Listed { own, with_ghosts: with_ghosts_here };
                 // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
-                unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.list) };
+                unsafe { list_pairs(set, inputs, *number, buffers, &mut lists) };
+                Listed { own: plane.list, with_ghosts: **with_ghosts } = lists;
             }
         });
+        if !self.ghosts.is_empty() {
+            with_ghosts::join(pool, planes, &self.with_ghosts);
+        }
         Ok(())
     }
 
-    /// Takes over the order of a sweep, with the flags of its ghosts, whose planes have their own pairs.
-    pub fn follow(&mut self, cells: &CellOrder, ghosts: &[bool]) {
+    /// Takes over the order of a sweep, and the pairs of its owned particles with ghosts, which it adds to the planes.
+    pub fn follow<T: AsMut<PlanePairs> + Send>(
+        &mut self,
+        pool: &Pool,
+        cells: &CellOrder,
+        planes: &mut [T],
+        with_ghosts: &[PairList],
+    ) {
         self.cells.order.clone_from(&cells.order);
-        self.particles.ghost.clear();
-        self.particles.ghost.extend_from_slice(ghosts);
+        self.ghosts = flags_of_ghosts(cells);
         self.find_places(cells.all);
+        if !self.ghosts.is_empty() {
+            with_ghosts::join(pool, planes, with_ghosts);
+        }
     }
 
     /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag
@@ -230,7 +264,7 @@ impl PairLists {
 
     /// Fills the arrays in the order of cells.
     fn fill(&mut self, pool: &Pool, input: &Input, multispecies: bool) {
-        self.particles.make_room(pool, &self.cells, multispecies);
+        self.particles.make_room(&self.cells, multispecies);
         let (set, cells, threads) = (self.set, &self.cells, pool.threads());
         let shared = &self.particles.share();
         let mut work: Vec<_> = (0..threads).map(|t| cells.whole_vectors(t, threads)).collect();

@@ -37,7 +37,7 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::pair_batch::inputs::PairInputs;
 use psidpd_passes::plane::data::PassData;
-use psidpd_passes::plane::list::{ListTerms, PairList};
+use psidpd_passes::plane::list::{ListTerms, Listed, PairList};
 use psidpd_threads::{Pool, part};
 use scheduler::{PassInput, Scheduler};
 use slopes::SlopeArrays;
@@ -93,7 +93,7 @@ impl<P: PairPrecision> Workspace<P> {
     ) -> Result<(), EngineError> {
         (self.thermostat, self.totals) = (input.thermostat, input.totals);
         self.order.sort(pool, self.fluid.set, geometry, grid, input)?;
-        self.particles.make_room(pool, &self.order, self.fluid.terms.species > 1);
+        self.particles.make_room(&self.order, self.fluid.terms.species > 1);
         self.excluded.fill(&self.order, input.exclusions);
         let packs = self.fluid.terms.full_cache;
         self.slopes.make_room(&self.order, self.fluid.width(), packs);
@@ -101,8 +101,7 @@ impl<P: PairPrecision> Workspace<P> {
     }
 
     /// Does everything after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over
-    /// all planes, and their forces, with slopes of ghosts zero: [`Workspace::add_rim`] adds their
-    /// part. `times` are those of the caller's thread.
+    /// all planes, and their forces without the many-body forces of pairs with ghosts, which [`Workspace::add_rim`] adds. `times` are those of the caller's thread.
     ///
     /// # Errors
     /// Fails for ψ or a force that is not finite, and names the lowest tag.
@@ -178,22 +177,12 @@ impl<P: PairPrecision> Workspace<P> {
         } = self;
         let (particles, excluded) = (&particles.share(), excluded.share());
         let (slopes, sums) = (slopes.share(), accumulators.share());
-        let SharedParticles { x, fixed16_scale, fixed16, packed, species, ghosts } = *particles;
+        let SharedParticles { x, fixed16_scale, fixed16, packed, species } = *particles;
         let (geometry, grid, start) = (&order.geometry, &order.grid, &order.start[..]);
         let (terms, thermostat) = (&fluid.terms, self.thermostat);
         let data = PassData {
-            cells: SortedCells {
-                set: fluid.set,
-                geometry,
-                grid,
-                start,
-                x,
-                fixed16,
-                fixed16_scale,
-                ghosts,
-                excluded,
-            },
-            inputs: PairInputs { geometry, terms, thermostat, packed, species, ghosts },
+            cells: SortedCells { set: fluid.set, geometry, grid, start, x, fixed16, fixed16_scale, excluded },
+            inputs: PairInputs { geometry, terms, thermostat, packed, species },
             slopes: slopes.slopes,
             listed: listed.as_ref(),
         };
@@ -203,32 +192,43 @@ impl<P: PairPrecision> Workspace<P> {
         work(scheduler, &mut slabs);
     }
 
-    /// The order of the particles, and their flags of ghosts, if there are any.
-    pub fn sorted(&self) -> (&CellOrder, &[bool]) {
-        (&self.order, &self.particles.ghost)
+    /// The order of the particles.
+    pub fn sorted(&self) -> &CellOrder {
+        &self.order
     }
 
     /// Gives lists, in the order of planes, to the threads that will need their memory.
     pub fn lend_lists(&mut self, mut lists: impl ExactSizeIterator<Item = PairList>) {
         let (count, threads) = (lists.len(), self.threads.len());
         for (number, state) in self.threads.iter_mut().enumerate() {
-            state.lists = lists.by_ref().take(part(count, number, threads).len()).collect();
+            let lists = lists.by_ref().take(part(count, number, threads).len());
+            state.lists = lists.map(|own| Listed { own, ..Listed::default() }).collect();
         }
     }
 
     /// Moves the pairs that the last evaluation has listed to the lists of the planes, whose memory it keeps for the next.
-    pub fn move_lists<'a>(&mut self, lists: impl Iterator<Item = &'a mut PairList>) {
+    /// Returns the pairs with ghosts of each plane.
+    pub fn move_lists<'a>(&mut self, lists: impl Iterator<Item = &'a mut PairList>) -> Vec<PairList> {
         let Workspace { order, threads, .. } = self;
         let mut lists: Vec<_> = lists.collect();
+        let mut with_ghosts = vec![PairList::default(); lists.len()];
         for (units, state) in order.thread_slabs(threads.len()).iter().zip(threads) {
             for (plane, found) in order.planes_of(units).zip(&mut state.lists) {
                 // A plane may be in several slabs.
-                match found.first == order.plane_start(plane) {
-                    true => std::mem::swap(lists[plane], found),
-                    false => lists[plane].append(found),
+                match found.own.first == order.plane_start(plane) {
+                    true => {
+                        std::mem::swap(lists[plane], &mut found.own);
+                        std::mem::swap(&mut with_ghosts[plane], &mut found.with_ghosts);
+                    }
+                    false => {
+                        lists[plane].append(&found.own);
+                        with_ghosts[plane].begin_at(found.with_ghosts.first);
+                        with_ghosts[plane].append(&found.with_ghosts);
+                    }
                 }
             }
         }
+        with_ghosts
     }
 
     /// Adds the times of the caller's thread; fails for ψ or a force that is not finite, and names the lowest tag.

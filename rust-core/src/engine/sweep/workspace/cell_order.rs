@@ -25,7 +25,8 @@ pub use fractions::TWO_TO_32;
 /// Up to this number of particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
-/// The particles of each cell. If planes are periodic, copies of the first plane follow the last plane.
+/// The particles of each cell: in each plane owned particles come first, then ghosts. If planes are periodic, copies of
+/// the first plane follow the last plane.
 #[derive(Clone)]
 pub struct CellOrder {
     pub geometry: BoxGeometry,
@@ -59,6 +60,8 @@ impl CellOrder {
                 plane_axis: 2,
                 search_cutoff: 1.0,
                 range_half_width: 1.0,
+                layers: 1,
+                interior: [0, 1],
                 i_cluster_size: 4,
                 i_cluster_extent: 1.0,
             },
@@ -73,15 +76,17 @@ impl CellOrder {
         }
     }
 
-    /// Sorts the particles into the cells of `grid`: by cell, and within a cell by the host's number.
+    /// Sorts the particles into the cells of `grid`: by cell, and within a cell by the host's number. Ghosts are in cells of
+    /// their own.
     pub fn sort(
         &mut self,
         pool: &Pool,
         set: InstructionSet,
         geometry: BoxGeometry,
-        grid: CellGrid,
+        mut grid: CellGrid,
         input: &Input,
     ) -> Result<(), EngineError> {
+        grid.layers = if input.has_ghosts() { 2 } else { 1 };
         (self.geometry, self.grid) = (geometry, grid);
         (self.all, self.owned) = (input.particles.x.len(), input.particles.owned);
         let (all, cells, threads) = (self.all, grid.cell_count(), pool.threads());
@@ -89,8 +94,7 @@ impl CellOrder {
         self.fixed32.resize(all, [0; 3]);
         self.counts.resize(threads * cells, 0);
         self.sums.resize(threads * threads, 0);
-        let per_plane = grid.columns_per_plane * grid.cells_per_column;
-        self.start.resize(cells + 1 + if self.is_periodic() { per_plane } else { 0 }, 0);
+        self.start.resize(cells + 1 + if self.is_periodic() { grid.cells_per_plane() } else { 0 }, 0);
         self.start[0] = 0;
         self.order.resize(all, 0);
         let sorting = &Sorting {
@@ -99,6 +103,7 @@ impl CellOrder {
                 geometry: &self.geometry,
                 fractions: Fractions::new(&self.geometry, &self.grid),
                 first_kind: Count::first_kind(input),
+                to_ghosts: (grid.columns_per_plane * grid.cells_per_column) as u32,
             },
             threads,
             cells,
@@ -146,6 +151,9 @@ impl CellOrder {
         if (0..grid.planes).any(crowded) {
             return Err(EngineError::Host("two neighbouring planes of cells contain 2^25 particles or more"));
         }
+        if grid.layers > 1 && particles >> J_CODE_BITS > 0 {
+            return Err(EngineError::Host("a rank has 2^25 particles and ghosts or more"));
+        }
         Ok(())
     }
 
@@ -167,7 +175,14 @@ impl CellOrder {
 
     /// The first particle of a plane, or one past the last.
     pub fn plane_start(&self, plane: usize) -> usize {
-        self.start[plane * self.grid.columns_per_plane * self.grid.cells_per_column] as usize
+        self.start[plane * self.grid.cells_per_plane()] as usize
+    }
+
+    /// The ghosts of a plane.
+    pub fn ghosts_of(&self, plane: usize) -> Range<usize> {
+        let grid = &self.grid;
+        let owned = plane * grid.cells_per_plane() + grid.columns_per_plane * grid.cells_per_column;
+        self.start[owned] as usize..self.plane_start(plane + 1)
     }
 
     /// The range of particles of consecutive planes.

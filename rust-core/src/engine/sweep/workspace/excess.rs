@@ -47,13 +47,12 @@ impl<'a> ExcessInput<'a> {
     fn add(&self, numbers: &[u32], width: usize, densities: &mut [f64]) {
         if width == 1 {
             for (k, n) in numbers.iter().zip(densities) {
-                *n += self.added.get(*k as usize).copied().unwrap_or_default();
+                *n += self.added[*k as usize];
             }
             return;
         }
         for (k, row) in numbers.iter().zip(densities.chunks_exact_mut(width)) {
-            // Ghosts have no row.
-            let added = self.added.get(width * *k as usize..).unwrap_or_default();
+            let added = &self.added[width * *k as usize..][..width];
             row.iter_mut().zip(added).for_each(|(n, added)| *n += added);
         }
     }
@@ -67,8 +66,6 @@ pub struct DensityBlock<'a> {
     pub added: (Added<'a>, Option<Added<'a>>),
     /// Species of the particles; empty with one species.
     pub species: &'a [u8],
-    /// Ghost flags of the particles; empty without ghosts.
-    pub ghost: &'a [bool],
     pub densities: &'a mut [f64],
     pub excess: &'a mut [f64],
     pub slopes: &'a mut [f64],
@@ -83,21 +80,16 @@ impl DensityBlock<'_> {
         order: &CellOrder,
         pass: &mut ExcessPass,
     ) -> Result<(), EngineError> {
-        let DensityBlock { first, added, species, ghost, densities, excess, slopes } = self;
+        let DensityBlock { first, added, species, densities, excess, slopes } = self;
         sum_densities(fluid.set, fluid.width(), added, &input.self_weights, species, densities);
         if !input.added.is_empty() {
             input.add(&order.order[first..][..excess.len()], fluid.width(), densities);
         }
         let rows = &mut Rows { first: 0, columns: &fluid.variables, densities, excess, slopes };
         let tag = |s: usize| input.tag[order.order[first + s] as usize];
-        match (species.is_empty(), ghost.is_empty()) {
-            (true, true) => pass.run(input.plan, None::<fn(usize) -> i32>, tag, rows),
-            (true, false) => pass.run(input.plan, Some(|s: usize| -(ghost[s] as i32)), tag, rows),
-            (false, true) => pass.run(input.plan, Some(|s: usize| species[s] as i32), tag, rows),
-            (false, false) => {
-                let species = |s: usize| if ghost[s] { -1 } else { species[s] as i32 };
-                pass.run(input.plan, Some(species), tag, rows)
-            }
+        match species.is_empty() {
+            true => pass.run(input.plan, None::<fn(usize) -> i32>, tag, rows),
+            false => pass.run(input.plan, Some(|s: usize| species[s] as i32), tag, rows),
         }
     }
 }

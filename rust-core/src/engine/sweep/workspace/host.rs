@@ -16,23 +16,27 @@ impl<P: PairPrecision> Workspace<P> {
     pub fn slopes_to_host(&self, pool: &Pool, out: &mut Vec<f64>) {
         let (width, slopes, order) = (self.fluid.width(), self.slopes.rows(), &self.order);
         out.resize(width * order.all, 0.0);
+        if width == 0 {
+            return;
+        }
         let out = SharedSlice::new(out);
         pool.run(&|t| {
-            let range = part(order.particles(), t, pool.threads());
-            for (s, k) in range.clone().zip(&order.order[range]) {
-                let k = *k as usize;
-                if k >= order.owned {
-                    continue;
-                }
-                // SAFETY: each particle occurs once in the order, and so in the part of one thread; owned particles have
-                // rows in `out`.
-                unsafe {
-                    if width == 1 {
-                        // One slope is by far the most common case, and needs no inner loop.
-                        *out.at(k) = slopes[s];
-                    } else {
-                        let row = out.slice_mut(width * k..width * (k + 1));
-                        row.copy_from_slice(&slopes[width * s..][..width]);
+            for plane in part(order.grid.planes, t, pool.threads()) {
+                // Ghosts follow the owned particles of their plane.
+                let owned = order.plane_start(plane)..order.ghosts_of(plane).start;
+                let rows = &slopes[width * owned.start..width * owned.end];
+                for (row, k) in order.order[owned].iter().enumerate() {
+                    let k = *k as usize;
+                    // SAFETY: each particle occurs once in the order, and so in the part of one thread; owned particles
+                    // have rows in `out`.
+                    unsafe {
+                        if width == 1 {
+                            // One slope is by far the most common case, and needs no inner loop.
+                            *out.at(k) = rows[row];
+                        } else {
+                            out.slice_mut(width * k..width * (k + 1))
+                                .copy_from_slice(&rows[width * row..][..width]);
+                        }
                     }
                 }
             }
@@ -46,8 +50,8 @@ impl<P: PairPrecision> Workspace<P> {
             tally += *plane;
         }
         if self.totals {
-            for (s, excess) in self.results.excess.iter().enumerate() {
-                if self.particles.ghost.get(s).is_none_or(|g| !*g) {
+            for (k, excess) in self.order.order.iter().zip(&self.results.excess) {
+                if (*k as usize) < self.order.owned {
                     tally.excess += excess;
                 }
             }

@@ -50,6 +50,12 @@ impl<'a> Input<'a> {
         Input { exclusions: Some(exclusions), ..self }
     }
 
+    /// Whether there are ghosts that are not images: only these are sorted.
+    pub fn has_ghosts(&self) -> bool {
+        let Particles { owned, x, .. } = self.particles;
+        owned < x.len() && (self.images.is_empty() || self.images.contains(&false))
+    }
+
     /// The species of a particle, or `None` if its type is unknown.
     #[inline(always)]
     pub fn species_of(&self, k: usize) -> Option<i32> {

@@ -1,6 +1,6 @@
 //! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache when the
-//! next pass reads them: all passes run together, and only a few planes are in memory at once. With ghosts the
-//! second pass takes their slopes as zero; `rim` adds the rest when the host has sent them.
+//! next pass reads them: all passes run together, and only a few planes are in memory at once. The
+//! many-body forces of pairs with ghosts follow when the host has sent the slopes of these: `rim` adds them.
 //!
 //! Each thread has a slab of consecutive units: planes, and at both ends perhaps a part of a plane. Dependencies
 //! between planes:
@@ -14,7 +14,7 @@
 //!
 //! Access of threads: a [`ThreadSlab`] belongs to one thread. Three arrays are shared. Packed particles are written
 //! by the thread of their slab, one plane ahead of its first pass. Threads of previous slabs read those of the
-//! slab's first two planes and four vectors more, threads of later slabs those of its last plane: these are filled
+//! slab's first two planes and four vectors more, threads of later slabs those of its last plane and ghosts of its last two: these are filled
 //! before any pass begins. Accumulators are written by the thread of the unit whose pairs add to them, except that
 //! the thread of the particles joins their sums. Slopes are written by the thread of their slab. Threads of previous
 //! slabs read those of the first planes, in a separate round after all slopes are written.
@@ -73,11 +73,11 @@ fn needed(order: &CellOrder, units: &Range<usize>, planes: usize) -> Range<usize
 }
 
 /// The particles of a slab that its thread fills before any pass begins: those of its first two planes, and of its
-/// last one; all if everything fits into the cache.
+/// last one, or two if there are ghosts; all if everything fits into the cache.
 fn filled_first(order: &CellOrder, units: &Range<usize>) -> [Range<usize>; 2] {
     let first = needed(order, units, if order.exceeds_cache() { 2 } else { order.grid.planes });
     let end = vectors_before(order.particles_of_units(units).end);
-    let last = order.planes_of(units).end.saturating_sub(1);
+    let last = order.planes_of(units).end.saturating_sub(order.grid.layers);
     let last = vectors_before(order.plane_start(last)).clamp(first.end, end);
     [first, last..end]
 }
@@ -133,7 +133,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
             filled = end;
             lap(&mut since, &mut slab.state.times.sort);
             slab.state.exchange_list(plane - planes.start);
-            slab.state.buffers.list.clear(self.order.plane_start(plane).max(slab.first));
+            let first = self.order.plane_start(plane);
+            slab.state.buffers.lists.clear(first.max(slab.first), first);
             for unit in self.units(slab, plane) {
                 // SAFETY: this plane, the next and the vectors after them are filled; if the next plane is
                 // not of this slab, or a copy, it was filled by `fill_start`.
@@ -232,14 +233,14 @@ impl<P: PairPrecision> Scheduler<'_, P> {
     /// The plane, the next one and the vectors after them are filled; no thread writes there meanwhile.
     unsafe fn first(&self, slab: &mut ThreadSlab<P::Scalar>, unit: &Unit) {
         let (kept, Unit { plane, columns, .. }) = (self.kept(slab, unit.plane), unit.clone());
-        let (buffers, in_range, _, tally) = slab.unit(kept, self.order, unit);
+        let (buffers, in_range, rim, tally) = slab.unit(kept, self.order, unit);
         // SAFETY: no other unit of the set reaches these particles, and each unit is in one slab.
         unsafe { self.sums.clear(self.fluid.set, self.order, unit) };
         let sums = self.sums.of_unit(self.order, unit, self.fluid.width());
         // SAFETY: `make_room` has sized all arrays for this order; the caller promises that they are
         // filled where the pass reads them, and the accumulators are those of this plane and the next.
         *tally = unsafe {
-            P::first(&self.passes, First { data: &self.data, plane, columns, sums, buffers, in_range })
+            P::first(&self.passes, First { data: &self.data, plane, columns, sums, buffers, in_range, rim })
         };
     }
 
@@ -265,15 +266,10 @@ impl<P: PairPrecision> Scheduler<'_, P> {
                 let added = self.sums.of_particles(self.order, unit, particles.clone());
                 (self.particles.species.slice(species), self.slopes.rows_mut(particles.clone()), added)
             };
-            if !self.particles.ghosts.is_empty() {
-                // ψ of ghosts is not evaluated: their slopes stay zero.
-                slopes.fill(0.0);
-            }
             let block = DensityBlock {
                 first,
                 added,
                 species,
-                ghost: self.particles.ghosts.flags.get(particles.clone()).unwrap_or_default(),
                 densities: &mut slab.densities[width * own..][..width * count],
                 excess: &mut slab.excess[own..][..count],
                 slopes: &mut *slopes,
@@ -291,7 +287,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
     }
 
-    /// Does the second pass of a unit, and lists its rim.
+    /// Does the second pass of a unit.
     ///
     /// # Safety
     /// Slopes of the plane and of the next are complete, and no thread writes them.
@@ -299,19 +295,13 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         if self.fluid.terms.passes.is_empty() {
             return;
         }
-        let (kept, plane) = (self.kept(slab, unit.plane), unit.plane);
-        let (_, in_range, rim, tally) = slab.unit(kept, self.order, unit);
-        rim.clear(self.order.plane_start(plane + 1));
-        let columns = self.order.grid.columns_per_plane;
-        let mut of_both =
-            self.particles.ghosts.owned_of_column.iter().skip(plane * columns).take(2 * columns);
-        let near_rim = of_both.any(|column| column.with_ghosts);
+        let (_, in_range, _, tally) = slab.unit(self.kept(slab, unit.plane), self.order, unit);
         let sums = self.sums.of_unit(self.order, unit, self.fluid.width());
         // SAFETY: the first pass of this unit has stored the pairs; the caller promises that slopes
         // are complete; the accumulators are those of this plane and the next.
         unsafe {
             let virial = &mut tally.virial;
-            P::second(&self.passes, Second { data: &self.data, sums, in_range, rim, near_rim, virial })
+            P::second(&self.passes, Second { data: &self.data, sums, in_range, is_rim: false, virial })
         };
     }
 

@@ -4,7 +4,7 @@ use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
 use psidpd_passes::plane::slopes::{SLOPES_PER_BLOCK, Slopes};
 use psidpd_passes::simd::Scalar;
-use psidpd_threads::SharedSlice;
+use psidpd_threads::{Pool, SharedSlice, part};
 use std::ops::Range;
 
 /// Slopes of all particles in the order of cells, then those of the copies of the first plane.
@@ -54,6 +54,30 @@ impl<T: Scalar> SlopeArrays<T> {
                 stride: self.stride,
             },
         }
+    }
+
+    /// Takes the slopes of ghosts from rows of the host.
+    pub fn take_ghosts(&mut self, pool: &Pool, order: &CellOrder, rows: &[f64]) {
+        let (width, shared) = (self.width, self.share());
+        pool.run(&|t| {
+            for plane in part(order.grid.planes, t, pool.threads()) {
+                let ghosts = order.ghosts_of(plane);
+                // SAFETY: each ghost is in one plane, and each plane in the part of one thread.
+                unsafe {
+                    let to = shared.rows_mut(ghosts.clone());
+                    let numbers = &order.order[ghosts.clone()];
+                    match width {
+                        1 => to.iter_mut().zip(numbers).for_each(|(to, k)| *to = rows[*k as usize]),
+                        _ => {
+                            for (to, k) in to.chunks_exact_mut(width).zip(numbers) {
+                                to.copy_from_slice(&rows[width * *k as usize..][..width]);
+                            }
+                        }
+                    }
+                    shared.pack(ghosts, to);
+                }
+            }
+        });
     }
 
     /// Size in bytes of the arrays.

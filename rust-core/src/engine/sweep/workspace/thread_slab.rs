@@ -8,8 +8,7 @@ use crate::engine::sweep::times::Times;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::in_range_pairs::InRangePairs;
 use psidpd_passes::plane::buffers::PairBuffers;
-use psidpd_passes::plane::list::PairList;
-use psidpd_passes::plane::rim::Rim;
+use psidpd_passes::plane::list::Listed;
 use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
 use psidpd_threads::take;
@@ -23,7 +22,7 @@ pub const KEPT_PLANES: usize = 6;
 pub struct ThreadState<T> {
     pub buffers: PairBuffers<T>,
     /// The listed pairs of each plane of the slab, or of the part that the slab has.
-    pub lists: Vec<PairList>,
+    pub lists: Vec<Listed>,
     pub excess: ExcessPass,
     /// Error of a ψ that was not finite.
     pub fault: Option<EngineError>,
@@ -48,12 +47,12 @@ impl<T: Scalar> ThreadState<T> {
         }
     }
 
-    /// Exchanges the list of the present plane with that of plane `number` of the slab.
+    /// Exchanges the lists of the present plane with those of plane `number` of the slab.
     pub fn exchange_list(&mut self, number: usize) {
         if number == self.lists.len() {
-            self.lists.push(PairList::default());
+            self.lists.push(Listed::default());
         }
-        std::mem::swap(&mut self.buffers.list, &mut self.lists[number]);
+        std::mem::swap(&mut self.buffers.lists, &mut self.lists[number]);
     }
 }
 
@@ -62,8 +61,8 @@ impl<T: Scalar> ThreadState<T> {
 pub struct PlaneResults<T> {
     /// Pairs for the second pass, of a few planes of each thread slab.
     in_range: Vec<InRangePairs<T>>,
-    /// The rim of each unit, if there are ghosts.
-    pub rims: Vec<Rim<T>>,
+    /// The rim of each unit: its pairs of an owned particle and a ghost.
+    pub rims: Vec<InRangePairs<T>>,
     pub tallies: Vec<Tally>,
     /// The densities of each particle, and ψ, in the order of cells.
     pub densities: Vec<f64>,
@@ -77,7 +76,7 @@ pub struct ThreadSlab<'a, T> {
     pub first: usize,
     pub state: &'a mut ThreadState<T>,
     in_range: &'a mut [InRangePairs<T>],
-    rims: &'a mut [Rim<T>],
+    rims: &'a mut [InRangePairs<T>],
     tallies: &'a mut [Tally],
     /// Densities of the particles of the slab.
     pub densities: &'a mut [f64],
@@ -88,7 +87,7 @@ impl<T: Scalar> PlaneResults<T> {
     /// Makes room for all particles of an order, `width` densities each, and for the pairs of a few planes of each slab.
     pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize) {
         self.in_range.resize_with(KEPT_PLANES * order.units_per_plane() * slabs, InRangePairs::default);
-        self.rims.resize_with(order.units(), Rim::default);
+        self.rims.resize_with(order.units(), InRangePairs::default);
         self.tallies.clear();
         self.tallies.resize(order.units(), Tally::default());
         self.excess.resize(order.particles(), 0.0);
@@ -125,12 +124,18 @@ impl<T: Scalar> PlaneResults<T> {
     /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         self.in_range.iter().map(|pairs| pairs.bytes()).sum::<usize>()
-            + self.rims.iter().map(Rim::bytes).sum::<usize>()
+            + self.rims.iter().map(|pairs| pairs.bytes()).sum::<usize>()
             + (self.densities.capacity() + self.excess.capacity()) * size_of::<f64>()
     }
 }
 
 impl<T> ThreadSlab<'_, T> {
+    /// The rim of a unit of the slab, and its energies and virials.
+    pub fn rim(&mut self, order: &CellOrder, unit: &Unit) -> (&InRangePairs<T>, &mut Tally) {
+        let number = unit.plane * order.units_per_plane() + unit.block - self.units.start;
+        (&self.rims[number], &mut self.tallies[number])
+    }
+
     /// The buffers of a pass over a unit of the slab, its pairs for the second pass, at place `kept` of its plane, its
     /// rim, and its energies and virials.
     pub fn unit(
@@ -138,7 +143,7 @@ impl<T> ThreadSlab<'_, T> {
         kept: usize,
         order: &CellOrder,
         unit: &Unit,
-    ) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Rim<T>, &mut Tally) {
+    ) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut InRangePairs<T>, &mut Tally) {
         let blocks = order.units_per_plane();
         let number = unit.plane * blocks + unit.block - self.units.start;
         let in_range = &mut self.in_range[kept * blocks + unit.block];

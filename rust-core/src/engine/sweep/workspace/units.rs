@@ -77,7 +77,7 @@ impl CellOrder {
         self.has_slopes(units, plane) && self.has_slopes(units, plane - 1)
     }
 
-    /// The particles of consecutive units.
+    /// The particles of consecutive units; the ghosts of a plane follow its last unit.
     pub fn particles_of_units(&self, units: &Range<usize>) -> Range<usize> {
         let start = |number| {
             let unit = self.unit(number);
@@ -86,18 +86,19 @@ impl CellOrder {
         start(units.start)..start(units.end)
     }
 
-    /// The particles of a unit.
+    /// The owned particles of a unit.
     pub fn particles_of_unit(&self, unit: &Unit) -> Range<usize> {
         self.particles_in(unit.plane, unit.columns.clone())
     }
 
-    /// The first particle of a column; that of the column after the last of a plane is the first of the next plane.
+    /// The first particle of a column; that of the column after the last of a plane is the plane's first ghost, or the
+    /// first of the next plane.
     fn column_start(&self, plane: usize, column: usize) -> usize {
         let grid = &self.grid;
-        self.start[(plane * grid.columns_per_plane + column) * grid.cells_per_column] as usize
+        self.start[plane * grid.cells_per_plane() + column * grid.cells_per_column] as usize
     }
 
-    /// The particles of columns of a plane, or of the copy of the first plane.
+    /// The owned particles of columns of a plane, or of the copy of the first plane.
     fn particles_in(&self, plane: usize, columns: Range<usize>) -> Range<usize> {
         self.column_start(plane, columns.start)..self.column_start(plane, columns.end)
     }
@@ -143,7 +144,7 @@ impl CellOrder {
         let mean = self.particles() as f64 / columns as f64;
         // A particle has a cost even without neighbours.
         let cost = |u: usize| {
-            let particles = self.particles_of_units(&(u..u + 1)).len() as f64;
+            let particles = self.particles_of_unit(&self.unit(u)).len() as f64;
             particles * (particles / self.unit(u).columns.len() as f64 + 0.5 * mean)
         };
         let costs: Vec<f64> = (0..self.units()).map(cost).collect();

@@ -1,6 +1,6 @@
 //! Computes the cell of each particle, and the number of particles in each cell.
 
-use super::fractions::{Fractions, SORT_BLOCK};
+use super::fractions::{Fractions, OUTSIDE, SORT_BLOCK};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::Loop;
@@ -17,11 +17,13 @@ pub struct Count<'a> {
     pub fractions: Fractions<'a>,
     /// Result of [`Count::first_kind`].
     pub first_kind: u32,
+    /// Number of a ghost's cell minus that of an owned particle's at the same place.
+    pub to_ghosts: u32,
 }
 
 /// The particles of one thread: their cells, each of the grid or [`NO_CELL`], the fractions of
-/// particles with a cell, and the number of particles in each cell.
-pub struct CountRange<'a> {
+/// particles with a cell, and the number of particles in each cell. Without `OPEN` all directions are periodic.
+pub struct CountRange<'a, const OPEN: bool> {
     pub count: &'a Count<'a>,
     pub particles: Range<usize>,
     /// Cell of each of these particles.
@@ -31,7 +33,7 @@ pub struct CountRange<'a> {
     pub counts: &'a mut [u32],
 }
 
-impl Loop for CountRange<'_> {
+impl<const OPEN: bool> Loop for CountRange<'_, OPEN> {
     type Out = Result<(), EngineError>;
 
     #[inline(always)]
@@ -49,16 +51,19 @@ impl Loop for CountRange<'_> {
                 first += SORT_BLOCK;
                 continue;
             }
-            let near = count.fractions.of_block(x, &mut fixed32);
-            let cells = count.fractions.cells(&fixed32);
+            let near = count.fractions.of_block::<OPEN>(x, &mut fixed32);
+            let has_ghosts = first + SORT_BLOCK > count.input.particles.owned;
+            let cells = match OPEN && has_ghosts {
+                true => count.fractions.cells::<true>(&fixed32),
+                false => count.fractions.cells::<false>(&fixed32),
+            };
             if !near || !count.are_plain(first) {
                 count.one_by_one(first, (&fixed32, &cells), of_block, units_of_block, counts)?;
             } else {
                 *units_of_block = fixed32;
-                if first + SORT_BLOCK <= count.input.particles.owned {
-                    count.all::<false>(first, x, &cells, of_block, counts);
-                } else {
-                    count.all::<true>(first, x, &cells, of_block, counts);
+                match has_ghosts {
+                    true => count.all::<true>(first, &cells, of_block, counts),
+                    false => count.all::<false>(first, &cells, of_block, counts),
                 }
             }
             first += SORT_BLOCK;
@@ -66,8 +71,8 @@ impl Loop for CountRange<'_> {
         if !rest.is_empty() {
             let mut x = [count.geometry.origin; SORT_BLOCK];
             x[..rest.len()].copy_from_slice(rest);
-            count.fractions.of_block(&x, &mut fixed32);
-            let cells = count.fractions.cells(&fixed32);
+            count.fractions.of_block::<OPEN>(&x, &mut fixed32);
+            let cells = count.fractions.cells::<OPEN>(&fixed32);
             count.one_by_one(first, (&fixed32, &cells), cell, units, counts)?;
         }
         Ok(())
@@ -101,29 +106,30 @@ impl Count<'_> {
         images.is_some_and(|images| images.iter().fold(true, |all, image| all & *image))
     }
 
-    /// Whether a particle is a ghost that no owned particle needs: out of reach, or an image.
+    /// The cell of a particle with these contributions of its coordinates; [`NO_CELL`] for a ghost that no owned particle
+    /// needs: out of reach, or an image.
     #[inline(always)]
-    fn is_unneeded(&self, k: usize, x: &[f64; 3]) -> bool {
-        let Some(ghost) = k.checked_sub(self.input.particles.owned) else { return false };
-        !self.geometry.contains(x) || self.input.images.get(ghost).is_some_and(|image| *image)
+    fn cell(&self, k: usize, [a, b, c]: [u32; 3]) -> u32 {
+        // Owned particles may be at the ends.
+        let to = (a & (OUTSIDE - 1)) + (b & (OUTSIDE - 1)) + (c & (OUTSIDE - 1));
+        let Some(ghost) = k.checked_sub(self.input.particles.owned) else { return to };
+        let is_unneeded = (a | b | c) >= OUTSIDE || self.input.images.get(ghost).is_some_and(|image| *image);
+        if is_unneeded { NO_CELL } else { to + self.to_ghosts }
     }
 
-    /// Counts a block of particles, in which some ghosts may be unneeded.
+    /// Counts a block of particles, with `GHOSTS` some ghosts, which may be unneeded.
     #[inline(always)]
     fn all<const GHOSTS: bool>(
         &self,
         first: usize,
-        x: &[[f64; 3]; SORT_BLOCK],
         cells: &[[u32; 3]; SORT_BLOCK],
         cell: &mut [u32; SORT_BLOCK],
         counts: &mut [u32],
     ) {
         for (lane, [a, b, c]) in cells.iter().enumerate() {
-            let mut to = a + b + c;
-            if GHOSTS && self.is_unneeded(first + lane, &x[lane]) {
-                to = NO_CELL;
-            } else {
-                // SAFETY: `Fractions::cells` returns cells of the grid, each of which has a count.
+            let to = if GHOSTS { self.cell(first + lane, [*a, *b, *c]) } else { a + b + c };
+            if !GHOSTS || to != NO_CELL {
+                // SAFETY: `Fractions::cells` returns cells of the grid, each of which, and that of its ghosts, has a count.
                 unsafe { *counts.get_unchecked_mut(to as usize) += 1 };
             }
             cell[lane] = to;
@@ -152,10 +158,10 @@ impl Count<'_> {
             if species.is_none() || input.particles.tag[k] < 1 || !self.fractions.has(x) {
                 return Err(fault_of(input, k));
             }
-            if self.is_unneeded(k, x) {
+            *cell = self.cell(k, cells[lane]);
+            if *cell == NO_CELL {
                 continue;
             }
-            *cell = cells[lane].iter().sum();
             *unit = fixed32[lane];
             counts[*cell as usize] += 1;
         }

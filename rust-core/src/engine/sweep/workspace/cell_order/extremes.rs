@@ -48,28 +48,25 @@ impl Loop for FindExtremes<'_> {
 
     #[inline(always)]
     fn run(self) -> Self::Out {
-        let mut extremes = NOWHERE;
+        let x = &self.input.particles.x[self.particles.clone()];
         let (mut low, mut high) = ([f64::INFINITY; COORDINATES], [f64::NEG_INFINITY; COORDINATES]);
-        let (groups, rest) = self.input.particles.x[self.particles.clone()].as_chunks::<PARTICLES>();
-        for (g, group) in groups.iter().enumerate() {
+        let mut poison = [0.0; COORDINATES];
+        let (groups, rest) = x.as_chunks::<PARTICLES>();
+        for group in groups {
             let mut x = [0.0; COORDINATES];
             x.copy_from_slice(group.as_flattened());
-            let mut absurd = [0; PARTICLES];
-            for from in (0..COORDINATES).step_by(PARTICLES) {
-                for c in 0..PARTICLES {
-                    // The comparison is false for NaN too.
-                    let sound = x[from + c].abs() <= ABSURD / 3.0;
-                    absurd[c] |= u64::from(!sound);
-                }
-            }
-            if absurd != [0; PARTICLES] {
-                self.one_by_one(PARTICLES * g, group, &mut extremes)?;
-                continue;
-            }
             for c in 0..COORDINATES {
                 low[c] = if x[c] < low[c] { x[c] } else { low[c] };
                 high[c] = if x[c] > high[c] { x[c] } else { high[c] };
+                // The product is NaN for coordinates that are not finite.
+                poison[c] += 0.0 * x[c];
             }
+        }
+        let sound = |c: usize| poison[c] == 0.0 && low[c] >= -ABSURD / 3.0 && high[c] <= ABSURD / 3.0;
+        let mut extremes = NOWHERE;
+        if !groups.is_empty() && !(0..COORDINATES).all(sound) {
+            self.one_by_one(0, x, &mut extremes)?;
+            return Ok(extremes);
         }
         self.one_by_one(PARTICLES * groups.len(), rest, &mut extremes)?;
         for c in 0..COORDINATES {

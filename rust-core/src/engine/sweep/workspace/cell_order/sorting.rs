@@ -50,14 +50,12 @@ impl Sorting<'_> {
             let counts = self.counts.slice_mut(cells * part.number..cells * (part.number + 1));
             (counts, self.sums.slice_mut(threads * part.number..threads * (part.number + 1)))
         };
-        let range = CountRange {
-            count: &self.count,
-            particles: part.particles.clone(),
-            cell: &mut *part.cell,
-            fixed32: &mut *part.fixed32,
-            counts: &mut *counts,
+        let (count, particles, all) = (&self.count, part.particles.clone(), &mut *counts);
+        let (cell, fixed32) = (&mut *part.cell, &mut *part.fixed32);
+        part.done = match self.count.fractions.is_open {
+            true => vectors::run(set, CountRange::<true> { count, particles, cell, fixed32, counts: all }),
+            false => vectors::run(set, CountRange::<false> { count, particles, cell, fixed32, counts: all }),
         };
-        part.done = vectors::run(set, range);
         if part.done.is_err() {
             self.failed.store(true, Ordering::Relaxed);
             return;
