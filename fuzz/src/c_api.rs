@@ -111,7 +111,7 @@ impl Cloud {
 }
 
 fn call(engine: *mut Engine, bytes: &mut Bytes) {
-    let which = bytes.below(12);
+    let which = bytes.below(14);
     let mut cloud = Cloud::new(bytes);
     let step = Step { seed: u64::from(bytes.byte()), number: 3, dt: bytes.number() };
     let step = if bytes.flag() { &raw const step } else { null() };
@@ -161,6 +161,28 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
                     }
                 }
                 status
+            }
+            11 => {
+                let index = |bytes: &mut Bytes| small(bytes) as u32;
+                let special: Vec<SpecialPair> = (0..bytes.below(9))
+                    .map(|_| SpecialPair { i: index(bytes), j: index(bytes), factor: bytes.number() })
+                    .collect();
+                psidpd_engine_set_special_pairs(engine, special.as_ptr(), special.len())
+            }
+            12 => {
+                let mut thermostat: *mut Thermostat = null_mut();
+                let made = psidpd_thermostat_new(engine, &mut thermostat);
+                let mass = [(); 2].map(|()| bytes.number().abs());
+                let frozen: Vec<i32> = cloud.tag.iter().map(|_| i32::from(bytes.flag())).collect();
+                let Particles { all, x, tag, kind, .. } = cloud.particles();
+                let (mass, frozen) = (mass.as_ptr(), if bytes.flag() { frozen.as_ptr() } else { null() });
+                let bodies = Bodies { count: all, x, tag, species: kind, mass, frozen };
+                let mut virial = [0.0; 6];
+                let virial = if bytes.flag() { virial.as_mut_ptr() } else { null_mut() };
+                let (domain, rule) = (domain(bytes), small(bytes));
+                told(psidpd_thermostat_act(thermostat, &domain, &bodies, rule, step, force, virial));
+                psidpd_thermostat_free(thermostat);
+                made
             }
             _ => {
                 let mut results = std::mem::zeroed::<Results>();

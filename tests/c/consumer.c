@@ -484,6 +484,57 @@ static void check_engine_errors(const psidpd_model *model, const struct host *st
     psidpd_engine_free(engine);
 }
 
+/* A special pair with the factor 0 has no force. */
+static void check_special_pairs(psidpd_engine *engine, const struct host *start)
+{
+    static struct host special, plain;
+    const psidpd_special_pair pairs[1] = {{0, 1, 0.0}};
+    const psidpd_box around = {{0, 0, 0}, {20, 0, 0, 0, 20, 0, 0, 0, 20}, {0, 0, 0}};
+    psidpd_request request;
+    plain = special = *start;
+    memset(plain.force, 0, sizeof plain.force);
+    memset(special.force, 0, sizeof special.force);
+    request = ask(&plain, 2, 2, NULL);
+    request.want = 0;
+    plain.x[3] = plain.x[0] + 0.3;
+    plain.x[4] = plain.x[1];
+    plain.x[5] = plain.x[2];
+    OK(psidpd_engine_evaluate(engine, &around, &request, plain.force, NULL));
+    CHECK(plain.force[0] != 0.0);
+    OK(psidpd_engine_set_special_pairs(engine, pairs, 1));
+    OK(psidpd_engine_evaluate(engine, &around, &request, special.force, NULL));
+    CHECK(special.force[0] == 0.0 && special.force[3] == 0.0);
+    OK(psidpd_engine_set_special_pairs(engine, NULL, 0));
+}
+
+/* Drag and noise apart from the forces keep the momentum. */
+static void check_thermostat(const psidpd_engine *engine, const struct host *start)
+{
+    static struct host host;
+    psidpd_thermostat *thermostat = NULL;
+    const psidpd_box around = {{0, 0, 0}, {2.3, 0, 0, 0, 2.6, 0, 0, 0, 2.1}, {1, 1, 1}};
+    const psidpd_step step = {1, 2, 0.01};
+    const double mass[1] = {1.0};
+    double before = 0.0, after = 0.0, virial[6];
+    psidpd_bodies bodies;
+    size_t i;
+    host = *start;
+    bodies.count = OWNED;
+    bodies.x = host.x;
+    bodies.tag = host.tag;
+    bodies.species = host.kind;
+    bodies.mass = mass;
+    bodies.frozen = NULL;
+    OK(psidpd_thermostat_new(engine, &thermostat));
+    OK(psidpd_thermostat_act(thermostat, &around, &bodies, PSIDPD_RULE_MIDPOINT, &step, host.v, virial));
+    for (i = 0; i < OWNED; i++) {
+        before += start->v[3 * i];
+        after += host.v[3 * i];
+    }
+    CHECK(fabs(before - after) < 1e-12 && memcmp(host.v, start->v, 3 * OWNED * sizeof(double)) != 0);
+    psidpd_thermostat_free(thermostat);
+}
+
 int main(int count, char **arguments)
 {
     static struct host start, host;
@@ -556,6 +607,8 @@ int main(int count, char **arguments)
     print_outcome("thermal", &host);
     check_gradient(engine, &start);
     check_narrow_box(engine, &start, &step);
+    check_special_pairs(engine, &start);
+    check_thermostat(engine, &start);
     psidpd_engine_free(engine);
     return 0;
 }

@@ -9,7 +9,8 @@
  *
  * Particles in a box of their own: psidpd_engine_evaluate. With ghosts: psidpd_engine_first; copy the
  * owners' numbers in psidpd_engine_slopes to their ghosts; psidpd_engine_second; add forces on ghosts
- * to their owners. psidpd_engine_path says whether the fast way was taken, and if not why.
+ * to their owners. psidpd_engine_path says whether the fast way was taken, and if not why. Drag and noise
+ * act in the forces of a request with a step, or apart from the forces by psidpd_thermostat_act.
  *
  * If a function returns anything but PSIDPD_STATUS_OK, psidpd_last_error has the reason, and the places
  * for results are left alone. Under "Safety" is what no function can check.
@@ -87,6 +88,16 @@
  * For `want`: sum every density of the model, also those that no force needs.
  */
 #define PSIDPD_WANT_DENSITIES 16
+
+/**
+ * For psidpd_thermostat_act: the implicit midpoint rule over all pairs.
+ */
+#define PSIDPD_RULE_MIDPOINT 0
+
+/**
+ * For psidpd_thermostat_act: the exact Ornstein-Uhlenbeck process of each pair in turn.
+ */
+#define PSIDPD_RULE_PAIRWISE 1
 
 /**
  * The outcome of a call. The values keep their meaning in every version; later versions may add some.
@@ -175,6 +186,11 @@ typedef struct psidpd_engine psidpd_engine;
 typedef struct psidpd_model psidpd_model;
 
 /**
+ * The thermostat of an engine's model and temperature. One thread at a time may use it.
+ */
+typedef struct psidpd_thermostat psidpd_thermostat;
+
+/**
  * The title of a model, and the number of its dimensions and species.
  */
 typedef struct psidpd_model_facts {
@@ -242,6 +258,27 @@ typedef struct psidpd_engine_facts {
    */
   const char *plan;
 } psidpd_engine_facts;
+
+/**
+ * A pair with reduced strength, for instance two bonded particles.
+ *
+ * `factor` scales the conservative interaction: the density and the pair energy have it. Drag and noise act at full
+ * strength; only pairs with a factor of 0 do not interact at all.
+ */
+typedef struct psidpd_special_pair {
+  /**
+   * Array index, from 0, of the first particle, an owned one.
+   */
+  uint32_t i;
+  /**
+   * Array index of the second particle. If it is a ghost, the rank of its owner has the same pair too.
+   */
+  uint32_t j;
+  /**
+   * Factor of the conservative interaction.
+   */
+  double factor;
+} psidpd_special_pair;
 
 /**
  * Arrays of the last evaluation, of which an engine keeps those that were asked for; valid until the next evaluation
@@ -410,6 +447,36 @@ typedef struct psidpd_pairs {
   const double *factor;
 } psidpd_pairs;
 
+/**
+ * The particles that a thermostat acts on.
+ */
+typedef struct psidpd_bodies {
+  /**
+   * Number of particles.
+   */
+  size_t count;
+  /**
+   * Positions, `3 * count` numbers. Positions outside the box along periodic edges stand for an image.
+   */
+  const double *x;
+  /**
+   * Particle numbers from 1, each different, `count` of them.
+   */
+  const int32_t *tag;
+  /**
+   * Species indices from 0, `count` of them.
+   */
+  const int32_t *species;
+  /**
+   * Mass of each species of the model, positive.
+   */
+  const double *mass;
+  /**
+   * For each particle 1 if its velocity is fixed, and 0 if not; NULL if none is fixed.
+   */
+  const int32_t *frozen;
+} psidpd_bodies;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -562,6 +629,20 @@ psidpd_status psidpd_engine_map_kinds(struct psidpd_engine *engine,
                                       size_t length);
 
 /**
+ * Sets the pairs with reduced strength, from the next evaluation on: `length` of them, which are copied; 0 for none.
+ * Two particles must meet in one image only within the cut-off. They do not apply to pairs that the host lists.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER. Pairs of particles that are not there fail in the next evaluation.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `pairs` has `length` entries.
+ */
+psidpd_status psidpd_engine_set_special_pairs(struct psidpd_engine *engine,
+                                              const struct psidpd_special_pair *pairs,
+                                              size_t length);
+
+/**
  * Puts in `*slopes` the place of the derivatives of psi, and in `*length` how many there are: of each
  * owned particle `slope_width` numbers, then as many of each ghost. Those of ghosts mean nothing; the host
  * must fill them in with their owners' before psidpd_engine_second.
@@ -669,6 +750,50 @@ psidpd_status psidpd_engine_second(struct psidpd_engine *engine,
                                    const struct psidpd_request *request,
                                    double *force,
                                    struct psidpd_tally *tally);
+
+/**
+ * Makes the thermostat of an engine, with its temperature, settings and threads, and puts it in `*thermostat`, to be freed
+ * with psidpd_thermostat_free. If it fails, `*thermostat` is left alone. The thermostat does not need the engine any more.
+ *
+ * # Errors
+ * PSIDPD_STATUS_MODEL if no pair of species of the model has drag. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `thermostat` can be written to.
+ */
+psidpd_status psidpd_thermostat_new(const struct psidpd_engine *engine,
+                                    struct psidpd_thermostat **thermostat);
+
+/**
+ * Applies drag and noise to the velocities `v`, `3 * bodies.count` numbers, for the time `step.dt` at fixed positions.
+ * `rule` is PSIDPD_RULE_...; the noise is Gaussian and depends on the seed and the number of the step. Forces are then
+ * computed without a step. `virial` is NULL or gets the virial of the impulses over `dt`: xx, yy, zz, xy, xz, yz.
+ *
+ * # Errors
+ * PSIDPD_STATUS_ENGINE for a position that is not finite. PSIDPD_STATUS_INVALID_ARGUMENT for an unknown rule, a species
+ * that the model does not have, a mass that is not positive, a box without volume or narrower than twice the range of the
+ * drag, a `dt` that is not positive, or if `v` overlaps `bodies.x`; `v` is left alone then. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `thermostat` is NULL or a thermostat that has not been freed; `box`, `bodies` and `step` are NULL or at such structures,
+ * whose arrays are as long as said above; `v` is NULL or as long as said above; `virial` is NULL or has six numbers.
+ * Neither overlaps the others. Nothing is kept of them.
+ */
+psidpd_status psidpd_thermostat_act(struct psidpd_thermostat *thermostat,
+                                    const struct psidpd_box *box,
+                                    const struct psidpd_bodies *bodies,
+                                    int32_t rule,
+                                    const struct psidpd_step *step,
+                                    double *v,
+                                    double *virial);
+
+/**
+ * Frees a thermostat; NULL is ignored.
+ *
+ * # Safety
+ * `thermostat` is NULL or a thermostat that has not been freed, and no other thread is using it.
+ */
+void psidpd_thermostat_free(struct psidpd_thermostat *thermostat);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,6 +1,6 @@
 //! Checks of the arguments that C callers pass.
 
-use crate::status::{Failure, Status};
+use crate::status::{Failure, Status, guard};
 use std::ffi::{CStr, c_char};
 
 fn null(name: &str) -> Failure {
@@ -13,7 +13,7 @@ fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
         return Err(null(name));
     }
     if !pointer.is_aligned() {
-        return Err(Failure::new(Status::InvalidArgument, format!("{name} is not aligned")));
+        return Err(Failure::argument(format!("{name} is not aligned")));
     }
     Ok(())
 }
@@ -32,6 +32,20 @@ pub(super) unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Result<&'a
     check(pointer, name)?;
     // SAFETY: `check` found it aligned and not null; the caller promises a `T` there that is nobody else's during `'a`.
     Ok(unsafe { &mut *pointer })
+}
+
+/// Frees what a function of this library has made and given out; null is ignored.
+///
+/// # Safety
+/// `pointer` is null or at a `T` in a box that has been given out, not freed, and that no other thread is using.
+pub(super) unsafe fn free<T>(pointer: *mut T) {
+    let _ = guard(|| {
+        if !pointer.is_null() {
+            // SAFETY: the caller promises that the pointer came from `Box::into_raw` and has not been freed.
+            drop(unsafe { Box::from_raw(pointer) });
+        }
+        Ok(())
+    });
 }
 
 /// Copies the `T` at `pointer`.
@@ -66,7 +80,7 @@ fn check_array<T>(pointer: *const T, length: usize, name: &str) -> Result<(), Fa
     check(pointer, name)?;
     match length.checked_mul(size_of::<T>()) {
         Some(bytes) if isize::try_from(bytes).is_ok() => Ok(()),
-        _ => Err(Failure::new(Status::InvalidArgument, format!("{name} cannot be as long as {length}"))),
+        _ => Err(Failure::argument(format!("{name} cannot be as long as {length}"))),
     }
 }
 
@@ -106,7 +120,7 @@ pub(super) unsafe fn array_mut<'a, T>(
 pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &str) -> Result<(), Failure> {
     let bytes = length.saturating_mul(size_of::<[f64; 3]>());
     if !a.is_null() && a.addr().abs_diff(b.addr()) < bytes {
-        return Err(Failure::new(Status::InvalidArgument, format!("{what} overlap")));
+        return Err(Failure::argument(format!("{what} overlap")));
     }
     Ok(())
 }
@@ -118,9 +132,7 @@ pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &st
 pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a str, Failure> {
     // SAFETY: `c_str` asks for what this function does: null, or bytes up to a zero that nobody writes to during `'a`.
     let bytes = unsafe { c_str(pointer, name) }?;
-    bytes
-        .to_str()
-        .map_err(|error| Failure::new(Status::InvalidArgument, format!("{name} is not UTF-8: {error}")))
+    bytes.to_str().map_err(|error| Failure::argument(format!("{name} is not UTF-8: {error}")))
 }
 
 /// # Safety
@@ -136,6 +148,6 @@ pub(super) fn flag(value: i32, name: &str) -> Result<bool, Failure> {
     match value {
         0 => Ok(false),
         1 => Ok(true),
-        _ => Err(Failure::new(Status::InvalidArgument, format!("{name} is {value}, not 0 or 1"))),
+        _ => Err(Failure::argument(format!("{name} is {value}, not 0 or 1"))),
     }
 }

@@ -1,6 +1,6 @@
 //! Engines, which compute forces.
 
-use crate::arguments::{Output, array, copied, exclusive, shared};
+use crate::arguments::{Output, array, copied, exclusive, free, shared};
 use crate::model::Model;
 use crate::settings::{Path, Settings};
 use crate::status::{Failure, Status, c_text, guard};
@@ -13,6 +13,8 @@ pub struct Engine {
     pub(super) engine: engine::Engine,
     /// Forces of psidpd_engine_first, which psidpd_engine_second adds to the host's.
     pub(super) first_forces: Vec<[f64; 3]>,
+    /// Temperature, for a thermostat apart from the forces.
+    pub(super) kt: f64,
     plan_text: CString,
     path_text: CString,
     pub(super) state: State,
@@ -94,7 +96,7 @@ const WANT: u32 = PSIDPD_WANT_ENERGY
 /// Translates the bits of `want`; fails for other bits.
 pub(super) fn want_of(bits: u32) -> Result<engine::Want, Failure> {
     if bits & !WANT != 0 {
-        return Err(Failure::new(Status::InvalidArgument, format!("want has unknown bits: {bits:#x}")));
+        return Err(Failure::argument(format!("want has unknown bits: {bits:#x}")));
     }
     let has = |bit| bits & bit != 0;
     Ok(engine::Want {
@@ -113,7 +115,7 @@ pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::P
     let Particles { owned, all, .. } = *particles;
     if owned > all {
         let text = format!("particles: {owned} are owned, but there are only {all}");
-        return Err(Failure::new(Status::InvalidArgument, text));
+        return Err(Failure::argument(text));
     }
     // SAFETY: the caller promises null or arrays of these lengths that nobody writes to; a
     // vector is three consecutive numbers.
@@ -130,7 +132,7 @@ pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::P
 pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
     if !(step.dt > 0.0 && step.dt.is_finite()) {
         let text = format!("step.dt is {}, not a positive number", step.dt);
-        return Err(Failure::new(Status::InvalidArgument, text));
+        return Err(Failure::argument(text));
     }
     Ok(engine::Step { seed: step.seed, number: step.number, dt: step.dt })
 }
@@ -169,6 +171,7 @@ pub unsafe extern "C" fn psidpd_engine_new(
         out.put(Box::into_raw(Box::new(Engine {
             engine,
             first_forces: Vec::new(),
+            kt,
             plan_text,
             path_text,
             state: State::Nothing,
@@ -263,13 +266,8 @@ pub unsafe extern "C" fn psidpd_engine_path(
 /// `engine` is NULL or an engine that has not been freed, and no other thread is using it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_free(engine: *mut Engine) {
-    let _ = guard(|| {
-        if !engine.is_null() {
-            // SAFETY: the pointer came from `Box::into_raw` and has not been freed.
-            drop(unsafe { Box::from_raw(engine) });
-        }
-        Ok(())
-    });
+    // SAFETY: the caller promises null or a handle that has not been freed and is not in use.
+    unsafe { free(engine) }
 }
 
 /// Maps the host's types to species, from the next evaluation on: `species[kind]` is the
@@ -290,6 +288,44 @@ pub unsafe extern "C" fn psidpd_engine_map_kinds(
         // SAFETY: the caller promises that `engine` is null or not freed and that `species` has `length` entries.
         let (engine, species) = unsafe { (exclusive(engine, "engine")?, array(species, length, "species")?) };
         Ok(engine.engine.map_kinds(species)?)
+    })
+}
+
+/// A pair with reduced strength, for instance two bonded particles.
+///
+/// `factor` scales the conservative interaction: the density and the pair energy have it. Drag and noise act at full
+/// strength; only pairs with a factor of 0 do not interact at all.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct SpecialPair {
+    /// Array index, from 0, of the first particle, an owned one.
+    pub i: u32,
+    /// Array index of the second particle. If it is a ghost, the rank of its owner has the same pair too.
+    pub j: u32,
+    /// Factor of the conservative interaction.
+    pub factor: f64,
+}
+
+/// Sets the pairs with reduced strength, from the next evaluation on: `length` of them, which are copied; 0 for none.
+/// Two particles must meet in one image only within the cut-off. They do not apply to pairs that the host lists.
+///
+/// # Errors
+/// PSIDPD_STATUS_NULL_POINTER. Pairs of particles that are not there fail in the next evaluation.
+///
+/// # Safety
+/// `engine` is NULL or an engine that has not been freed; `pairs` has `length` entries.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_set_special_pairs(
+    engine: *mut Engine,
+    pairs: *const SpecialPair,
+    length: usize,
+) -> Status {
+    guard(|| {
+        // SAFETY: the caller promises that `engine` is null or not freed and that `pairs` has `length` entries.
+        let (engine, pairs) = unsafe { (exclusive(engine, "engine")?, array(pairs, length, "pairs")?) };
+        let pairs = pairs.iter().map(|&SpecialPair { i, j, factor }| engine::SpecialPair { i, j, factor });
+        engine.engine.set_special_pairs(pairs);
+        Ok(())
     })
 }
 

@@ -4,7 +4,7 @@ use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive,
 use crate::engine::{Engine, Particles, State, Step, Tally, not_before, particles_of, step_of, want_of};
 use crate::status::{Failure, Status, guard};
 use nalgebra::{Matrix3, Vector3};
-use psidpd_core::engine::{self, Around, DomainError, Newton, PairsOfHost, PeriodicBox, Surroundings};
+use psidpd_core::engine::{self, Around, Newton, PairsOfHost, PeriodicBox, Surroundings};
 
 /// A box: a corner, the three edges from there, and which of them are periods.
 #[repr(C)]
@@ -50,19 +50,15 @@ pub struct Pairs {
 }
 
 impl Domain {
-    fn domain(&self) -> Result<PeriodicBox, Failure> {
+    pub(super) fn domain(&self) -> Result<PeriodicBox, Failure> {
         let [a, b, c] = [0, 3, 6].map(|k| Vector3::from_column_slice(&self.edges[k..k + 3]));
         let mut periodic = [false; 3];
         for (is, given) in periodic.iter_mut().zip(self.periodic) {
             *is = flag(given, "box.periodic")?;
         }
         let edges = Matrix3::from_columns(&[a, b, c]);
-        PeriodicBox::new(self.origin, edges, periodic).map_err(invalid)
+        PeriodicBox::new(self.origin, edges, periodic).map_err(|error| Failure::argument(error.to_string()))
     }
-}
-
-fn invalid(error: DomainError) -> Failure {
-    Failure::new(Status::InvalidArgument, error.to_string())
 }
 
 impl Request {

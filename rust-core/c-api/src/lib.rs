@@ -12,6 +12,7 @@ mod evaluation;
 mod model;
 mod settings;
 mod status;
+mod thermostat;
 mod version;
 
 pub use engine::*;
@@ -19,6 +20,7 @@ pub use evaluation::*;
 pub use model::*;
 pub use settings::*;
 pub use status::{Status, psidpd_last_error};
+pub use thermostat::*;
 pub use version::*;
 
 #[cfg(test)]

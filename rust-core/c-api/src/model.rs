@@ -1,6 +1,6 @@
 //! Models, which are read from model files.
 
-use crate::arguments::{Output, c_str, shared, text};
+use crate::arguments::{Output, c_str, free, shared, text};
 use crate::status::{Failure, Status, c_text, guard};
 use psidpd_core::model;
 use std::ffi::{CStr, CString, c_char};
@@ -29,7 +29,7 @@ fn path_of(path: &CStr) -> Result<PathBuf, Failure> {
 
 #[cfg(not(unix))]
 fn path_of(path: &CStr) -> Result<PathBuf, Failure> {
-    let path = path.to_str().map_err(|_| Failure::new(Status::InvalidArgument, "path is not UTF-8"))?;
+    let path = path.to_str().map_err(|_| Failure::argument("path is not UTF-8"))?;
     Ok(path.into())
 }
 
@@ -84,13 +84,8 @@ pub unsafe extern "C" fn psidpd_model_parse(
 /// `model` is NULL or a model that has not been freed, and no other thread is using it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_model_free(model: *mut Model) {
-    let _ = guard(|| {
-        if !model.is_null() {
-            // SAFETY: the pointer came from `Box::into_raw` and has not been freed.
-            drop(unsafe { Box::from_raw(model) });
-        }
-        Ok(())
-    });
+    // SAFETY: the caller promises null or a handle that has not been freed and is not in use.
+    unsafe { free(model) }
 }
 
 /// The title of a model, and the number of its dimensions and species.
@@ -144,7 +139,7 @@ pub unsafe extern "C" fn psidpd_model_species_name(
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(name, "name")?) };
         let name = model.species.get(index).ok_or_else(|| {
             let text = format!("there is no species {index}: the model has {}", model.species.len());
-            Failure::new(Status::InvalidArgument, text)
+            Failure::argument(text)
         })?;
         out.put(name.as_ptr());
         Ok(())

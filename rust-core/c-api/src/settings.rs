@@ -1,6 +1,6 @@
 //! Settings of an engine: precision, instruction set and threads.
 
-use crate::status::{Failure, Status};
+use crate::status::Failure;
 use psidpd_core::engine;
 
 /// For psidpd_settings: pairs in double precision.
@@ -47,43 +47,44 @@ impl Settings {
     pub(super) const DEFAULT: Settings =
         Settings { precision: PSIDPD_PRECISION_DOUBLE, instructions: PSIDPD_INSTRUCTIONS_BEST, threads: 1 };
 
+    const PRECISIONS: [(i32, engine::Precision); 2] = [
+        (PSIDPD_PRECISION_DOUBLE, engine::Precision::Double),
+        (PSIDPD_PRECISION_MIXED, engine::Precision::Mixed),
+    ];
+
+    const INSTRUCTIONS: [(i32, engine::Instructions); 4] = [
+        (PSIDPD_INSTRUCTIONS_PORTABLE, engine::Instructions::Portable),
+        (PSIDPD_INSTRUCTIONS_AVX2, engine::Instructions::Avx2),
+        (PSIDPD_INSTRUCTIONS_AVX512, engine::Instructions::Avx512),
+        (PSIDPD_INSTRUCTIONS_AVX512_VBMI2, engine::Instructions::Avx512Vbmi2),
+    ];
+
     pub(super) fn checked(self) -> Result<engine::Settings, Failure> {
-        let wrong = |what: &str, value: i32| {
-            Failure::new(
-                Status::InvalidArgument,
-                format!("settings.{what} is {value}, which is not a valid value"),
-            )
-        };
-        let precision = match self.precision {
-            PSIDPD_PRECISION_DOUBLE => engine::Precision::Double,
-            PSIDPD_PRECISION_MIXED => engine::Precision::Mixed,
-            other => return Err(wrong("precision", other)),
-        };
+        fn of<T: Copy>(table: &[(i32, T)], what: &str, value: i32) -> Result<T, Failure> {
+            let found = table.iter().find(|(number, _)| *number == value).map(|(_, set)| *set);
+            let wrong = || format!("settings.{what} is {value}, which is not a valid value");
+            found.ok_or_else(|| Failure::argument(wrong()))
+        }
         let instructions = match self.instructions {
             PSIDPD_INSTRUCTIONS_BEST => engine::Instructions::best(),
-            PSIDPD_INSTRUCTIONS_PORTABLE => engine::Instructions::Portable,
-            PSIDPD_INSTRUCTIONS_AVX2 => engine::Instructions::Avx2,
-            PSIDPD_INSTRUCTIONS_AVX512 => engine::Instructions::Avx512,
-            PSIDPD_INSTRUCTIONS_AVX512_VBMI2 => engine::Instructions::Avx512Vbmi2,
-            other => return Err(wrong("instructions", other)),
+            other => of(&Settings::INSTRUCTIONS, "instructions", other)?,
         };
-        let threads = engine::Pool::count(self.threads)
-            .map_err(|e| Failure::new(Status::InvalidArgument, format!("settings: {e}")))?;
-        Ok(engine::Settings { precision, instructions, threads })
+        let threads =
+            engine::Pool::count(self.threads).map_err(|e| Failure::argument(format!("settings: {e}")))?;
+        Ok(engine::Settings {
+            precision: of(&Settings::PRECISIONS, "precision", self.precision)?,
+            instructions,
+            threads,
+        })
     }
 
     pub(super) fn of(settings: engine::Settings) -> Settings {
+        fn of<T: PartialEq>(table: &[(i32, T)], value: T) -> i32 {
+            table.iter().find(|(_, set)| *set == value).map_or(0, |(number, _)| *number)
+        }
         Settings {
-            precision: match settings.precision {
-                engine::Precision::Double => PSIDPD_PRECISION_DOUBLE,
-                engine::Precision::Mixed => PSIDPD_PRECISION_MIXED,
-            },
-            instructions: match settings.instructions {
-                engine::Instructions::Portable => PSIDPD_INSTRUCTIONS_PORTABLE,
-                engine::Instructions::Avx2 => PSIDPD_INSTRUCTIONS_AVX2,
-                engine::Instructions::Avx512 => PSIDPD_INSTRUCTIONS_AVX512,
-                engine::Instructions::Avx512Vbmi2 => PSIDPD_INSTRUCTIONS_AVX512_VBMI2,
-            },
+            precision: of(&Settings::PRECISIONS, settings.precision),
+            instructions: of(&Settings::INSTRUCTIONS, settings.instructions),
             threads: settings.threads.get(),
         }
     }

@@ -43,6 +43,11 @@ impl Failure {
     pub fn new(status: Status, text: impl Into<String>) -> Failure {
         Failure { status, text: text.into() }
     }
+
+    /// The failure of an argument out of its domain.
+    pub fn argument(text: impl Into<String>) -> Failure {
+        Failure::new(Status::InvalidArgument, text)
+    }
 }
 
 impl From<FileError> for Failure {

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::ptr::{null, null_mut};
 
 /// Source files in the order of the header.
-const SOURCES: [&str; 6] =
-    ["version.rs", "status.rs", "model.rs", "settings.rs", "engine.rs", "evaluation.rs"];
+const SOURCES: [&str; 7] =
+    ["version.rs", "status.rs", "model.rs", "settings.rs", "engine.rs", "evaluation.rs", "thermostat.rs"];
 
 fn last_error() -> String {
     // SAFETY: the text is valid until the next failing call on this thread.
@@ -207,12 +207,131 @@ fn no_particles_need_no_arrays() {
     }
 }
 
+/// Special pairs act as listed pairs with factors do.
+#[test]
+fn special_pairs_have_their_factors() {
+    let model = model(TEXT);
+    let mut engine = null_mut();
+    let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.2, 0.6, 0.0];
+    let (tag, kind) = ([1, 2, 3], [0; 3]);
+    let particles = Particles { owned: 3, all: 3, x: x.as_ptr(), tag: tag.as_ptr(), kind: kind.as_ptr() };
+    let request = Request { particles, v: null(), step: null(), want: 0 };
+    let open =
+        Domain { origin: [-2.0; 3], edges: [5.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 5.0], periodic: [0; 3] };
+    let (i, j, factor) = ([0, 0, 1], [1, 2, 2], [0.3, 1.0, 0.0]);
+    let listed = Pairs { count: 3, i: i.as_ptr(), j: j.as_ptr(), factor: factor.as_ptr() };
+    let special = [SpecialPair { i: 0, j: 1, factor: 0.3 }, SpecialPair { i: 1, j: 2, factor: 0.0 }];
+    // SAFETY: handles are alive, and arrays are as long as stated.
+    unsafe {
+        assert_eq!(psidpd_engine_new(model, 1.0, null(), &mut engine), Status::Ok);
+        psidpd_model_free(model);
+        assert_eq!(psidpd_engine_first_of_pairs(engine, &listed, 1, &request), Status::Ok);
+        let mut expected = [0.0; 9];
+        assert_eq!(psidpd_engine_second(engine, &request, expected.as_mut_ptr(), null_mut()), Status::Ok);
+        let evaluate = || {
+            let mut force = [0.0; 9];
+            let status = psidpd_engine_evaluate(engine, &open, &request, force.as_mut_ptr(), null_mut());
+            (status, force)
+        };
+        let (_, plain) = evaluate();
+        assert_eq!(psidpd_engine_set_special_pairs(engine, special.as_ptr(), 2), Status::Ok);
+        let (status, found) = evaluate();
+        assert_eq!(status, Status::Ok, "{}", last_error());
+        assert!(
+            found != plain && found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-12),
+            "{found:?}"
+        );
+        let nobody = SpecialPair { i: 0, j: 7, factor: 0.5 };
+        assert_eq!(psidpd_engine_set_special_pairs(engine, &nobody, 1), Status::Ok);
+        assert_eq!(evaluate().0, Status::InvalidArgument);
+        assert_eq!(psidpd_engine_set_special_pairs(engine, null(), 1), Status::NullPointer);
+        assert_eq!(psidpd_engine_set_special_pairs(engine, null(), 0), Status::Ok);
+        assert_eq!(evaluate(), (Status::Ok, plain));
+        psidpd_engine_free(engine);
+    }
+}
+
+/// The thermostat keeps the momentum and fixed velocities, and changes the others by the seed.
+#[test]
+fn a_thermostat_acts_on_velocities() {
+    let text = c"title = \"t\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
+    let (model, without) = (model(text), model(TEXT));
+    let (mut engine, mut thermostat) = (null_mut(), null_mut());
+    let number = |k: usize| ((k * 7919) % 1009) as f64 / 1009.0;
+    let x: Vec<f64> = (0..300).map(|k| 3.0 * number(k)).collect();
+    let start: Vec<f64> = (0..300).map(|k| number(k + 400) - 0.5).collect();
+    let (tag, species): (Vec<i32>, Vec<i32>) = ((1..=100).collect(), vec![0; 100]);
+    let frozen: Vec<i32> = (0..100).map(|k| i32::from(k == 3)).collect();
+    let edges = [3.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 3.0];
+    let domain = Domain { origin: [0.0; 3], edges, periodic: [1; 3] };
+    let (step, mass) = (Step { seed: 5, number: 6, dt: 0.05 }, [2.0]);
+    let bodies = Bodies {
+        count: 100,
+        x: x.as_ptr(),
+        tag: tag.as_ptr(),
+        species: species.as_ptr(),
+        mass: mass.as_ptr(),
+        frozen: null(),
+    };
+    // SAFETY: handles are alive, and arrays are as long as stated.
+    unsafe {
+        assert_eq!(psidpd_engine_new(without, 1.0, null(), &mut engine), Status::Ok);
+        assert_eq!(psidpd_thermostat_new(engine, &mut thermostat), Status::Model);
+        psidpd_engine_free(engine);
+        assert_eq!(psidpd_engine_new(model, 1.0, null(), &mut engine), Status::Ok);
+        assert_eq!(psidpd_thermostat_new(engine, &mut thermostat), Status::Ok);
+        psidpd_engine_free(engine);
+        psidpd_model_free(model);
+        psidpd_model_free(without);
+        let act = |bodies: &Bodies, rule, step: Step| {
+            let (mut v, mut virial) = (start.clone(), [0.0; 6]);
+            let status = psidpd_thermostat_act(
+                thermostat,
+                &domain,
+                bodies,
+                rule,
+                &step,
+                v.as_mut_ptr(),
+                virial.as_mut_ptr(),
+            );
+            (status, v, virial)
+        };
+        let sum = |v: &[f64], c: usize| v.iter().skip(c).step_by(3).sum::<f64>();
+        for rule in [PSIDPD_RULE_MIDPOINT, PSIDPD_RULE_PAIRWISE] {
+            let (status, v, virial) = act(&bodies, rule, step);
+            assert_eq!(status, Status::Ok, "{}", last_error());
+            assert!(v != start && virial[0] != 0.0);
+            assert!((0..3).all(|c| (sum(&v, c) - sum(&start, c)).abs() < 1e-12));
+            assert_eq!(act(&bodies, rule, step), (Status::Ok, v.clone(), virial));
+            assert!(act(&bodies, rule, Step { seed: 6, ..step }).1 != v);
+            let held = act(&Bodies { frozen: frozen.as_ptr(), ..bodies }, rule, step).1;
+            assert!(held[9..12] == start[9..12] && held[12..15] != start[12..15]);
+        }
+        let negative = [-1.0];
+        let strangers = vec![1; 100];
+        for (bodies, rule, step, message) in [
+            (bodies, 7, step, "rule is 7"),
+            (Bodies { mass: negative.as_ptr(), ..bodies }, 0, step, "mass has -1"),
+            (Bodies { species: strangers.as_ptr(), ..bodies }, 0, step, "species has 1"),
+            (bodies, 0, Step { dt: 0.0, ..step }, "step.dt"),
+        ] {
+            let (status, v, _) = act(&bodies, rule, step);
+            assert!(status == Status::InvalidArgument && v == start, "{message}");
+            assert!(last_error().contains(message), "{}", last_error());
+        }
+        psidpd_thermostat_free(thermostat);
+        psidpd_thermostat_free(null_mut());
+    }
+}
+
 /// The header allows threads to share models and to pass engines on.
 #[test]
 fn handles_may_cross_threads() {
     fn shared<T: Send + Sync>() {}
     shared::<Model>();
     shared::<Engine>();
+    fn sent<T: Send>() {}
+    sent::<Thermostat>();
 }
 
 /// The limits are the most threads of a pool, and one thread more.

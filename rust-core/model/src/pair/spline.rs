@@ -65,11 +65,8 @@ impl SplineAttractive {
 /// The form `spline` in the model file.
 #[derive(Debug, Clone)]
 pub struct SplineEntry {
-    strength: Number,
-    repulsion: Number,
-    attraction: Number,
-    repulsion_range: Number,
-    attraction_range: Number,
+    /// Strength, `A`, `B`, `range_A` and `range_B`.
+    numbers: Box<[Number; 5]>,
 }
 
 impl FormEntry for SplineEntry {
@@ -101,23 +98,20 @@ impl FormEntry for SplineEntry {
 
     fn read(table: &Section, _: &Path) -> Result<SplineEntry, FileError> {
         let number = |key| Number::require(table, key);
-        Ok(SplineEntry {
-            strength: number("strength")?,
-            repulsion: number("A")?,
-            attraction: number("B")?,
-            repulsion_range: number("range_A")?,
-            attraction_range: number("range_B")?,
-        })
+        let numbers =
+            [number("strength")?, number("A")?, number("B")?, number("range_A")?, number("range_B")?];
+        Ok(SplineEntry { numbers: Box::new(numbers) })
     }
 
     fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<SplineAttractive, FileError> {
+        let [strength, a, b, range_a, range_b] = &*self.numbers;
         let value = |number: &Number| number.evaluate(constants).map(|x| x.value);
         Ok(SplineAttractive::new(
-            value(&self.strength)?,
-            value(&self.repulsion)?,
-            value(&self.attraction)?,
-            self.repulsion_range.positive(constants)?,
-            self.attraction_range.positive(constants)?,
+            value(strength)?,
+            value(a)?,
+            value(b)?,
+            range_a.positive(constants)?,
+            range_b.positive(constants)?,
         ))
     }
 }
