@@ -20,8 +20,9 @@ impl Scene {
             let lacks = DeviceError::Lacks("double precision".into());
             return Some(self.located(lacks, |root| root.get("precision")));
         }
+        let walls = self.domain.periodic()[..self.model.dimensions()].contains(&false);
         self.stages.iter().find_map(|stage| {
-            let lacks = DeviceError::Lacks(refused_step(stage.integrator)?);
+            let lacks = DeviceError::Lacks(refused_step(stage.integrator, walls)?);
             Some(self.located(lacks, |root| stage::place_of_integrator(root, &stage.name)))
         })
     }

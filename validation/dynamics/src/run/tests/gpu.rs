@@ -203,6 +203,10 @@ fn what_a_gpu_does_not_do_is_named_with_its_line() {
         let error = refused(&format!("{base}{rest}"));
         assert!(error.contains(line) && error.contains(what), "{error}");
     }
+    let walls = "integrator = \"force-gradient\"\ndevice = \"gpu\"\n[box]\nlengths = [4.0, 4.0, 4.0]\n\
+                 boundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
+    let error = refused(&(base.replace("box = 4.0\n", "") + walls));
+    assert!(error.contains("s.toml:5:") && error.contains("\"force-gradient\" between walls"), "{error}");
 }
 
 #[test]
