@@ -1,17 +1,18 @@
 //! The midpoint rule on one of several ranks, whose ghosts stand for the particles of others.
 //!
 //! A pair of an owned particle and a ghost is computed on both ranks, and its impulse added to the
-//! owned particle alone. In mixed precision its vectors there differ by 10⁻⁷, the rounding of the search, as forces do; so momentum
-//! is kept to the rounding of single precision. The rule returns what it [needs](Need), the host gets that from the other
+//! owned particle alone. The rule returns what it [needs](Need), the host gets that from the other
 //! ranks, and the rule continues. All ranks decide by the same sums, so that they need the same.
 
 use super::PairThermostat;
 use super::pass::Wide;
+use super::planes::{Plane, second};
 use super::round::Round;
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
-use crate::engine::sweep::Pool;
+use crate::engine::sweep::{PlanePairs, Pool};
+use psidpd_passes::plane::list::{PairList, pairs_of_each};
 
 /// The particles of a rank, owned particles first, and their surroundings.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +73,54 @@ impl PairThermostat {
         }
         // Ghosts are moved by their owners.
         let mass = |k: usize| mass.get(k).copied().unwrap_or(f64::INFINITY);
-        self.find(pool, around, &particles, species_of_kind, dt, virial, mass)
+        self.find(pool, around, &particles, species_of_kind, dt, virial, mass)?;
+        if !self.is_exact {
+            self.agree_with_other_ranks(rank, dt);
+        }
+        Ok(())
+    }
+
+    /// Computes vectors of pairs with a ghost as the other rank does: from coordinates that differ by a
+    /// period, instead of fractions of this rank's own region.
+    fn agree_with_other_ranks(&mut self, rank: &Rank, dt: f64) {
+        let PairThermostat { plan, lists, planes, .. } = self;
+        let (order, ghosts) = (lists.order(), lists.ghosts());
+        if ghosts.is_empty() {
+            return;
+        }
+        let Rank { around, particles, species_of_kind, .. } = *rank;
+        let species = plan.gamma.len().isqrt();
+        for Plane { found, .. } in planes {
+            let PlanePairs { own, next, list: PairList { start, pairs, stretch, .. } } = found;
+            if [&*own, next].iter().all(|range| !ghosts[(*range).clone()].contains(&true)) {
+                continue;
+            }
+            for (i, of_i) in pairs_of_each(start) {
+                let i = own.start + i;
+                for k in of_i {
+                    let pair = &mut pairs[k];
+                    let j = second(own, next, pair.j);
+                    if ghosts[i] == ghosts[j] {
+                        continue;
+                    }
+                    let of_host = [i, j].map(|k| order[k] as usize);
+                    let [a, b] = of_host.map(|k| species_of_kind[particles.kind[k] as usize] as usize);
+                    let law = a * species + b;
+                    let [x, y] = of_host.map(|k| particles.x[k]);
+                    let d = around.domain.minimum_image(x, y);
+                    let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+                    let (t, exponent) = ((1.0 - r / plan.range[law]).max(0.0), plan.exponent[law]);
+                    let w = if exponent == 1.0 { t } else { t.powf(exponent) };
+                    let factor = (0.5 * dt * plan.gamma[law]).sqrt() * w / r;
+                    if factor > 0.0 && factor.is_finite() {
+                        pair.g = d.map(|d| (factor * d) as f32);
+                        if let Some(stretch) = stretch.get_mut(k) {
+                            *stretch = factor.recip();
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Begins the midpoint rule for the pairs and noise of the last search. `vectors` are velocities of
@@ -105,7 +153,7 @@ impl PairThermostat {
         match self.round {
             Round::Start => Err(EngineError::Host("the thermostat must begin before it continues")),
             Round::Direction => {
-                self.take_ghosts(v.len(), vectors);
+                self.take_ghosts(vectors);
                 self.round = Round::Curvature;
                 let [curvature, square] = self.curvature(pool);
                 Ok(Need::Totals([self.first, curvature, square]))
@@ -146,11 +194,12 @@ impl PairThermostat {
         Need::Nothing(virial)
     }
 
-    /// Takes the vectors of ghosts, which follow those of the `owned` particles.
-    fn take_ghosts(&mut self, owned: usize, vectors: &[[f64; 3]]) {
-        for ([x, y, z], place) in vectors.iter().zip(self.lists.place()).skip(owned) {
-            if let Some(p) = self.sums.p.get_mut(*place as usize) {
-                *p = Wide([*x, *y, *z, 0.0]);
+    fn take_ghosts(&mut self, vectors: &[[f64; 3]]) {
+        let ghosts = self.lists.ghosts();
+        for ((p, k), ghost) in self.sums.p.iter_mut().zip(self.lists.order()).zip(ghosts) {
+            if *ghost {
+                let [x, y, z] = vectors[*k as usize];
+                *p = Wide([x, y, z, 0.0]);
             }
         }
     }
