@@ -6,8 +6,8 @@ mod common;
 use common::{Random, device, model, particles};
 use nalgebra::Matrix3;
 use psidpd_core::engine::{
-    Around, DevicePath, Engine, EngineError, Mark, Newton, Particles, Path, PeriodicBox, Reason, Request,
-    Settings, Step, Surroundings, Tally, Want,
+    Around, Engine, EngineError, Mark, Newton, Particles, Path, PeriodicBox, Reason, Request, Settings, Step,
+    Surroundings, Tally, Want,
 };
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};

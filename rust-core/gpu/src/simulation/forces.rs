@@ -98,7 +98,9 @@ impl GpuForces {
         if [tag.len(), kind.len()] != [x.len(); 2] || owned > x.len() || drag && request.v.len() != x.len() {
             return Err(EngineError::Host("particle arrays have different lengths"));
         }
-        (self.places.clear(), self.positions.clear(), self.velocities.clear());
+        self.places.clear();
+        self.positions.clear();
+        self.velocities.clear();
         self.owned = 0;
         if owned == 0 {
             return Ok(());
