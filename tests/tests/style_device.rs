@@ -98,7 +98,7 @@ fn trajectories_are_those_of_the_cpu() {
         let errors: Vec<f64> = (0..found.len())
             .map(|k| (found[k] - expected[k]).abs() / expected[if k == 2 { 1 } else { k }].abs())
             .collect();
-        println!("{what}: x, v and f differ by {apart:.1e?}, energy, pressures and values by {errors:.1e?}");
+        println!("{what}: x, v and f differ by {apart:?}, energy, pressures and values by {errors:?}");
         assert!(apart[0] < 1e-5 && apart[1] < 1e-3 && apart[2] < 1e-3, "{what}: {apart:?}");
         assert!(apart[0] > 1e-13, "{what}: the CPU has computed both");
         assert!(
