@@ -83,7 +83,11 @@ fn mistakes_stop_with_one_clear_line() {
             "expected 'pair_style dpd/psi T seed' and optional keywords, found 1 arguments",
         ),
         (style, "pair_style dpd/psi 1.0 5 6".into(), "keyword '6' needs a value"),
-        (style, "pair_style dpd/psi 1.0 5 law lucy".into(), "unknown keyword 'law': expected 'precision' or"),
+        (
+            style,
+            "pair_style dpd/psi 1.0 5 law lucy".into(),
+            "unknown keyword 'law': expected 'precision', 'threads' or 'device'",
+        ),
         (style, "pair_style dpd/psi 1.0 5 precision single".into(), "unknown precision 'single'"),
         (style, "pair_style dpd/psi 1.0 5 threads 0".into(), "threads must be from 1 to 1024, found 0"),
         (&coeff, "pair_coeff * * nowhere.toml F".into(), "nowhere.toml: cannot be read"),

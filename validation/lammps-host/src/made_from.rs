@@ -28,13 +28,18 @@ const CPP: [&str; 3] = ["lammps-plugin/cpp", "lammps-plugin/compat", "lammps-plu
 const SETTINGS: [&str; 4] = ["RUSTFLAGS", "CXXFLAGS", "CARGO_ENCODED_RUSTFLAGS", "RUSTUP_TOOLCHAIN"];
 
 /// The digest of a plugin for `host` from the checkout `root`.
-pub(super) fn digest(host: &Host, root: &Path, compiler: &[String]) -> Result<String, LammpsError> {
+pub(super) fn digest(
+    host: &Host,
+    root: &Path,
+    compiler: &[String],
+    features: &[&str],
+) -> Result<String, LammpsError> {
     let mut hasher = DefaultHasher::new();
     compiler.hash(&mut hasher);
     for name in SETTINGS {
         std::env::var_os(name).hash(&mut hasher);
     }
-    super::plugin::with_gpu().hash(&mut hasher);
+    features.hash(&mut hasher);
     for part in SOURCES.iter().chain(&CPP) {
         add(&root.join(part), &root.join(part), &mut hasher)?;
     }

@@ -147,6 +147,7 @@ fn build_with(
         }
     }
     let compiler = compiler()?;
+    let features = features();
 
     let waiting = || progress("waiting for another process that is building the plugin");
     for folder in [base, builds] {
@@ -156,7 +157,7 @@ fn build_with(
     let (plugin, styles, launcher) = (base.join(FILE_NAME), base.join(STYLES), base.join(LAUNCHER));
     let sizes = || [&plugin, &styles].map(|file| fs::metadata(file).map_or(0, |file| file.len()));
     let mut built_for = BuiltFor {
-        made_from: made_from::digest(host, root, &compiler)?,
+        made_from: made_from::digest(host, root, &compiler, features)?,
         sizes: sizes(),
         ..BuiltFor::new(version)
     };
@@ -169,7 +170,6 @@ fn build_with(
         "building the plugin for LAMMPS {}: minutes the first time, then seconds",
         version.name
     ));
-    let features = if with_gpu() { &["--features", "psidpd/gpu,psidpd-lammps/gpu"][..] } else { &[] };
     let out = cargo_command(cargo)
         // The program is built too, which gives the shared crates the same features.
         .args(["build", "--release", "--lib", "-p", "psidpd", "-p", "psidpd-lammps"])
@@ -220,9 +220,12 @@ fn build_with(
     Ok(plugin)
 }
 
-/// Whether the plugin shall have `device gpu`, by the variable of the Python package.
-pub(super) fn with_gpu() -> bool {
-    std::env::var_os("PSIDPD_WITH_GPU").is_some_and(|value| !value.is_empty() && value != "0")
+/// The arguments that give the plugin `device gpu`, if the variable of the Python package asks for it.
+fn features() -> &'static [&'static str] {
+    match std::env::var_os("PSIDPD_WITH_GPU") {
+        Some(value) if !value.is_empty() && value != "0" => &["--features", "psidpd/gpu,psidpd-lammps/gpu"],
+        _ => &[],
+    }
 }
 
 /// The cargo command, without variables that an enclosing cargo set for another package.

@@ -3,7 +3,10 @@
 //! Particles are in the order of cells, and within a cell in the order of their tags: the order
 //! depends on positions and tags alone.
 
+mod plane_pairs;
 mod with_ghosts;
+
+pub use plane_pairs::PlanePairs;
 
 use super::region::region;
 use super::workspace::{CellOrder, Input, SortedParticles};
@@ -19,33 +22,6 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, Listed, PairList, list_pairs};
 use psidpd_passes::tally::Want;
 use psidpd_threads::{Pool, part};
-use std::ops::Range;
-
-/// The pairs whose first particle is in one plane; the second is in the same plane or in the next.
-#[derive(Debug, Clone, Default)]
-pub struct PlanePairs {
-    /// The sorted particles of this plane, and of the next one.
-    pub own: Range<usize>,
-    pub next: Range<usize>,
-    pub list: PairList,
-}
-
-impl PlanePairs {
-    /// Sets the particles of a plane of cells.
-    pub fn lie_in(&mut self, cells: &CellOrder, plane: usize) {
-        let (next, count) = (plane + 1, cells.grid.planes);
-        let next = if next < count { next } else { 0 };
-        let follows = next > 0 || cells.is_periodic();
-        self.own = cells.particles_of(&(plane..plane + 1));
-        self.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
-    }
-}
-
-impl AsMut<PlanePairs> for PlanePairs {
-    fn as_mut(&mut self) -> &mut PlanePairs {
-        self
-    }
-}
 
 /// Sorted particles, and scratch arrays.
 pub struct PairLists {

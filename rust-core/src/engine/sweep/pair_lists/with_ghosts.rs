@@ -3,7 +3,7 @@
 //! A search lists them for the owned particle, whose ghost may be in the plane before. A plane's list has pairs of its
 //! particles with each other and with the next plane: there such a pair is one of the plane before, with the ghost first.
 
-use super::PlanePairs;
+use super::plane_pairs::PlanePairs;
 use psidpd_passes::plane::list::{PairList, pairs_of_each};
 use psidpd_threads::Pool;
 use std::ops::Range;
