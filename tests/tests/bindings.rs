@@ -27,7 +27,6 @@ fn the_bindings_are_those_of_the_header() {
         .allowlist_function(USED)
         .allowlist_recursively(false)
         .merge_extern_blocks(true)
-        .rust_edition(bindgen::RustEdition::Edition2024)
         .generate_comments(false)
         .layout_tests(false)
         .raw_line("//! LAMMPS's C library interface, loaded at run time. Written by `tests/tests/bindings.rs`: do not edit.\n")
