@@ -45,40 +45,31 @@ pub struct Unsupported {
     pub what: String,
 }
 
-/// The reason why a step failed, with its number and the lowest tag among the particles of this fault.
+/// A step that failed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Stop {
+#[error("step {step}: {fault} of particle {tag}")]
+pub struct Stop {
+    /// Number of the step.
+    pub step: u64,
+    /// The lowest tag among the particles of this fault.
+    pub tag: i32,
+    /// The reason.
+    pub fault: Fault,
+}
+
+/// The reason why a step failed, in the order of `status` of `wgsl/common.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Fault {
     /// A velocity is not finite.
-    #[error("step {step}: the velocity of particle {tag} is not finite")]
-    Velocity {
-        /// The step that failed.
-        step: u64,
-        /// The particle.
-        tag: i32,
-    },
+    #[error("not finite: the velocity")]
+    Velocity,
     /// A particle moved by half of the box or more in one drift.
-    #[error("step {step}: particle {tag} moved by half of the box or more")]
-    Runaway {
-        /// The step that failed.
-        step: u64,
-        /// The particle.
-        tag: i32,
-    },
+    #[error("half of the box or more: the move")]
+    Runaway,
     /// ψ or its derivative is not finite.
-    #[error("step {step}: the excess free energy of particle {tag} is not finite")]
-    ExcessFreeEnergy {
-        /// The step that failed.
-        step: u64,
-        /// The particle.
-        tag: i32,
-    },
+    #[error("not finite: the excess free energy")]
+    ExcessFreeEnergy,
     /// A force is not finite.
-    #[error("step {step}: the force on particle {tag} is not finite")]
-    Force {
-        /// The step that failed.
-        step: u64,
-        /// The particle.
-        tag: i32,
-    },
+    #[error("not finite: the force")]
+    Force,
 }

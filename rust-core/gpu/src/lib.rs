@@ -25,7 +25,7 @@ mod simulation;
 mod table;
 
 pub use device::{Device, DeviceInfo, devices};
-pub use error::{GpuError, Stop, Unsupported};
+pub use error::{Fault, GpuError, Stop, Unsupported};
 pub use settings::{BodyForce, FROZEN, MOST_BODY_FORCES, Particles, Rule, Settings, Totals, body_force_mark};
 pub use simulation::forces::GpuForces;
 pub use simulation::{GpuSimulation, Timing};

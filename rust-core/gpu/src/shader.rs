@@ -92,11 +92,24 @@ impl Shader {
             &body,
             include_str!("wgsl/motion.wgsl"),
         ] {
-            text += part;
+            for line in part.lines() {
+                match line.strip_prefix("@KERNEL ").and_then(|rest| rest.strip_suffix(" {")) {
+                    Some(name) => text += &KERNEL.replace("@NAME", name),
+                    None => text += line,
+                }
+                text.push('\n');
+            }
         }
         Ok(Shader { text, constants, tables, variables })
     }
 }
+
+/// The head of a kernel: `i` is the particle of this invocation, `block` its workgroup.
+const KERNEL: &str = "@compute @workgroup_size(LANES)
+fn @NAME(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) lane: u32) {
+    let block = group.x + group.y * groups.x;
+    let i = block * LANES + lane;";
 
 /// The loop over the neighbours `j` of particle `i` at `own`, with `d = r_i − r_j` and its square `r2`.
 const LOOP: &str = "let here = cell_of(own);

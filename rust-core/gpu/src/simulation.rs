@@ -149,7 +149,7 @@ impl GpuSimulation {
         });
         self.submit(&list)?;
         let status = self.status()?;
-        self.fault(&status).map_or(Ok(()), |fault| Err(GpuError::Stopped(fault(self.number))))
+        self.fault(&status, self.number).map_or(Ok(()), |stop| Err(stop.into()))
     }
 
     /// Makes steps of `dt`; with `totals` the last one also computes the sums of [`GpuSimulation::totals`].
@@ -210,9 +210,9 @@ impl GpuSimulation {
             let sequence = self.sequence;
             let status = self.status()?;
             let at = ends.iter().find(|(_, end)| *end >= status.failed).map_or(first, |(number, _)| *number);
-            if let Some(fault) = self.fault(&status) {
+            if let Some(stop) = self.fault(&status, at) {
                 self.number = at;
-                return Err(GpuError::Stopped(fault(at)));
+                return Err(stop.into());
             }
             if status.unfinished == 0 {
                 debug_assert!(status.failed == 0, "{status:?} {sequence}");
@@ -270,47 +270,21 @@ impl GpuSimulation {
         Ok(())
     }
 
-    /// Takes the same model at another temperature, from the next forces on.
-    ///
-    /// # Errors
-    /// As [`GpuSimulation::new`].
-    pub fn set_fluid(&mut self, fluid: &Fluid) -> Result<(), GpuError> {
-        check(&self.settings, fluid)?;
-        self.geometry = Geometry::new(&self.settings.domain, fluid.dimensions, fluid.cutoff())?;
-        let shader = Shader::new(fluid)?;
-        let old = self.kernels.shader();
-        let fits = shader.variables == old.variables
-            && shader.constants.len() == old.constants.len()
-            && shader.tables.len() == old.tables.len()
-            && fluid.cutoff() == self.fluid.cutoff();
-        self.kernels.replace(&self.device, shader)?;
-        self.fluid = fluid.clone();
-        match fits {
-            true => {
-                self.write_constants();
-                Ok(())
-            }
-            false => self.reload(),
-        }
-    }
-
-    /// Replaces box, masses, seed and body forces; the particles keep their positions. Forces must be prepared anew.
+    /// Replaces the fluid, for instance by the same model at another temperature, box, masses, seed and body forces. The particles
+    /// keep their positions; forces must be prepared anew.
     ///
     /// # Errors
     /// As [`GpuSimulation::new`] and [`GpuSimulation::upload`].
-    pub fn set_settings(&mut self, settings: Settings) -> Result<(), GpuError> {
-        check(&settings, &self.fluid)?;
-        let geometry = Geometry::new(&settings.domain, self.fluid.dimensions, self.fluid.cutoff())?;
-        self.kernels.set_tilted(geometry.is_tilted);
+    pub fn replace(&mut self, fluid: &Fluid, settings: Settings) -> Result<(), GpuError> {
+        check(&settings, fluid)?;
+        let geometry = Geometry::new(&settings.domain, fluid.dimensions, fluid.cutoff())?;
+        let shader = Shader::new(fluid)?;
         let mut particles = Particles::default();
         self.download(&mut particles)?;
-        (self.settings, self.geometry, self.arrays) = (settings, geometry, None);
+        self.kernels.replace(&self.device, shader)?;
+        self.kernels.set_tilted(geometry.is_tilted);
+        (self.fluid, self.settings, self.geometry, self.arrays) = (fluid.clone(), settings, geometry, None);
         if particles.x.is_empty() { Ok(()) } else { self.upload(&particles, self.number) }
-    }
-
-    /// Puts the particles into new arrays.
-    fn reload(&mut self) -> Result<(), GpuError> {
-        self.set_settings(self.settings.clone())
     }
 
     /// Number of particles.

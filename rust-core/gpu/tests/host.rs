@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Random, device, model, particles};
+use common::{device, model, particles};
 use nalgebra::Matrix3;
 use psidpd_core::engine::{
     Around, Engine, EngineError, Mark, Newton, Particles, Path, PeriodicBox, Reason, Request, Settings, Step,
@@ -65,12 +65,8 @@ fn rank(
     let mut rank = Arrays::default();
     (0..all.x.len()).filter(|k| is_own(*k)).for_each(|k| rank.add(all, k, [0.0; 3]));
     rank.owned = rank.x.len();
-    let deep = if dimensions == 2 { 0..=0 } else { -1..=1 };
-    for (a, b, c) in (-1..=1)
-        .flat_map(|a| (-1..=1).map(move |b| (a, b)))
-        .flat_map(|(a, b)| deep.clone().map(move |c| (a, b, c)))
-    {
-        let shift = [a, b, c];
+    let shifts = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
+    for shift in shifts.filter(|shift| dimensions == 3 || shift[2] == 0) {
         let by = [0, 1, 2].map(|e| (0..3).map(|k| f64::from(shift[k]) * domain.edge(k)[e]).sum());
         for k in (0..all.x.len()).filter(|k| shift != [0; 3] || !is_own(*k)) {
             let at: [f64; 3] = [0, 1, 2].map(|c| all.x[k][c] + by[c]);
@@ -121,7 +117,7 @@ fn on_two_ranks(
 
 fn case(name: &str, fluid: &Fluid, edges: Matrix3<f64>, density: f64) {
     let domain = PeriodicBox::new([-1.0, 0.5, 0.0], edges, [true; 3]).unwrap();
-    let found = particles(&mut Random(3), fluid, &domain, density);
+    let found = particles(3, fluid, &domain, density);
     let kind: Vec<i32> = found.species.iter().map(|s| s + 1).collect();
     let all = Arrays { owned: kind.len(), x: found.x, v: found.v, tag: found.tag, kind, images: Vec::new() };
     let species: Vec<usize> = found.species.iter().map(|s| *s as usize).collect();

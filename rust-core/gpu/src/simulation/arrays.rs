@@ -30,6 +30,7 @@ pub(super) const FORCES: usize = 8;
 pub(super) const COUNTS: usize = 9;
 pub(super) const STATUS: usize = 14;
 pub(super) const SUMS: usize = 15;
+pub(super) const TABLES: usize = 16;
 pub(super) const EXCHANGE: usize = 17;
 
 #[repr(C)]
@@ -74,25 +75,12 @@ impl GpuSimulation {
         let shader = self.kernels.shader();
         let vectors = 16 * count;
         let of_thermostat = if thermostat { vectors } else { 16 };
-        let mut sizes = vec![
-            size_of::<Params>() as u64,
-            4 * shader.constants.len() as u64,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            vectors,
-            4 * cells,
-            4 * scans * u64::from(SCAN),
-            4 * scans,
-            8 * count,
-            4 * count * shader.variables.max(1) as u64,
-            size_of::<Status>() as u64,
-            u64::from(4 * ENTRIES * groups_of(room.0)),
-            4 * shader.tables.len() as u64,
-        ];
+        let mut sizes = vec![size_of::<Params>() as u64, 4 * shader.constants.len() as u64];
+        // Particles twice, as sorting copies them, and forces.
+        sizes.extend([vectors; 7]);
+        sizes.extend([4 * cells, 4 * scans * u64::from(SCAN), 4 * scans, 8 * count]);
+        sizes.extend([4 * count * shader.variables.max(1) as u64, size_of::<Status>() as u64]);
+        sizes.extend([u64::from(4 * ENTRIES * groups_of(room.0)), 4 * shader.tables.len() as u64]);
         sizes.extend([of_thermostat.max(4 * exchange * count), of_thermostat, of_thermostat, of_thermostat]);
         let limits = &self.device.limits;
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
@@ -140,24 +128,13 @@ impl GpuSimulation {
                 entries: &entries,
             })
         });
+        let write = |k: usize, numbers| {
+            self.device.queue.write_buffer(&buffers[k], 0, bytemuck::cast_slice(numbers));
+        };
+        write(CONSTANTS, &shader.constants);
+        write(TABLES, &shader.tables);
         self.arrays = Some(Arrays { buffers, groups, scans: scans as u32, has_thermostat: thermostat, room });
-        self.write_constants();
         Ok(())
-    }
-
-    pub(super) fn write_constants(&self) {
-        let Some(arrays) = &self.arrays else { return };
-        let shader = self.kernels.shader();
-        self.device.queue.write_buffer(
-            &arrays.buffers[CONSTANTS],
-            0,
-            bytemuck::cast_slice(&shader.constants),
-        );
-        self.device.queue.write_buffer(
-            &arrays.buffers[CONSTANTS + 15],
-            0,
-            bytemuck::cast_slice(&shader.tables),
-        );
     }
 
     pub(super) fn write_params(&self) {

@@ -8,7 +8,7 @@ use super::arrays::{COUNTS, EXCHANGE, POSITIONS, STATUS, SUMS, VELOCITIES};
 use super::status::Status;
 use super::{read, sums_of};
 use crate::geometry::Geometry;
-use crate::{Device, GpuError, Settings, Stop, Totals};
+use crate::{Device, Fault, GpuError, Settings, Totals};
 use psidpd_core::engine::{
     Around, DevicePath, EngineError, Evaluate, PeriodicBox, Request, Results, Surroundings, Tally,
 };
@@ -175,16 +175,16 @@ impl GpuForces {
         let mut found: Vec<f32> = read(&machine.device, &parts).map_err(failed)?;
         let status: Status =
             bytemuck::pod_read_unaligned(bytemuck::cast_slice(&found[numbers..][..status / 4]));
-        match machine.fault(&status).map(|fault| fault(0)) {
-            None => {}
-            Some(Stop::Force { tag, .. }) => return Err(EngineError::Force { tag }),
-            Some(Stop::ExcessFreeEnergy { tag, .. }) => {
-                return Err(EngineError::Device(format!(
+        if let Some(stop) = machine.fault(&status, 0) {
+            let tag = stop.tag;
+            return Err(match stop.fault {
+                Fault::Force => EngineError::Force { tag },
+                Fault::ExcessFreeEnergy => EngineError::Device(format!(
                     "the excess free energy of particle {tag} is not finite: psi is singular there; set bounds on the \
                      density, or lower the time step"
-                )));
-            }
-            Some(other) => return Err(EngineError::Device(other.to_string())),
+                )),
+                Fault::Velocity | Fault::Runaway => EngineError::Device(stop.to_string()),
+            });
         }
         let totals = sums_of(&found[numbers + size_of::<Status>() / 4..]);
         found.truncate(numbers);

@@ -3,7 +3,7 @@
 use super::GpuSimulation;
 use super::arrays::STATUS;
 use crate::kernels::{Run, read};
-use crate::{GpuError, Stop};
+use crate::{Fault, GpuError, Stop};
 
 /// `Status` of `wgsl/common.wgsl`.
 #[repr(C)]
@@ -48,17 +48,10 @@ impl GpuSimulation {
         (0..3).for_each(|k| self.effort[k] += u64::from(status.effort[k]));
     }
 
-    /// The fault that kernels reported, of a step.
-    pub(super) fn fault(&self, status: &Status) -> Option<impl Fn(u64) -> Stop + use<>> {
-        let found = status.tags.iter().position(|tag| *tag != u32::MAX);
-        let tag = found.map_or(0, |reason| status.tags[reason] as i32);
-        found.map(|reason| {
-            move |step| match reason {
-                0 => Stop::Velocity { step, tag },
-                1 => Stop::Runaway { step, tag },
-                2 => Stop::ExcessFreeEnergy { step, tag },
-                _ => Stop::Force { step, tag },
-            }
-        })
+    /// The fault that kernels reported, in step `step`.
+    pub(super) fn fault(&self, status: &Status, step: u64) -> Option<Stop> {
+        let faults = [Fault::Velocity, Fault::Runaway, Fault::ExcessFreeEnergy, Fault::Force];
+        let found = faults.into_iter().zip(status.tags).find(|(_, tag)| *tag != u32::MAX);
+        found.map(|(fault, tag)| Stop { step, tag: tag as i32, fault })
     }
 }

@@ -95,14 +95,6 @@ override TILTED: bool = true;
 const FLAG_DEFERRED = 1u;
 const FLAG_NOISE = 4u;
 
-fn index_of(group: vec3<u32>, groups: vec3<u32>, lane: u32) -> u32 {
-    return (group.x + group.y * groups.x) * LANES + lane;
-}
-
-fn block_of(group: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return group.x + group.y * groups.x;
-}
-
 // Whether an earlier kernel failed.
 fn halted() -> bool {
     let failed = atomicLoad(&status.failed);

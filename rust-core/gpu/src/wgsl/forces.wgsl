@@ -1,10 +1,7 @@
 // The two passes over pairs: local densities with ψ and its slopes, and forces.
 
 // Densities of a particle, ψ, and ∂ψ/∂n.
-@compute @workgroup_size(LANES)
-fn densities(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL densities {
     let acts = is_owned(i);
     var psi = 0.0;
     if (acts) {
@@ -29,14 +26,11 @@ fn densities(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         if (excess.below) { atomicAdd(&status.below, 1u); }
         if (excess.above) { atomicAdd(&status.above, 1u); }
     }
-    if (TOTALS) { store_sum(block_of(group, groups), 0u, psi, lane); }
+    if (TOTALS) { store_sum(block, 0u, psi, lane); }
 }
 
 // Conservative forces, and with FLAG_NOISE drag and noise: a is √(2kT/Δt).
-@compute @workgroup_size(LANES)
-fn forces(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL forces {
     let acts = is_owned(i);
     var sum = vec3(0.0);
     var energy = 0.0;
@@ -85,7 +79,6 @@ fn forces(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
         force[i] = vec4(sum, 0.0);
     }
     if (TOTALS) {
-        let block = block_of(group, groups);
         store_sum(block, 1u, energy, lane);
         for (var k = 0u; k < 6u; k++) {
             store_sum(block, 2u + k, virial[k], lane);
@@ -105,26 +98,17 @@ fn add_virial(to: ptr<function, array<f32, 6>>, e: vec3<f32>, factor: f32) {
 }
 
 // Where the host keeps the particles: slopes of its own, slopes of its ghosts, and forces.
-@compute @workgroup_size(LANES)
-fn give_slopes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL give_slopes {
     if (!is_owned(i)) { return; }
     for (var k = 0u; k < V; k++) { exchange[u32(box_of[i].w) * V + k] = slopes[i * V + k]; }
 }
 
-@compute @workgroup_size(LANES)
-fn take_slopes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL take_slopes {
     if (halted() || i >= P.count || !is_ghost(vel[i])) { return; }
     for (var k = 0u; k < V; k++) { slopes[i * V + k] = exchange[u32(box_of[i].w) * V + k]; }
 }
 
-@compute @workgroup_size(LANES)
-fn give_forces(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL give_forces {
     if (!is_owned(i)) { return; }
     for (var k = 0u; k < 3u; k++) { exchange[u32(box_of[i].w) * 3u + k] = force[i][k]; }
 }

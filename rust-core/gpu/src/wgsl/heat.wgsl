@@ -2,10 +2,7 @@
 // g = a √γ w_R ê; b is √kT.
 
 // The residual √kT Σ ξ g − K v, and the first direction.
-@compute @workgroup_size(LANES)
-fn heat_start(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL heat_start {
     var square = 0.0;
     if (!halted() && i < P.count) {
         let own = pos[i];
@@ -27,7 +24,7 @@ fn heat_start(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             status.iterations = 0u;
         }
     }
-    store_sum(block_of(group, groups), 27u, square, lane);
+    store_sum(block, 27u, square, lane);
 }
 
 fn drag_vector(a: u32, b: u32, d: vec3<f32>, r2: f32) -> vec3<f32> {
@@ -36,10 +33,7 @@ fn drag_vector(a: u32, b: u32, d: vec3<f32>, r2: f32) -> vec3<f32> {
 }
 
 // The image (M + K) p of the direction.
-@compute @workgroup_size(LANES)
-fn heat_image(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL heat_image {
     var curvature = 0.0;
     var square = 0.0;
     if (!halted() && status.state == 0u && i < P.count) {
@@ -59,8 +53,8 @@ fn heat_image(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
         image[i] = vec4(sum, 0.0);
     }
-    store_sum(block_of(group, groups), 28u, curvature, lane);
-    store_sum(block_of(group, groups), 29u, square, lane);
+    store_sum(block, 28u, curvature, lane);
+    store_sum(block, 29u, square, lane);
 }
 
 // Sums three entries of all blocks in a fixed order.
@@ -74,8 +68,7 @@ fn sum_of_blocks(entry: u32, lane: u32) -> vec3<f32> {
 }
 
 // Decides how far to go along the direction. c is the tolerance, d the least relative residual.
-@compute @workgroup_size(LANES)
-fn heat_decide(@builtin(local_invocation_index) lane: u32) {
+@KERNEL heat_decide {
     // r·M⁻¹r of the first residual, p·Ap and Ap·M⁻¹Ap.
     let found = sum_of_blocks(27u, lane);
     if (lane != 0u || halted()) { return; }
@@ -95,10 +88,7 @@ fn heat_decide(@builtin(local_invocation_index) lane: u32) {
 }
 
 // Moves along the direction.
-@compute @workgroup_size(LANES)
-fn heat_advance(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL heat_advance {
     var square = 0.0;
     if (!halted() && status.state == 0u && i < P.count) {
         let rest = residual[i].xyz - status.alpha * image[i].xyz;
@@ -106,13 +96,12 @@ fn heat_advance(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         residual[i] = vec4(rest, 0.0);
         square = inverse_mass(vel[i]) * dot(rest, rest);
     }
-    store_sum(block_of(group, groups), 30u, square, lane);
+    store_sum(block, 30u, square, lane);
 }
 
 // Decides whether to go on. The norm is that of the residual itself: in single precision the recurrence of the CPU,
 // α² Ap·M⁻¹Ap − r·M⁻¹r, loses its digits under strong drag.
-@compute @workgroup_size(LANES)
-fn heat_judge(@builtin(local_invocation_index) lane: u32) {
+@KERNEL heat_judge {
     let next = sum_of_blocks(30u, lane).x;
     if (lane != 0u || halted() || status.state != 0u) { return; }
     status.beta = next / status.now;
@@ -127,10 +116,7 @@ fn heat_judge(@builtin(local_invocation_index) lane: u32) {
 
 // Computes the next direction. After the last iteration it is the whole change to the midpoint, and the solution has the
 // residual added.
-@compute @workgroup_size(LANES)
-fn heat_turn(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL heat_turn {
     if (halted() || status.state == 2u || i >= P.count) { return; }
     let inverse = inverse_mass(vel[i]);
     if (status.state == 0u) {
@@ -143,10 +129,7 @@ fn heat_turn(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
 }
 
 // The virial of the impulses over Δt: drag at the midpoint, and noise. c is 2/Δt.
-@compute @workgroup_size(LANES)
-fn heat_virial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL heat_virial {
     var virial: array<f32, 6>;
     if (!halted() && i < P.count) {
         let own = pos[i];
@@ -161,14 +144,11 @@ fn heat_virial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             if (size > 0.0) { add_virial(&virial, g / size, 0.5 * I.c * sqrt(r2) * size * along); }
         @END
     }
-    for (var k = 0u; k < 6u; k++) { store_sum(block_of(group, groups), 8u + k, virial[k], lane); }
+    for (var k = 0u; k < 6u; k++) { store_sum(block, 8u + k, virial[k], lane); }
 }
 
 // v += 2 δ. Fails if conjugate gradients need more iterations.
-@compute @workgroup_size(LANES)
-fn heat_apply(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL heat_apply {
     if (halted() || i >= P.count) { return; }
     if (status.state == 0u) {
         if (i == 0u) {

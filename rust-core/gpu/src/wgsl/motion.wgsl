@@ -1,10 +1,7 @@
 // Kick and drift, and the sort by cells that follows.
 
 // v += a F/m (twice if the last kick of the step before was deferred); x += b v. Counts the particles of each cell.
-@compute @workgroup_size(LANES)
-fn kick_drift(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL kick_drift {
     if (halted() || i >= P.count) { return; }
     var v = vel[i];
     var s = pos[i];
@@ -56,20 +53,14 @@ fn kick_drift(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
 }
 
 // Counts the particles of each cell, where none moves, and numbers them as the host does.
-@compute @workgroup_size(LANES)
-fn count_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL count_cells {
     if (halted() || i >= P.count) { return; }
     box_of[i].w = i32(i);
     slots[i].x = atomicAdd(&counts[cell_index(cell_of(pos[i]))], 1u);
 }
 
 // Puts particles at x + a F/m for an evaluation of forces, in a box without walls.
-@compute @workgroup_size(LANES)
-fn displace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL displace {
     if (halted() || i >= P.count) { return; }
     var s = pos[i];
     kept[i] = s;
@@ -88,19 +79,13 @@ fn displace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
 }
 
 // Puts particles back, which have been sorted since.
-@compute @workgroup_size(LANES)
-fn step_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL step_back {
     if (halted() || i >= P.count) { return; }
     pos[i] = kept[slots[i].x];
 }
 
 // v += a F/m.
-@compute @workgroup_size(LANES)
-fn kick(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL kick {
     if (halted() || i >= P.count) { return; }
     let v = vel[i];
     let u = fma(vec3(I.a * inverse_mass(v)), force[i].xyz, v.xyz);
@@ -129,10 +114,7 @@ fn scan_group(value: u32, lane: u32) -> u32 {
 }
 
 // Sums the counts of SCAN cells, and clears them for the next sort.
-@compute @workgroup_size(LANES)
-fn scan_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let block = block_of(group, groups);
+@KERNEL scan_cells {
     let begin = block * SCAN + lane * (SCAN / LANES);
     var local: array<u32, SCAN / LANES>;
     var total = 0u;
@@ -153,8 +135,7 @@ fn scan_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
 }
 
 // Sums the sums, with one workgroup.
-@compute @workgroup_size(LANES)
-fn scan_sums(@builtin(local_invocation_index) lane: u32) {
+@KERNEL scan_sums {
     let length = arrayLength(&sums);
     let writes = !halted();
     var carry = 0u;
@@ -169,19 +150,13 @@ fn scan_sums(@builtin(local_invocation_index) lane: u32) {
 }
 
 // Lists the particles of each cell, in an order that depends on the run.
-@compute @workgroup_size(LANES)
-fn list_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL list_cells {
     if (halted() || i >= P.count) { return; }
     slots[first_of(cell_index(cell_of(pos[i]))) + slots[i].x].y = i;
 }
 
 // Moves each particle to its place: by cell, and within a cell by tag; images of one particle share a tag.
-@compute @workgroup_size(LANES)
-fn sort(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
+@KERNEL sort {
     if (halted() || i >= P.count) { return; }
     let own = pos[i];
     let cell = cell_index(cell_of(own));
@@ -200,11 +175,7 @@ fn sort(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
 }
 
 // Momentum and its flux, the force on frozen particles, and the largest force.
-@compute @workgroup_size(LANES)
-fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-        @builtin(local_invocation_index) lane: u32) {
-    let i = index_of(group, groups, lane);
-    let block = block_of(group, groups);
+@KERNEL measure {
     var v = vec3(0.0);
     var m = 0.0;
     var f = vec3(0.0);

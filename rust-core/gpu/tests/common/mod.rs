@@ -1,9 +1,13 @@
 //! Particles without a pattern, and the device that tests run on.
 #![allow(dead_code)]
 
+#[path = "../../../tests/random_fluid/mod.rs"]
+pub mod random_fluid;
+
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_gpu::{Device, Particles, Settings};
+use random_fluid::Random;
 use std::path::Path;
 
 /// The device of an index in `PSIDPD_GPU_DEVICE`, or the first.
@@ -12,28 +16,9 @@ pub fn device() -> Device {
     Device::open(index).unwrap()
 }
 
-/// Random numbers from a seed.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-}
-
 /// Particles on a grid of about `density`, each off by up to 0.3 of the spacing, with velocities of about 1.
-pub fn particles(random: &mut Random, fluid: &Fluid, domain: &PeriodicBox, density: f64) -> Particles {
+pub fn particles(seed: u64, fluid: &Fluid, domain: &PeriodicBox, density: f64) -> Particles {
+    let mut random = Random(seed);
     let dimensions = fluid.dimensions;
     let spacing = density.powf(-1.0 / dimensions as f64);
     let along = [0, 1, 2]
@@ -50,13 +35,13 @@ pub fn particles(random: &mut Random, fluid: &Fluid, domain: &PeriodicBox, densi
         let mut v = [0; 3].map(|_| random.within(-1.7, 1.7));
         v[dimensions..].fill(0.0);
         particles.v.push(v);
-        particles.species.push((random.bits() % fluid.species.len() as u64) as i32);
+        particles.species.push(random.below(fluid.species.len()) as i32);
     }
     let count = particles.x.len();
     // Tags in no order.
     particles.tag = (1..=count as i32).collect();
     for k in (1..count).rev() {
-        particles.tag.swap(k, (random.bits() % (k as u64 + 1)) as usize);
+        particles.tag.swap(k, random.below(k + 1));
     }
     (particles.image, particles.marks) = (vec![[0; 3]; count], vec![0; count]);
     particles

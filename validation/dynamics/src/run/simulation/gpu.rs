@@ -10,7 +10,7 @@ use crate::integrator::Integrator;
 use crate::particles::BodyForce;
 use psidpd_core::engine::thermostat::Effort;
 use psidpd_core::engine::{EngineError, Tally, Want};
-use psidpd_gpu::{self as gpu, GpuError, GpuSimulation, Rule, Stop};
+use psidpd_gpu::{self as gpu, Fault, GpuError, GpuSimulation, Rule, Stop};
 use std::time::{Duration, Instant};
 
 /// Time that collected steps may take: a run can stop, and shows its progress, after so long.
@@ -147,8 +147,7 @@ impl Simulation {
             }
             let Some(gpu) = &mut self.gpu else { return Ok(()) };
             gpu.uploaded &= before.body_forces == now.body_forces;
-            gpu.machine.set_fluid(&fluid).map_err(failed)?;
-            gpu.machine.set_settings(settings).map_err(failed)?;
+            gpu.machine.replace(&fluid, settings).map_err(failed)?;
             gpu.conditions = now;
         }
         let Simulation { gpu: Some(gpu), particles, external, number, .. } = self else { return Ok(()) };
@@ -306,24 +305,17 @@ impl Simulation {
 
     /// The error of a step that failed, as the host words it.
     fn failure(&mut self, error: GpuError, dt: f64) -> RunError {
-        let GpuError::Stopped(stop) = error else { return failed(error) };
-        let (step, tag) = match stop {
-            Stop::Velocity { step, tag }
-            | Stop::Runaway { step, tag }
-            | Stop::ExcessFreeEnergy { step, tag }
-            | Stop::Force { step, tag } => (step, tag),
-            other => return failed(GpuError::Stopped(other)),
-        };
+        let GpuError::Stopped(Stop { step, tag, fault }) = error else { return failed(error) };
         self.number = step;
         let fetched = self.fetch();
-        match stop {
-            Stop::Velocity { .. } => RunError::Velocity { step, tag },
-            Stop::Runaway { .. } => {
+        match fault {
+            Fault::Velocity => RunError::Velocity { step, tag },
+            Fault::Runaway => {
                 let found = self.tags().iter().position(|other| *other == tag);
                 let v = found.map_or([f64::NAN; 3], |k| self.particles.now().v[k]);
                 RunError::Runaway { step, tag, distance: dt * v[0].hypot(v[1]).hypot(v[2]) }
             }
-            _ => {
+            Fault::ExcessFreeEnergy | Fault::Force => {
                 // The host says at which densities, at the positions of the failed step.
                 let again = fetched.and_then(|()| self.compute(Want::FORCES, None));
                 let error = again.err().filter(|error| matches!(error, RunError::Engine { .. }));

@@ -4,6 +4,9 @@ use super::resume::{assert_same, finished, until};
 use super::*;
 use crate::checkpoint::{Store, read_state};
 use crate::device::{Device, gpus};
+use crate::integrator::Coupling;
+use crate::particles::{BodyForce, Tags};
+use psidpd_core::engine::PeriodicBox;
 use psidpd_observe::{difference, estimate};
 use std::num::NonZeroUsize;
 
@@ -57,6 +60,106 @@ fn two_runs_have_the_same_bits_and_so_has_a_run_that_was_stopped() {
     );
     let about = std::fs::read_to_string(first.join("about.json")).unwrap();
     assert!(about.contains("\"device\": \"gpu:0\""), "{about}");
+}
+
+const TWO_STAGE: Integrator = Integrator::TwoStage { lambda: 0.21, coupling: Coupling::DEFAULT };
+
+/// Steps of each integrator that a GPU has, with the thermostat after every, every second and every third step.
+fn steps() -> [Integrator; 4] {
+    let every = |every| Coupling { every, ..Coupling::DEFAULT };
+    [
+        Integrator::VelocityVerlet,
+        TWO_STAGE,
+        Integrator::TwoStage { lambda: 0.21, coupling: every(3) },
+        Integrator::ForceGradient { lambda: 0.17, gradient: 1.0 / 24.0, coupling: every(2) },
+    ]
+}
+
+/// Makes steps from one state on both devices, and compares positions, velocities, boxes, totals and iterations.
+fn follows(start: impl Fn() -> Simulation, steps: u64, dt: f64, integrator: Integrator) -> Simulation {
+    let [cpu, gpu] = [Device::Cpu, GPU].map(|device| {
+        let mut run = start();
+        run.use_device(device).unwrap();
+        run.prepare_for(integrator, dt, Want::FORCES).unwrap();
+        run.advance(steps - 1, dt, integrator).unwrap();
+        run.step(dt, integrator, Want::TOTALS).unwrap();
+        run
+    });
+    let count = cpu.len() as f64;
+    let boxes = |run: &Simulation| {
+        let by_tag = run.tags().iter().copied().zip(run.image_flags().iter().copied());
+        std::collections::BTreeMap::from_iter(by_tag)
+    };
+    let apart = super::difference(&cpu, &gpu);
+    let energy = (cpu.potential_energy() - gpu.potential_energy()).abs() / count;
+    let pressure = |run: &Simulation| [run.conservative_pressure_tensor(), run.pressure_tensor()].concat();
+    let scale = cpu.domain().volume(cpu.dimensions()) / count;
+    let stress =
+        pressure(&cpu).iter().zip(pressure(&gpu)).map(|(a, b)| scale * (a - b).abs()).fold(0.0, f64::max);
+    println!("{count} particles, {integrator:?}: {apart:.1e}, energy {energy:.1e}, stress {stress:.1e}");
+    assert!(apart < 1e-4 && energy < 1e-5 && stress < 1e-4, "{apart} {energy} {stress}");
+    assert!(boxes(&cpu) == boxes(&gpu));
+    assert!(cpu.effort().iterations.abs_diff(gpu.effort().iterations) <= steps / 10, "{:?}", gpu.effort());
+    gpu
+}
+
+#[test]
+fn trajectories_follow_the_cpu() {
+    let state = settled();
+    for integrator in steps() {
+        follows(|| simulation(SET6, state.clone()), 50, 0.01, integrator);
+    }
+}
+
+/// Two species of different mass in a tilted plane, with frozen particles and body forces.
+#[test]
+fn mixtures_in_a_tilted_plane_follow_the_cpu() {
+    let edges = nalgebra::Matrix3::new(12.0, 3.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0);
+    let domain = PeriodicBox::new([1.0, -2.0, 0.0], edges, [true; 3]).unwrap();
+    let state = State { domain, mass: vec![1.0, 1.5], ..state_of(BINARY, "[12.0, 9.0]", 5.0) };
+    let ninth = Tags::Ranges((1..=state.len() as i32).step_by(9).map(|tag| tag..=tag).collect());
+    let all = BodyForce {
+        acceleration: [0.5, -0.3, 0.0],
+        reversed_along: None,
+        species: Vec::new(),
+        tags: Tags::All,
+    };
+    let shear = BodyForce {
+        acceleration: [2.0, 0.0, 0.0],
+        reversed_along: Some(1),
+        species: vec![1],
+        tags: Tags::All,
+    };
+    let start = || {
+        let mut start = simulation(BINARY, state.clone());
+        start.set_frozen(&ninth);
+        start.set_body_forces(&[all.clone(), shear.clone()]);
+        start
+    };
+    for integrator in steps() {
+        follows(start, 50, 0.005, integrator);
+    }
+}
+
+#[test]
+fn particles_between_walls_follow_the_cpu() {
+    let model = include_str!("../../../../models/standard-dpd.toml");
+    let mut state = state_of(model, "[5.0, 4.0, 7.0]", 3.0);
+    state.domain = PeriodicBox::orthogonal([0.0, -1.0, 2.0], [5.0, 4.0, 7.0], [false, true, false]).unwrap();
+    state.x.iter_mut().for_each(|x| *x = [x[0], x[1] - 1.0, x[2] + 2.0]);
+    for integrator in &steps()[..3] {
+        follows(|| simulation(model, state.clone()), 50, 0.01, *integrator);
+    }
+}
+
+/// Strong drag needs more iterations than are sent to the device at first.
+#[test]
+fn updates_go_on_until_they_are_accurate() {
+    let model = IDEAL.replace("gamma = 4.5", "gamma = 1000");
+    assert_ne!(model, IDEAL);
+    let state = state_of(&model, "[5.0, 5.0, 5.0]", 5.0);
+    let effort = follows(|| simulation(&model, state.clone()), 5, 0.02, TWO_STAGE).effort();
+    assert!(effort.updates == 5 && effort.inaccurate == 0 && effort.iterations > 40, "{effort:?}");
 }
 
 /// The rows of a run on the CPU, and of one that changes its device at steps of every kind, agree to single precision.
