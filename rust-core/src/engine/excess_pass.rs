@@ -174,14 +174,9 @@ impl ExcessPass {
                 if width < variables {
                     at.fill(0.0);
                 }
-                match width {
-                    2 => gather::<2>(lanes, rows, at),
-                    3 => gather::<3>(lanes, rows, at),
-                    4 => gather::<4>(lanes, rows, at),
-                    _ => gather_any(lanes, rows, at),
-                }
-                for &v in rows.columns {
+                for (column, &v) in rows.columns.iter().enumerate() {
                     let at = &mut at[v * n..][..n];
+                    lanes.each(|lane, row| at[lane] = rows.densities[row * width + column]);
                     if !polynomial(v).is_identity() {
                         polynomial(v).block(at, &mut correction[v * n..][..n]);
                     }
@@ -221,67 +216,11 @@ impl ExcessPass {
             lanes.each(|lane, row| rows.excess[row] = psi[lane]);
         }
         if !slopes_in_place {
-            let slopes = &slopes[..slope_width * n];
-            match slope_width {
-                2 => spread::<2>(lanes, slopes, rows.slopes),
-                3 => spread::<3>(lanes, slopes, rows.slopes),
-                4 => spread::<4>(lanes, slopes, rows.slopes),
-                _ => spread_any(lanes, slopes, rows.slopes, slope_width),
+            for (k, slopes) in slopes[..slope_width * n].chunks_exact(n).enumerate() {
+                lanes.each(|lane, row| rows.slopes[row * slope_width + k] = slopes[lane]);
             }
         }
         Ok(())
-    }
-}
-
-/// Copies rows of densities to the columns of `at`: a few columns, row by row.
-fn gather<const W: usize>(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
-    let n = lanes.count();
-    let mut columns: [&mut [f64]; W] = std::array::from_fn(|_| &mut [][..]);
-    let mut found = 0;
-    for (v, values) in at.chunks_exact_mut(n).enumerate() {
-        if let Some(column) = rows.columns.iter().position(|c| *c == v) {
-            columns[column] = values;
-            found += 1;
-        }
-    }
-    assert_eq!(found, W, "columns of variables that there are");
-    let densities = rows.densities.as_chunks::<W>().0;
-    lanes.each(|lane, row| {
-        let densities = &densities[row];
-        for c in 0..W {
-            // SAFETY: `gather` gives every column as many numbers as there are lanes.
-            unsafe { *columns[c].get_unchecked_mut(lane) = densities[c] };
-        }
-    });
-}
-
-/// Copies rows as `gather`, with any number of columns, column by column.
-fn gather_any(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
-    let (n, width) = (lanes.count(), rows.columns.len());
-    for (column, &v) in rows.columns.iter().enumerate() {
-        let at = &mut at[v * n..][..n];
-        lanes.each(|lane, row| at[lane] = rows.densities[row * width + column]);
-    }
-}
-
-/// Copies columns to rows: a few columns, row by row.
-fn spread<const W: usize>(lanes: Lanes, columns: &[f64], rows: &mut [f64]) {
-    let n = lanes.count();
-    let columns: [&[f64]; W] = std::array::from_fn(|c| &columns[c * n..][..n]);
-    let rows = rows.as_chunks_mut::<W>().0;
-    lanes.each(|lane, row| {
-        let row = &mut rows[row];
-        for c in 0..W {
-            // SAFETY: `spread` gives every column as many numbers as there are lanes.
-            row[c] = unsafe { *columns[c].get_unchecked(lane) };
-        }
-    });
-}
-
-/// Copies columns as `spread`, with any number of columns, column by column.
-fn spread_any(lanes: Lanes, columns: &[f64], rows: &mut [f64], width: usize) {
-    for (k, column) in columns.chunks_exact(lanes.count()).enumerate() {
-        lanes.each(|lane, row| rows[row * width + k] = column[lane]);
     }
 }
 
