@@ -5,7 +5,7 @@
 //! few: the terms vanish beyond their range.
 
 use super::buffers::SearchBuffers;
-use super::cell_ranges::SearchGroup;
+use super::cell_ranges::{HALF, SearchGroup};
 use super::clusters::{I_PER_MASK, MASKS_PER_CLUSTER, SLOT_BLOCK};
 use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
@@ -114,8 +114,11 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
                     let four = masks_each * block + k / I_PER_MASK;
                     let masks = masks.add(SLOT_BLOCK * four + k % I_PER_MASK);
                     let j_bases = j_bases.add(SLOT_BLOCK * block);
-                    pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
-                    if 2 * block + 1 < end_half {
+                    // Most particles at a rim have no ghost among the candidates of a half block.
+                    if COLUMNS == HALF || *masks != 0 {
+                        pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
+                    }
+                    if 2 * block + 1 < end_half && (COLUMNS == HALF || *masks.add(4) != 0) {
                         pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
                     }
                     block += 1;
