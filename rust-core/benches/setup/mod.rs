@@ -178,7 +178,6 @@ pub struct Rank {
     v: Vec<[f64; 3]>,
     tag: Vec<i32>,
     kind: Vec<i32>,
-    slopes: Vec<f64>,
 }
 
 #[allow(dead_code)] // Some targets that include this module do not use it.
@@ -191,7 +190,7 @@ impl Rank {
         let is_open = [faces > 4, faces > 2, faces > 0];
         let (around, along) = (part(is_open.map(|open| !open)), part(is_open));
         let (tag, kind, images) = (cloud.tag.clone(), cloud.kind.clone(), Images::default());
-        Rank { cloud, around, along, images, x: vec![], v: vec![], tag, kind, slopes: vec![] }
+        Rank { cloud, around, along, images, x: vec![], v: vec![], tag, kind }
     }
 
     /// Finds the images within the cut-off and the skin of the box.
@@ -224,10 +223,9 @@ impl Rank {
         sweep.first(around, &particles, v, step, Want::FORCES, force).expect("densities");
         between();
         let width = sweep.slope_width();
-        self.slopes.clear();
-        self.slopes.extend_from_slice(&sweep.slopes()[..width * owned]);
-        self.images.forward(width, &mut self.slopes);
-        sweep.slopes_mut().copy_from_slice(&self.slopes);
+        let slopes = sweep.slopes_mut();
+        slopes.truncate(width * owned);
+        self.images.forward(width, slopes);
         between();
         sweep.second(&particles, &mut self.cloud.force).expect("forces");
     }

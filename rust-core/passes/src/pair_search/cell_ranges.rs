@@ -79,8 +79,10 @@ impl<const COLUMNS: usize> StencilColumns<COLUMNS> {
             stencil.present[w] = 1.0;
             stencil.wraps |= (wrap | turn) != 0;
             stencil.start[w] = cells.start[first_cell(above as usize, to as usize)..].as_ptr();
-            for period in 0..3 {
-                stencil.shift[period][w] = search.shift(wrap, period, turn);
+            if geometry.periodic[0] || (wrap | turn) != 0 {
+                for period in 0..3 {
+                    stencil.shift[period][w] = search.shift(wrap, period, turn);
+                }
             }
         }
         stencil

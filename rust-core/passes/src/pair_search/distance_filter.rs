@@ -5,11 +5,11 @@
 //! few: the terms vanish beyond their range.
 
 use super::buffers::SearchBuffers;
-use super::cell_ranges::SearchGroup;
+use super::cell_ranges::{HALF, SearchGroup};
 use super::clusters::{I_PER_MASK, MASKS_PER_CLUSTER, SLOT_BLOCK};
 use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
-use crate::simd::{BroadcastPair, Isa, OFFSET_BITS};
+use crate::simd::{BroadcastPair, Isa, OFFSET_BITS, Reals};
 
 /// Lists the pairs of a search group, one i-particle after the other; a batch has
 /// `batch_size` i-particles, a power of two.
@@ -91,6 +91,9 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
             *j_bases.add(slot) = cluster.first << OFFSET_BITS;
             c += 1;
         }
+        // At a rim many half blocks have no ghost within reach. Wide vectors expand a mask faster than they would
+        // recover from a wrong guess of a branch.
+        let expands_all = COLUMNS == HALF || I::F32::LANES > 8;
         let (out, i_in_batch) = (buffers.j_offsets.as_mut_ptr(), buffers.i_in_batch.as_mut_ptr());
         let mut pairs = 0;
         let mut member = 0;
@@ -114,8 +117,10 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
                     let four = masks_each * block + k / I_PER_MASK;
                     let masks = masks.add(SLOT_BLOCK * four + k % I_PER_MASK);
                     let j_bases = j_bases.add(SLOT_BLOCK * block);
-                    pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
-                    if 2 * block + 1 < end_half {
+                    if expands_all || *masks != 0 {
+                        pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
+                    }
+                    if 2 * block + 1 < end_half && (expands_all || *masks.add(4) != 0) {
                         pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
                     }
                     block += 1;

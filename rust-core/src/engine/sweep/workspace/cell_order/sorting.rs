@@ -82,6 +82,14 @@ impl Sorting<'_> {
             unsafe { self.counts.slice_mut(self.cells * t + cells.start..self.cells * t + cells.end) }
         };
         let ends = &mut *part.ends;
+        if self.threads == 1 {
+            let mut next = 0;
+            for (end, count) in ends.iter_mut().zip(of_thread(0)) {
+                next += std::mem::replace(count, next);
+                *end = next;
+            }
+            return;
+        }
         ends.copy_from_slice(of_thread(0));
         for t in 1..self.threads {
             ends.iter_mut().zip(of_thread(t)).for_each(|(end, count)| *end += *count);
