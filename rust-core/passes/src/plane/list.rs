@@ -22,7 +22,7 @@ pub struct Pair {
     /// Vector `ê √(½ Δt γ) w_R` from the second particle to the first.
     pub g: [f32; 3],
     /// Index of the second particle, counted from the first particle of the first particle's plane, through the next plane;
-    /// in a list of [`Listed::with_ghosts`] counted from the first of all.
+    /// of a ghost counted from the first of all.
     pub j: u32,
 }
 
@@ -40,7 +40,7 @@ pub struct PairList {
     /// The first of these particles.
     pub first: usize,
     /// The particle that indices of second particles count from.
-    j_from: usize,
+    pub j_from: usize,
     /// Index of each particle's first pair; the last entry is one past the last pair.
     pub start: Vec<u32>,
     pub pairs: Vec<Pair>,
@@ -50,14 +50,17 @@ pub struct PairList {
     pub exact: Vec<ExactPair>,
     /// Ratio `r/|g|` of each pair; empty unless requested.
     pub stretch: Vec<f64>,
+    /// Noise of each pair; of another list until it is drawn.
+    pub xi: Vec<f32>,
     scratch: Scratch,
 }
 
 /// The listed pairs of owned particles of a plane, or of a part of it.
 #[derive(Debug, Clone, Default)]
 pub struct Listed {
+    /// The pairs of these particles with each other and with owned particles of the next plane.
     pub own: PairList,
-    /// The pairs of these particles with ghosts, without entries for the last particles.
+    /// The pairs of these particles with ghosts of any plane, without entries for the last particles.
     pub with_ghosts: PairList,
 }
 
@@ -66,6 +69,12 @@ impl Listed {
     pub fn clear(&mut self, first: usize, plane_first: usize) {
         self.own.clear(first, plane_first);
         self.with_ghosts.clear(first, 0);
+    }
+
+    /// Appends lists whose particles follow.
+    pub fn append(&mut self, next: &Listed) {
+        self.own.append(&next.own);
+        self.with_ghosts.append(&next.with_ghosts);
     }
 
     /// The list for a batch.
@@ -105,27 +114,13 @@ impl PairList {
     }
 
     /// Appends a list whose particles follow.
-    pub fn append(&mut self, next: &PairList) {
+    fn append(&mut self, next: &PairList) {
+        self.begin_at(next.first);
         let count = self.pairs.len() as u32;
         self.start.extend(next.start.iter().skip(1).map(|start| count + start));
         self.pairs.extend_from_slice(&next.pairs);
         self.tags.iter_mut().zip(&next.tags).for_each(|(tags, next)| tags.extend_from_slice(next));
         self.stretch.extend_from_slice(&next.stretch);
-    }
-
-    /// Gives the next particle the pairs that have been added since the last one.
-    pub fn end_particle(&mut self) {
-        self.start.push(self.pairs.len() as u32);
-    }
-
-    /// Adds pair `k` of another list, with the index `j` of its second particle; with `swap` its particles change places.
-    pub fn add(&mut self, other: &PairList, k: usize, j: u32, swap: bool) {
-        let sign = if swap { -1.0 } else { 1.0 };
-        self.pairs.push(Pair { g: other.pairs[k].g.map(|g| sign * g), j });
-        let [a, b] = [0, 1].map(|side| other.tags[side ^ usize::from(swap)][k]);
-        self.tags[0].push(a);
-        self.tags[1].push(b);
-        self.stretch.extend(other.stretch.get(k));
     }
 
     /// Gives no pairs to the particles before `place` that are not listed yet.

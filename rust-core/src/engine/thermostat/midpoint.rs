@@ -75,7 +75,7 @@ impl PairThermostat {
         let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
             .zip(planes.iter())
             .map(|((image, below), plane)| {
-                let own = plane.found.own.clone();
+                let own = plane.own.clone();
                 let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
                 let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
                 (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
@@ -192,6 +192,6 @@ impl PairThermostat {
         let noise = if noise { kt.sqrt() } else { 0.0 };
         sums.gather(pool, lists.order(), v);
         sums.close(planes);
-        virial(pool, planes, sums, lists.ghosts(), noise, 2.0 / *dt)
+        virial(pool, planes, sums, noise, 2.0 / *dt)
     }
 }

@@ -20,6 +20,7 @@
 
 mod bodies;
 mod effort;
+mod exchange;
 mod forces;
 mod listed;
 mod measure;
@@ -27,12 +28,11 @@ mod midpoint;
 mod of_forces;
 mod particle_loops;
 mod pass;
-mod planes;
 mod progress;
 mod pulls;
 mod rank;
-mod round;
 mod sequential;
+mod weights;
 
 #[cfg(test)]
 mod tests;
@@ -46,16 +46,15 @@ use super::error::EngineError;
 use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
-use super::sweep::{MARGIN, PairLists, Places, Pool};
+use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
+use exchange::Exchange;
 use listed::Listed;
 use pass::{Sums, Wide};
-use planes::Plane;
 use progress::Progress;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
-use round::Round;
 
 /// The rule that changes velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,10 +83,9 @@ pub struct PairThermostat {
     dt: f64,
     set: InstructionSet,
     lists: PairLists,
-    planes: Vec<Plane>,
+    planes: Vec<PlanePairs>,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
-    places: Places,
     /// Mass of each sorted particle, 0 where it is infinite, and its inverse.
     inertia: Vec<f64>,
     inverse_mass: Vec<f64>,
@@ -105,10 +103,7 @@ pub struct PairThermostat {
     listed: Option<Listed>,
     /// Whether the present pairs are those.
     are_listed: bool,
-    /// State of a solution in rounds with other ranks.
-    round: Round,
-    /// Squared norm of the first residual of this rank.
-    first: f64,
+    exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
 }
@@ -133,7 +128,6 @@ impl PairThermostat {
             lists: PairLists::new(set, plan.dimensions()),
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
-            places: Places::default(),
             inertia: Vec::new(),
             inverse_mass: Vec::new(),
             sums: Sums::default(),
@@ -145,8 +139,7 @@ impl PairThermostat {
             wants_virial: false,
             listed: None,
             are_listed: false,
-            round: Round::default(),
-            first: 0.0,
+            exchange: Exchange::default(),
             noise: [PairNoise::default(); 2],
         })
     }
@@ -184,7 +177,7 @@ impl PairThermostat {
         virial: bool,
         mass: impl Fn(usize) -> f64 + Sync,
     ) -> Result<(), EngineError> {
-        (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
+        (self.dt, self.wants_virial, self.exchange) = (dt, virial, Exchange::default());
         let listed = Listed { dt, virial, particles: particles.x.len() };
         self.are_listed = self.listed.take().is_some_and(|there| there.serves(listed));
         if !self.are_listed {
@@ -192,10 +185,8 @@ impl PairThermostat {
             let range = [self.plan.longest, self.margin()];
             let PairThermostat { lists, planes, .. } = self;
             lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
-            if self.is_exact {
-                self.measure(pool, around.domain, particles, species_of_kind);
-            }
         }
+        self.measure(pool, around.domain, particles, species_of_kind);
         let order = self.lists.order();
         pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
         pass::fill(pool, &mut self.inertia, order, |k| {
@@ -213,14 +204,17 @@ impl PairThermostat {
     /// The pairs for a time `dt`, with or without their distances.
     fn terms(&self, dt: f64, virial: bool) -> ListTerms {
         let with_stretch = virial && !self.is_exact;
-        ListTerms { tables: planes::weights(&self.plan, dt, self.margin()), with_stretch }
+        ListTerms { tables: weights::weights(&self.plan, dt, self.margin()), with_stretch }
     }
 
     /// Draws the noise of the pairs of the last search.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
-        pool.each(&mut self.planes, |plane| plane.draw(noise[0], law));
+        pool.each(&mut self.planes, |plane| {
+            plane.lists.own.draw(noise[0], law);
+            plane.lists.with_ghosts.draw(noise[0], law);
+        });
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
@@ -244,7 +238,7 @@ impl PairThermostat {
         for plane in &self.planes {
             for [i, j, k] in plane.pairs() {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
-                let g = plane.found.list.g(k);
+                let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
                 let inverse = self.inverse_mass[i] + self.inverse_mass[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
@@ -272,7 +266,10 @@ impl PairThermostat {
 
     /// Number of pairs in range.
     pub fn pairs(&self) -> usize {
-        self.planes.iter().map(|plane| plane.found.list.pairs.len()).sum()
+        self.planes
+            .iter()
+            .map(|plane| plane.lists.own.pairs.len() + plane.lists.with_ghosts.pairs.len())
+            .sum()
     }
 }
 

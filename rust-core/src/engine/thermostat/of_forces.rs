@@ -19,7 +19,7 @@ impl PairThermostat {
         sweep.ask_for_pairs(Some(terms));
         // The memory of lists goes to and fro, so that there is one list of all pairs, not two.
         if self.are_listed {
-            sweep.lend_lists(self.planes.iter_mut().map(|plane| std::mem::take(&mut plane.found.list)));
+            sweep.lend_lists(&mut self.planes);
         }
     }
 
