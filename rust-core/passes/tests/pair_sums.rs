@@ -35,7 +35,7 @@ fn vectors() -> Vec<Wide> {
 
 /// Converts the pairs to double precision.
 fn exact(mut list: PairList) -> PairList {
-    let more = |pair: &Pair| ExactPair { g: pair.g.map(|g| f64::from(g) * 1.1), j: pair.j.into() };
+    let more = |pair: &Pair| ExactPair::new(pair.g.map(|g| f64::from(g) * 1.1), pair.j);
     list.exact = list.pairs.iter().map(more).collect();
     list
 }

@@ -53,7 +53,7 @@ pub unsafe fn add_pairs(
         true => add::<_, true>(set, own, &own.pairs, noise, [p, p], sums),
         false => add::<_, true>(set, own, &own.exact, noise, [p, p], sums),
     }
-    if !with_ghosts.pairs.is_empty() {
+    if with_ghosts.start.last().is_some_and(|end| *end > 0) {
         add::<_, false>(set, with_ghosts, &with_ghosts.exact, noise, [p, all], sums);
     }
 }
@@ -105,7 +105,7 @@ impl Entry for Pair {
 impl Entry for ExactPair {
     #[inline(always)]
     fn j(&self) -> usize {
-        self.j as usize
+        ExactPair::j(self) as usize
     }
 
     #[inline(always)]

@@ -35,21 +35,21 @@ impl SweepPairs {
     /// Creates the search for pairs in the range of the conservative interactions.
     pub fn new(fluid: &Fluid) -> SweepPairs {
         let (range, species) = (fluid.conservative_range(), fluid.species.len());
-        let inverse_range = 1.0 / (range * (1.0 + MARGIN));
         SweepPairs {
             lists: PairLists::new(InstructionSet::best(), fluid.dimensions),
             pool: Pool::new(NonZeroUsize::MIN),
             dimensions: fluid.dimensions,
             range,
-            terms: ListTerms {
-                tables: WeightTables {
+            terms: ListTerms::new(
+                WeightTables {
                     species,
                     amplitude: SpeciesPairTable::of(species * species, 1.0),
-                    inverse_range: SpeciesPairTable::of(species * species, inverse_range as f32),
+                    inverse_range: SpeciesPairTable::of(species * species, 1.0 / range),
                     exponent: Exponent::One,
                 },
-                with_stretch: false,
-            },
+                MARGIN,
+                false,
+            ),
             kinds: (0..species as i32).collect(),
             tags: Vec::new(),
             planes: Vec::new(),

@@ -286,9 +286,7 @@ impl Sweep {
         let input =
             Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
                 .excluding(&self.exclusions);
-        let can_list = self.settings.precision == Precision::Mixed
-            && input.thermostat.is_none()
-            && self.exclusions.is_empty();
+        let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
         let listed = self.asked.take().filter(|_| can_list);
         self.has_listed = false;
         let set = self.set;
@@ -307,7 +305,7 @@ impl Sweep {
     }
 
     /// Asks the next evaluation to list pairs for a thermostat, with the geometry that it computes anyway. It lists them
-    /// in mixed precision, without excluded pairs, and if drag and noise are not among the forces.
+    /// without excluded pairs, and if drag and noise are not among the forces.
     pub(super) fn ask_for_pairs(&mut self, terms: Option<ListTerms>) {
         (self.asked, self.has_listed) = (terms, false);
     }

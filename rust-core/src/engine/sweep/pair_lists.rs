@@ -102,7 +102,7 @@ impl PairLists {
         }
         self.cells.sort(pool, set, geometry, grid, &input)?;
         self.sort_by_tags(pool, particles.tag);
-        self.fill(pool, &input, terms.tables.species > 1);
+        self.fill(pool, &input, terms.species() > 1);
         planes.resize_with(grid.planes, PlanePairs::default);
         self.buffers.resize_with(pool.threads(), ListBuffers::default);
         let cells = &self.cells;

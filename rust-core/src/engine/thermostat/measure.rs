@@ -137,7 +137,7 @@ fn measure(
             pairs[kept] = pair;
             tags.iter_mut().for_each(|tags| tags[kept] = tags[k]);
             kept += 1;
-            exact.push(ExactPair { g: [factor * x[n], factor * y[n], factor * z[n]], j: pair.j.into() });
+            exact.push(ExactPair::new([factor * x[n], factor * y[n], factor * z[n]], pair.j));
             if with_stretch {
                 stretch.push(factor.recip());
             }

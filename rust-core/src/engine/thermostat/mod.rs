@@ -203,8 +203,7 @@ impl PairThermostat {
 
     /// The pairs for a time `dt`, with or without their distances.
     fn terms(&self, dt: f64, virial: bool) -> ListTerms {
-        let with_stretch = virial && !self.is_exact;
-        ListTerms { tables: weights::weights(&self.plan, dt, self.margin()), with_stretch }
+        ListTerms::new(weights::weights(&self.plan, dt), self.margin(), virial)
     }
 
     /// Draws the noise of the pairs of the last search.
@@ -266,10 +265,7 @@ impl PairThermostat {
 
     /// Number of pairs in range.
     pub fn pairs(&self) -> usize {
-        self.planes
-            .iter()
-            .map(|plane| plane.lists.own.pairs.len() + plane.lists.with_ghosts.pairs.len())
-            .sum()
+        self.planes.iter().map(|plane| plane.lists.own.count() + plane.lists.with_ghosts.count()).sum()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The pairs that an evaluation of forces lists on its way, where the thermostat acts at the same positions.
 //!
 //! A host asks for them before the evaluation, and gives them to the thermostat before its search, which then takes
-//! them instead. It may do so always: the search finds the pairs itself if the evaluation was no sweep, in double precision,
+//! them instead. It may do so always: the search finds the pairs itself if the evaluation was no sweep,
 //! with drag and noise among the forces or with excluded pairs, or if it was asked for another time. Listed particles of a cell
 //! are in the order of the host's arrays, instead of that of their tags.
 

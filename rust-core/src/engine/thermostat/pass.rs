@@ -92,13 +92,13 @@ fn below(planes: &[PlanePairs], number: usize) -> Option<(usize, usize)> {
 fn virial_of_plane(PlanePairs { own, lists, .. }: &PlanePairs, p: &[Wide], noise: f64) -> [f64; 6] {
     let mut virial = [0.0; 6];
     for (list, share) in [(&lists.own, 1.0), (&lists.with_ghosts, 0.5)] {
-        let PairList { start, pairs, stretch, xi, j_from, .. } = list;
+        let PairList { start, stretch, xi, j_from, .. } = list;
         if stretch.is_empty() {
             continue;
         }
         for (i, of_i) in pairs_of_each(start) {
             for k in of_i {
-                let (g, a, b) = (list.g(k), p[own.start + i], p[j_from + pairs[k].j as usize]);
+                let (g, a, b) = (list.g(k), p[own.start + i], p[j_from + list.second(k)]);
                 let along: f64 = (0..3).map(|c| (a[c] - b[c]) * g[c]).sum();
                 let xi = xi.get(k).map_or(0.0, |xi| f64::from(*xi));
                 add_virial(&mut virial, g, (noise * xi - along) * share * stretch[k]);

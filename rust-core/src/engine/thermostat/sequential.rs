@@ -179,7 +179,7 @@ impl Share<'_> {
     #[inline(always)]
     fn encounter(&mut self, i: usize, k: usize, kt: f64, rule: &impl Fn(&Encounter) -> f64) {
         let list = &self.plane.lists.own;
-        let (j, g) = (list.pairs[k].j as usize, list.g(k));
+        let (j, g) = (list.second(k), list.g(k));
         let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
         let (other, inverse) = match j < own {
             true => (self.own[j], self.of_own[j]),

@@ -27,8 +27,7 @@ impl PlanePairs {
     pub fn pairs(&self) -> impl Iterator<Item = [usize; 3]> {
         let PlanePairs { own, next, lists } = self;
         let second = |j: usize| j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
-        pairs_of_each(&lists.own.start).flat_map(move |(i, of_i)| {
-            of_i.map(move |k| [own.start + i, second(lists.own.pairs[k].j as usize), k])
-        })
+        pairs_of_each(&lists.own.start)
+            .flat_map(move |(i, of_i)| of_i.map(move |k| [own.start + i, second(lists.own.second(k)), k]))
     }
 }
