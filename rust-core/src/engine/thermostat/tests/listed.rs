@@ -35,7 +35,7 @@ fn act_again(
     thermostat.ask(engine, DT, true);
     compute_forces(engine, cloud);
     thermostat.take(engine);
-    let listed = thermostat.listed.is_some();
+    let listed = thermostat.from_forces.listed.is_some();
     thermostat.find_pairs(&pool, &cloud.bodies(), DT, true).unwrap();
     thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
     let mut v = cloud.v.clone();
@@ -102,17 +102,17 @@ fn only_the_pairs_that_were_asked_for_are_taken() {
     let mut thermostat = thermostat(ONE, 1.0, Precision::Mixed);
     compute_forces(&mut engine, &cloud);
     thermostat.take(&mut engine);
-    assert!(thermostat.listed.is_none(), "nobody asked");
+    assert!(thermostat.from_forces.listed.is_none(), "nobody asked");
     thermostat.ask(&mut engine, DT, false);
     compute_forces(&mut engine, &cloud);
     compute_forces(&mut engine, &cloud);
     thermostat.take(&mut engine);
-    assert!(thermostat.listed.is_none(), "another evaluation has followed");
+    assert!(thermostat.from_forces.listed.is_none(), "another evaluation has followed");
     for (dt, virial) in [(2.0 * DT, false), (DT, true)] {
         thermostat.ask(&mut engine, DT, false);
         compute_forces(&mut engine, &cloud);
         thermostat.take(&mut engine);
-        let found = thermostat.listed.unwrap();
+        let found = thermostat.from_forces.listed.unwrap();
         assert!(found.serves(Listed { dt: DT, virial: false, particles: cloud.x.len() }));
         assert!(!found.serves(Listed { dt, virial, particles: cloud.x.len() }));
     }
