@@ -72,17 +72,18 @@ fn listed_pairs_are_those_of_the_search() {
 /// or fewer, of other threads, of a search.
 #[test]
 fn lists_that_are_used_again_are_as_new() {
-    for threads in [1, 5] {
-        let mut thermostat = thermostat(ONE, 1.0, Precision::Mixed);
+    for (threads, precision) in [(1, Precision::Mixed), (5, Precision::Mixed), (2, Precision::Double)] {
+        let mut thermostat = thermostat(ONE, 1.0, precision);
         let clouds = [[3.0, 4.1, 5.3], [3.0, 3.0, 3.0], [5.0, 4.0, 9.0]]
-            .map(|edges| Cloud::new(1, nalgebra::Matrix3::from_diagonal(&edges.into()), [true; 3], 6.0));
+            .map(|edges| Cloud::new(1, nalgebra::Matrix3::from_diagonal(&edges.into()), [true; 3], 6.0))
+            .map(|cloud| Cloud { precision, ..cloud });
         for number in [0, 0, 1, 2, 2, 0, 1] {
             let cloud = &clouds[number];
-            let mut engine = engine(ONE, Precision::Mixed, threads);
+            let mut engine = engine(ONE, precision, threads);
             assert!(act_again(&mut thermostat, cloud, &mut engine) == act_on_listed(ONE, cloud, &mut engine));
         }
         // One engine, and a search in between.
-        let mut engine = engine(ONE, Precision::Mixed, threads);
+        let mut engine = engine(ONE, precision, threads);
         for number in [2, 2, 1, 0, 2] {
             let expected = act_on_listed(ONE, &clouds[number], &mut engine);
             assert!(act_again(&mut thermostat, &clouds[number], &mut engine) == expected);
