@@ -9,7 +9,8 @@
 //! With a number of sides as fifth word the particles are those of a rank that has ghosts on 2 (along z), 4
 //! or 6 sides; the sixth word is the number of particles, 2000 unless given; the seventh that of threads. With the
 //! fifth word `thermostat` drag and noise act apart from the forces instead, for the time of six steps, by the
-//! midpoint rule; with `listed` they act after an evaluation of forces at the same positions, which lists their pairs.
+//! midpoint rule; with `listed` they act after an evaluation of forces at the same positions, which lists their pairs, and with
+//! `ranked` after the first half of an evaluation on a rank that has ghosts on two sides.
 //!
 //! The difference between runs of different length is the cost of the additional evaluations. The
 //! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
@@ -18,8 +19,11 @@
 mod setup;
 
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update};
-use psidpd_core::engine::{Engine, Particles, Pool, Request, Settings, Sweep, Want};
+use psidpd_core::engine::thermostat::{self, Bodies, Need, PairThermostat, Stream, Update};
+use psidpd_core::engine::{
+    Around, Engine, Newton, Particles, Pool, Request, Settings, Surroundings, Sweep, Want,
+};
+use psidpd_core::model::Fluid;
 use setup::{Cloud, Rank, choose, faces};
 use std::num::NonZeroUsize;
 use std::process::ExitCode;
@@ -32,7 +36,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat|listed [PARTICLES [THREADS]]]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat|listed|ranked [PARTICLES [THREADS]]]"
             );
             ExitCode::FAILURE
         }
@@ -51,6 +55,9 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let threads = threads.map_err(|_| "THREADS is a number above 0")?;
     let settings = Settings { precision, instructions, threads };
     let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;
+    if rest.first().is_some_and(|word| word == "ranked") {
+        return on_rank(Rank::new(subject, &fluid, count, 2), &fluid, settings, evaluations);
+    }
     let apart = rest.first().filter(|word| ["thermostat", "listed"].contains(&word.as_str()));
     if let Some(word) = apart {
         let mut engine = Engine::new(&fluid, settings).map_err(|e| e.to_string())?;
@@ -96,5 +103,47 @@ fn run(arguments: &[String]) -> Result<(), String> {
         }
     };
     println!("{count} {}", force.iter().map(|f| f[0].abs()).sum::<f64>());
+    Ok(())
+}
+
+/// Lets drag and noise act on a rank whose ghosts are images of its own particles.
+fn on_rank(mut rank: Rank, fluid: &Fluid, settings: Settings, evaluations: u32) -> Result<(), String> {
+    let mut engine = Engine::new(fluid, settings).map_err(|e| e.to_string())?;
+    let mut thermostat =
+        PairThermostat::new(engine.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
+    rank.find_ghosts(engine.plan().cutoff());
+    let (pool, dt, owned) = (engine.pool().clone(), 6.0 * rank.cloud.dt(), rank.cloud.x.len());
+    let (mass, kinds): (_, Vec<i32>) = (vec![1.0; owned], (0..fluid.species.len() as i32).collect());
+    for number in 0..evaluations {
+        rank.drift();
+        thermostat.ask(&mut engine, dt, false);
+        let particles = Particles { owned, x: &rank.x, tag: &rank.tag, kind: &rank.kind };
+        let around = Around { domain: &rank.around, images: &[] };
+        let request = Request { particles, v: &[], step: None, want: Want::FORCES };
+        let surroundings = Surroundings::Ghosts(around, Newton::Off);
+        drop(engine.first(surroundings, &request, &mut rank.cloud.force).map_err(|e| e.to_string())?);
+        thermostat.take(&mut engine);
+        let of_rank = thermostat::Rank { around, particles, species_of_kind: &kinds, mass: &mass };
+        thermostat.find_pairs_of_rank(&pool, &of_rank, dt, false).map_err(|e| e.to_string())?;
+        thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);
+        let mut vectors = rank.v.clone();
+        let mut need = thermostat.begin_midpoint(&pool, &mut vectors).map_err(|e| e.to_string())?;
+        while need != Need::Nothing([0.0; 6]) {
+            let totals = match need {
+                Need::Totals(of_this_rank) => of_this_rank,
+                _ => {
+                    vectors.truncate(owned);
+                    rank.images.forward(1, &mut vectors);
+                    [0.0; 3]
+                }
+            };
+            need = thermostat
+                .go_on(&pool, totals, &mut vectors, &mut rank.v[..owned])
+                .map_err(|e| e.to_string())?;
+        }
+        rank.v.truncate(owned);
+        rank.images.forward(1, &mut rank.v);
+    }
+    println!("{owned} {}", rank.v.iter().map(|v| v[0].abs()).sum::<f64>());
     Ok(())
 }

@@ -28,7 +28,8 @@ fn baseline() -> PathBuf {
 fn count(program: &Path, case: &[&str], evaluations: u32) -> (f64, f64) {
     let mut run = Command::new("valgrind");
     run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program);
-    // The arguments are fluid, precision and instruction set; after the number, the sides with ghosts, `thermostat` or `listed`.
+    // The arguments are fluid, precision and instruction set; after the number, the sides with ghosts, `thermostat`,
+    // `listed` or `ranked`.
     run.args(&case[..3]).arg(evaluations.to_string()).args(&case[3..]);
     let output = run.output().unwrap_or_else(|e| {
         panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
@@ -63,9 +64,10 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
         for precision in ["mixed", "double"] {
             for instructions in ["portable", "avx2"] {
                 // The additional cost of ghosts hardly depends on the instruction set. The thermostat apart from the
-                // forces is counted on its own, and together with the forces at the same positions, without drag and noise.
+                // forces is counted on its own, and together with the forces at the same positions, without drag and noise: also
+                // on a rank with ghosts.
                 let more = match instructions {
-                    "avx2" => &[None, Some("6"), Some("thermostat"), Some("listed")][..],
+                    "avx2" => &[None, Some("6"), Some("thermostat"), Some("listed"), Some("ranked")][..],
                     _ => &[None],
                 };
                 for more in more {

@@ -171,13 +171,14 @@ const SKIN: f64 = 0.3;
 pub struct Rank {
     /// The box and the owned particles.
     pub cloud: Cloud,
-    around: PeriodicBox,
+    pub around: PeriodicBox,
     along: PeriodicBox,
-    images: Images,
-    x: Vec<[f64; 3]>,
-    v: Vec<[f64; 3]>,
-    tag: Vec<i32>,
-    kind: Vec<i32>,
+    pub images: Images,
+    /// Owned particles, followed by ghosts.
+    pub x: Vec<[f64; 3]>,
+    pub v: Vec<[f64; 3]>,
+    pub tag: Vec<i32>,
+    pub kind: Vec<i32>,
 }
 
 #[allow(dead_code)] // Some targets that include this module do not use it.

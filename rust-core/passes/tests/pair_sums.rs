@@ -2,74 +2,84 @@
 
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::threefry2x32;
-use psidpd_passes::plane::list::{ExactPair, Pair, PairList};
+use psidpd_passes::plane::list::{ExactPair, Listed, Pair, PairList};
 use psidpd_passes::plane::pair_sums::{Wide, add_pairs};
 use psidpd_passes::settings::Instructions;
 
 const OWN: usize = 40;
 const ALL: usize = 70;
+/// Number of particles before those of the plane.
+const FIRST: usize = 9;
 
 fn uniform(k: usize) -> f64 {
     f64::from(threefry2x32::<20>([k as u32, 0], [7, 7])[0]) / 4_294_967_296.0 - 0.5
 }
 
-fn list() -> PairList {
+fn list(own: usize) -> PairList {
     let mut list = PairList::default();
     list.start = vec![0];
-    for i in 0..OWN {
+    for i in 0..own {
         for j in (i + 1..ALL).filter(|j| (i * 7 + j * 3) % 5 == 0) {
             let g = std::array::from_fn(|c| uniform(1000 + 3 * (i * ALL + j) + c) as f32);
             list.pairs.push(Pair { g, j: j as u32 });
         }
         list.start.push(list.pairs.len() as u32);
     }
+    list.xi = (0..list.pairs.len()).map(|k| uniform(90_000 + k) as f32).collect();
     list
 }
 
 fn vectors() -> Vec<Wide> {
-    (0..ALL).map(|k| Wide([uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2), 0.0])).collect()
+    (0..FIRST + ALL).map(|k| Wide([uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2), 0.0])).collect()
 }
 
 /// Converts the pairs to double precision.
 fn exact(mut list: PairList) -> PairList {
-    let more = |pair: &Pair| ExactPair { g: pair.g.map(|g| f64::from(g) * 1.1), j: pair.j.into() };
+    let more = |pair: &Pair| ExactPair::new(pair.g.map(|g| f64::from(g) * 1.1), pair.j);
     list.exact = list.pairs.iter().map(more).collect();
     list
 }
 
 #[test]
 fn sums_are_those_of_a_plain_loop() {
-    are_plain(&list());
-    are_plain(&exact(list()));
+    are_plain(Listed { own: list(OWN), ..Listed::default() });
+    are_plain(Listed { own: exact(list(OWN)), ..Listed::default() });
+    // The last particles have no pairs with ghosts.
+    are_plain(Listed { own: list(OWN), with_ghosts: exact(list(OWN - 3)) });
 }
 
 /// Portable sums have the bits of the loop. Instructions that round a product and a sum once differ from it by rounding,
 /// and not from each other.
-fn are_plain(list: &PairList) {
-    let p = vectors();
-    let xi: Vec<f32> = (0..list.pairs.len()).map(|k| uniform(90_000 + k) as f32).collect();
+fn are_plain(lists: Listed) {
+    let all = vectors();
+    let p = &all[FIRST..];
     for noise in [0.0, 1.3] {
         let mut plain = vec![[0.0; 3]; ALL];
-        for (i, ends) in list.start.windows(2).enumerate() {
-            let mut sum = plain[i];
-            for k in ends[0] as usize..ends[1] as usize {
-                let (g, j) = (list.g(k), list.pairs[k].j as usize);
-                let t: [f64; 3] = std::array::from_fn(|c| (p[i][c] - p[j][c]) * g[c]);
-                let along = (t[0] + t[1]) + t[2];
-                let along = if noise == 0.0 { along } else { f64::from(xi[k]) * -noise + along };
-                for c in 0..3 {
-                    sum[c] += along * g[c];
-                    plain[j][c] -= along * g[c];
+        for (list, second) in [(&lists.own, p), (&lists.with_ghosts, &all[..])] {
+            let both = std::ptr::eq(list, &lists.own);
+            for (i, ends) in list.start.windows(2).enumerate() {
+                let mut sum = plain[i];
+                for k in ends[0] as usize..ends[1] as usize {
+                    let (g, j) = (list.g(k), list.pairs[k].j as usize);
+                    let t: [f64; 3] = std::array::from_fn(|c| (p[i][c] - second[j][c]) * g[c]);
+                    let along = (t[0] + t[1]) + t[2];
+                    let along = if noise == 0.0 { along } else { f64::from(list.xi[k]) * -noise + along };
+                    for c in 0..3 {
+                        sum[c] += along * g[c];
+                        if both {
+                            plain[j][c] -= along * g[c];
+                        }
+                    }
                 }
+                plain[i] = sum;
             }
-            plain[i] = sum;
         }
         let mut fused: Option<Vec<Wide>> = None;
         for (name, instructions) in Instructions::ALL {
             let Some(set) = InstructionSet::new(instructions) else { continue };
             let mut sums = vec![Wide([0.1; 4]); ALL];
             // SAFETY: both arrays have entries for the particles of the list.
-            unsafe { add_pairs(set, list, &xi, noise, &p, &mut sums) };
+            unsafe { add_pairs(set, &lists, noise, &all, FIRST, &mut sums) };
             for (found, plain) in sums.iter().zip(&plain) {
                 let apart = (0..3).map(|c| (found[c] - plain[c]).abs()).fold(0.0, f64::max);
                 assert!(apart < 1e-13, "{name}: {found:?} {plain:?}");

@@ -5,11 +5,11 @@ use super::buffers::PairBuffers;
 use super::data::PassData;
 use super::list::{ListTerms, Listed, PairList, PairsAt, VectorsOfPairs, append_batch};
 use super::traversal::{BatchVisitor, each_batch};
-use crate::ground::arithmetic::{Arithmetic, PairVector};
+use crate::ground::arithmetic::{Arithmetic, Double, Mixed, PairVector};
 use crate::instruction_set::InstructionSet;
 use crate::pair_batch::accumulators::PlaneSums;
 use crate::pair_batch::batch::Batch;
-use crate::pair_batch::buffers::{BatchBuffers, CacheLines};
+use crate::pair_batch::buffers::BatchBuffers;
 use crate::pair_batch::evaluate::evaluate;
 use crate::pair_batch::in_range_pairs::InRangePairs;
 use crate::pair_batch::inputs::PairInputs;
@@ -89,20 +89,20 @@ struct FirstPass<'a, I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
     tally: Tally,
 }
 
-/// The pairs of a batch in mixed precision, as the pass has computed them.
+/// The pairs of a batch, as the pass has computed them.
 struct Computed {
     /// [`PairVector`]s of the instruction set.
-    pairs: *const CacheLines<f32>,
+    pairs: *const u8,
     tags: [*const u32; 2],
 }
 
-impl<I: Isa> VectorsOfPairs<I> for Computed {
+impl<I: Isa, A: Arithmetic<I>> VectorsOfPairs<I, A> for Computed {
     #[inline(always)]
-    unsafe fn at(&self, k: usize) -> PairsAt<I> {
+    unsafe fn at(&self, k: usize) -> PairsAt<A::Reals> {
         // SAFETY: the caller promises a number of a pair; the arrays have whole vectors.
         unsafe {
-            let pairs = self.pairs.cast::<PairVector<I::F32>>();
-            let PairVector { geometry, species_pair } = *pairs.add(k / I::F32::LANES);
+            let pairs = self.pairs.cast::<PairVector<A::Reals>>();
+            let PairVector { geometry, species_pair } = *pairs.add(k / A::Reals::LANES);
             let tags = [Words::load(self.tags[0].add(k)), Words::load(self.tags[1].add(k))];
             PairsAt { geometry, species_pair, tags }
         }
@@ -115,6 +115,7 @@ struct Append<'a, const MULTISPECIES: bool> {
     terms: &'a ListTerms,
     batch: Batch<'a>,
     computed: Computed,
+    is_double: bool,
 }
 
 impl<const MULTISPECIES: bool> Kernel for Append<'_, MULTISPECIES> {
@@ -122,9 +123,14 @@ impl<const MULTISPECIES: bool> Kernel for Append<'_, MULTISPECIES> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let Append { list, terms, batch, computed } = self;
+        let Append { list, terms, batch, computed, is_double } = self;
         // SAFETY: the pass appends its batches in their order, with the arrays of this batch.
-        unsafe { append_batch::<I, MULTISPECIES>(list, terms, batch, &computed) }
+        unsafe {
+            match is_double {
+                false => append_batch::<I, Mixed, MULTISPECIES>(list, terms, batch, &computed),
+                true => append_batch::<I, Double, MULTISPECIES>(list, terms, batch, &computed),
+            }
+        }
     }
 }
 
@@ -150,14 +156,13 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 batch,
                 &mut self.tally,
             );
-            if size_of::<A::Scalar>() == size_of::<f32>()
-                && let Some(terms) = self.listed
-            {
+            if let Some(terms) = self.listed {
                 let [a, b] = &buffers.tags;
                 let computed =
                     Computed { pairs: buffers.pairs.as_ptr().cast(), tags: [a.as_ptr(), b.as_ptr()] };
                 let list = self.lists.of(batch);
-                run(self.set, Append::<MULTISPECIES> { list, terms, batch, computed });
+                let is_double = size_of::<A::Scalar>() == size_of::<f64>();
+                run(self.set, Append::<MULTISPECIES> { list, terms, batch, computed, is_double });
             }
             // Forces are added first: the quads of weights replace theirs.
             if !(MULTISPECIES && inputs.caches_all_pairs()) {

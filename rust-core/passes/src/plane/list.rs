@@ -2,7 +2,7 @@
 
 use super::traversal::{BatchVisitor, each_batch};
 use crate::cells::sorted::SortedCells;
-use crate::ground::arithmetic::{Arithmetic, IParticles, Mixed, MixedParticle, PairGeometry};
+use crate::ground::arithmetic::{Arithmetic, Double, IParticles, Mixed, MixedParticle, PairGeometry};
 use crate::ground::species_pairs::{SpeciesPair, SpeciesPairTable, TableLookup};
 use crate::ground::terms::Exponent;
 use crate::instruction_set::InstructionSet;
@@ -10,7 +10,7 @@ use crate::pair_batch::batch::Batch;
 use crate::pair_batch::room::make_room;
 use crate::pair_batch::thermostat::ThermostatWeight;
 use crate::pair_search::buffers::SearchBuffers;
-use crate::simd::{Isa, Kernel, OFFSET_BITS, Reals, Words, run};
+use crate::simd::{Isa, Kernel, OFFSET_BITS, Reals, Scalar, Words, run};
 use psidpd_model::kernel::Real;
 use psidpd_threads::SharedSlice;
 use std::ops::Range;
@@ -22,7 +22,7 @@ pub struct Pair {
     /// Vector `ê √(½ Δt γ) w_R` from the second particle to the first.
     pub g: [f32; 3],
     /// Index of the second particle, counted from the first particle of the first particle's plane, through the next plane;
-    /// in a list of [`Listed::with_ghosts`] counted from the first of all.
+    /// of a ghost counted from the first of all.
     pub j: u32,
 }
 
@@ -31,7 +31,20 @@ pub struct Pair {
 #[repr(C, align(32))]
 pub struct ExactPair {
     pub g: [f64; 3],
-    pub j: u64,
+    j: u64,
+}
+
+impl ExactPair {
+    pub fn new(g: [f64; 3], j: u32) -> ExactPair {
+        ExactPair { g, j: j.into() }
+    }
+
+    /// Index of the second particle, as that of [`Pair`].
+    #[inline(always)]
+    pub fn j(&self) -> u32 {
+        // The high word is that of the number in which vectors store it.
+        self.j as u32
+    }
 }
 
 /// Pairs whose first particles follow each other in the order of cells, sorted by first particle.
@@ -40,9 +53,10 @@ pub struct PairList {
     /// The first of these particles.
     pub first: usize,
     /// The particle that indices of second particles count from.
-    j_from: usize,
+    pub j_from: usize,
     /// Index of each particle's first pair; the last entry is one past the last pair.
     pub start: Vec<u32>,
+    /// The pairs in single precision; empty if they are listed in double precision.
     pub pairs: Vec<Pair>,
     /// Tags of both particles of each pair.
     pub tags: [Vec<u32>; 2],
@@ -50,14 +64,17 @@ pub struct PairList {
     pub exact: Vec<ExactPair>,
     /// Ratio `r/|g|` of each pair; empty unless requested.
     pub stretch: Vec<f64>,
+    /// Noise of each pair; of another list until it is drawn.
+    pub xi: Vec<f32>,
     scratch: Scratch,
 }
 
 /// The listed pairs of owned particles of a plane, or of a part of it.
 #[derive(Debug, Clone, Default)]
 pub struct Listed {
+    /// The pairs of these particles with each other and with owned particles of the next plane.
     pub own: PairList,
-    /// The pairs of these particles with ghosts, without entries for the last particles.
+    /// The pairs of these particles with ghosts of any plane, without entries for the last particles.
     pub with_ghosts: PairList,
 }
 
@@ -66,6 +83,12 @@ impl Listed {
     pub fn clear(&mut self, first: usize, plane_first: usize) {
         self.own.clear(first, plane_first);
         self.with_ghosts.clear(first, 0);
+    }
+
+    /// Appends lists whose particles follow.
+    pub fn append(&mut self, next: &Listed) {
+        self.own.append(&next.own);
+        self.with_ghosts.append(&next.with_ghosts);
     }
 
     /// The list for a batch.
@@ -81,7 +104,7 @@ struct Scratch {
     /// For each vector of pairs the mask of those that are kept, and the number of those kept before.
     kept: Vec<[u32; 2]>,
     /// Ratio `|g|/r` of each kept pair, if requested.
-    per_distance: Vec<f32>,
+    per_distance: Vec<f64>,
 }
 
 /// The particles of a plane, counted from its first, each with the range of its pairs in the list.
@@ -105,34 +128,26 @@ impl PairList {
     }
 
     /// Appends a list whose particles follow.
-    pub fn append(&mut self, next: &PairList) {
-        let count = self.pairs.len() as u32;
+    fn append(&mut self, next: &PairList) {
+        self.begin_at(next.first);
+        let count = self.count() as u32;
         self.start.extend(next.start.iter().skip(1).map(|start| count + start));
         self.pairs.extend_from_slice(&next.pairs);
         self.tags.iter_mut().zip(&next.tags).for_each(|(tags, next)| tags.extend_from_slice(next));
+        self.exact.extend_from_slice(&next.exact);
         self.stretch.extend_from_slice(&next.stretch);
     }
 
-    /// Gives the next particle the pairs that have been added since the last one.
-    pub fn end_particle(&mut self) {
-        self.start.push(self.pairs.len() as u32);
-    }
-
-    /// Adds pair `k` of another list, with the index `j` of its second particle; with `swap` its particles change places.
-    pub fn add(&mut self, other: &PairList, k: usize, j: u32, swap: bool) {
-        let sign = if swap { -1.0 } else { 1.0 };
-        self.pairs.push(Pair { g: other.pairs[k].g.map(|g| sign * g), j });
-        let [a, b] = [0, 1].map(|side| other.tags[side ^ usize::from(swap)][k]);
-        self.tags[0].push(a);
-        self.tags[1].push(b);
-        self.stretch.extend(other.stretch.get(k));
+    /// Number of pairs.
+    pub fn count(&self) -> usize {
+        self.tags[0].len()
     }
 
     /// Gives no pairs to the particles before `place` that are not listed yet.
     #[inline(always)]
     pub fn begin_at(&mut self, place: usize) {
-        let PairList { start, pairs, first, .. } = self;
-        start.resize(place - *first + 1, pairs.len() as u32);
+        let count = self.count() as u32;
+        self.start.resize(place - self.first + 1, count);
     }
 
     /// The vector `g` of a pair, in the highest precision available.
@@ -140,40 +155,136 @@ impl PairList {
     pub fn g(&self, k: usize) -> [f64; 3] {
         self.exact.get(k).map_or_else(|| self.pairs[k].g.map(f64::from), |pair| pair.g)
     }
+
+    /// The index of a pair's second particle.
+    #[inline(always)]
+    pub fn second(&self, k: usize) -> usize {
+        self.exact.get(k).map_or_else(|| self.pairs[k].j, ExactPair::j) as usize
+    }
 }
 
 /// Factors of the pairs, by pairs of species.
 #[derive(Debug, Clone)]
-pub struct WeightTables {
+pub struct WeightTables<T> {
     pub species: usize,
     /// Amplitude `√(½ Δt γ)`; zero without drag.
-    pub amplitude: SpeciesPairTable<f32>,
-    pub inverse_range: SpeciesPairTable<f32>,
-    pub exponent: Exponent<f32>,
+    pub amplitude: SpeciesPairTable<T>,
+    pub inverse_range: SpeciesPairTable<T>,
+    pub exponent: Exponent<T>,
 }
 
 /// The pairs that are listed, and whether `r/|g|` is requested.
 #[derive(Debug, Clone)]
 pub struct ListTerms {
-    pub tables: WeightTables,
-    pub with_stretch: bool,
+    mixed: WeightTables<f32>,
+    double: WeightTables<f64>,
+    with_stretch: bool,
+}
+
+impl ListTerms {
+    /// In single precision all ranges are longer by the fraction `margin`.
+    pub fn new(double: WeightTables<f64>, margin: f64, with_stretch: bool) -> ListTerms {
+        let table = |table: &SpeciesPairTable<f64>, factor: f64| {
+            SpeciesPairTable::new((0..table.count()).map(|k| (table[k] * factor).min(f32::MAX.into()) as f32))
+        };
+        let mixed = WeightTables {
+            species: double.species,
+            amplitude: table(&double.amplitude, 1.0),
+            inverse_range: table(&double.inverse_range, 1.0 / (1.0 + margin)),
+            exponent: match &double.exponent {
+                Exponent::One => Exponent::One,
+                Exponent::Two => Exponent::Two,
+                Exponent::Any(exponent) => Exponent::Any(table(exponent, 1.0)),
+            },
+        };
+        ListTerms { mixed, double, with_stretch }
+    }
+
+    pub fn species(&self) -> usize {
+        self.mixed.species
+    }
 }
 
 /// What the list needs of a vector of pairs.
-pub struct PairsAt<I: Isa> {
-    pub geometry: PairGeometry<I::F32>,
+pub struct PairsAt<R: Reals> {
+    pub geometry: PairGeometry<R>,
     /// Read only with several species.
-    pub species_pair: SpeciesPair<I::F32>,
-    pub tags: [<I::F32 as Reals>::Words; 2],
+    pub species_pair: SpeciesPair<R>,
+    pub tags: [R::Words; 2],
 }
 
 /// The pairs of a batch, a vector at a time.
-pub trait VectorsOfPairs<I: Isa> {
+pub trait VectorsOfPairs<I: Isa, A: Arithmetic<I>> {
     /// The pairs from number `k` on; lanes beyond the last pair are unspecified.
     ///
     /// # Safety
     /// The caller fulfils the contract of `simd`; `k` is a multiple of the lanes, and a number of a pair.
-    unsafe fn at(&self, k: usize) -> PairsAt<I>;
+    unsafe fn at(&self, k: usize) -> PairsAt<A::Reals>;
+}
+
+/// A precision in which pairs are listed. Callers of its functions fulfil the contract of `simd`.
+#[allow(clippy::missing_safety_doc)]
+pub trait ListArithmetic<I: Isa>: Arithmetic<I> {
+    /// A pair of four numbers, the last of which has the bits of the index.
+    type Pair;
+    fn tables(terms: &ListTerms) -> &WeightTables<Self::Scalar>;
+    fn pairs(list: &mut PairList) -> &mut Vec<Self::Pair>;
+    /// Numbers that have the words as bits.
+    unsafe fn of_words(words: <Self::Reals as Reals>::Words) -> Self::Reals;
+    /// Writes the words of `mask`, followed by others, a vector in all.
+    unsafe fn store_kept(words: <Self::Reals as Reals>::Words, mask: u32, to: *mut u32);
+}
+
+impl<I: Isa> ListArithmetic<I> for Mixed {
+    type Pair = Pair;
+
+    #[inline(always)]
+    fn tables(terms: &ListTerms) -> &WeightTables<f32> {
+        &terms.mixed
+    }
+
+    #[inline(always)]
+    fn pairs(list: &mut PairList) -> &mut Vec<Pair> {
+        &mut list.pairs
+    }
+
+    #[inline(always)]
+    unsafe fn of_words(words: <I::F32 as Reals>::Words) -> I::F32 {
+        // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
+        unsafe { I::of_bits(words) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_kept(words: <I::F32 as Reals>::Words, mask: u32, to: *mut u32) {
+        // SAFETY: the caller fulfils the contract of `simd`, and promises room for a vector.
+        unsafe { I::of_bits(words).compress(mask).store(to.cast()) }
+    }
+}
+
+impl<I: Isa> ListArithmetic<I> for Double {
+    type Pair = ExactPair;
+
+    #[inline(always)]
+    fn tables(terms: &ListTerms) -> &WeightTables<f64> {
+        &terms.double
+    }
+
+    #[inline(always)]
+    fn pairs(list: &mut PairList) -> &mut Vec<ExactPair> {
+        &mut list.exact
+    }
+
+    #[inline(always)]
+    unsafe fn of_words(words: <I::F64 as Reals>::Words) -> I::F64 {
+        // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
+        unsafe { I::F64::encode(words) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_kept(words: <I::F64 as Reals>::Words, mask: u32, to: *mut u32) {
+        // SAFETY: the caller fulfils the contract of `simd`, and promises room for a vector.
+        unsafe { I::halves(I::F64::encode(words).compress(mask))[0].store(to) }
+    }
 }
 
 /// Appends the pairs of a batch within their range to a list.
@@ -181,20 +292,22 @@ pub trait VectorsOfPairs<I: Isa> {
 /// # Safety
 /// The caller fulfils the contract of `simd`. The list has no particle of the batch or after it yet.
 #[inline(always)]
-pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
+pub unsafe fn append_batch<I: Isa, A: ListArithmetic<I>, const MULTISPECIES: bool>(
     list: &mut PairList,
     terms: &ListTerms,
     batch: Batch,
-    vectors: &impl VectorsOfPairs<I>,
+    vectors: &impl VectorsOfPairs<I, A>,
 ) {
-    type W<I> = <<I as Isa>::F32 as Reals>::Words;
     list.begin_at(batch.first);
-    let j_from = (list.j_from as u32) << OFFSET_BITS;
-    let PairList { start, pairs, tags: [a, b], stretch, scratch: Scratch { kept, per_distance }, .. } = list;
-    let (lanes, tables) = (I::F32::LANES, &terms.tables);
-    let room = batch.count + 16;
-    make_room(start, batch.members);
+    let (before, room) = (list.count(), batch.count + 16);
+    let pairs = A::pairs(list);
     make_room(pairs, room);
+    // SAFETY: room for more pairs than there are has been made.
+    let to_pairs = unsafe { pairs.as_mut_ptr().add(before) };
+    let j_from = (list.j_from as u32) << OFFSET_BITS;
+    let PairList { start, tags: [a, b], stretch, scratch: Scratch { kept, per_distance }, .. } = list;
+    let (lanes, tables) = (A::Reals::LANES, A::tables(terms));
+    make_room(start, batch.members);
     make_room(a, room);
     make_room(b, room);
     kept.resize(kept.len().max(room), [0; 2]);
@@ -204,31 +317,31 @@ pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
     // SAFETY: the search pads lists of the batch; room for all its pairs and a vector has been reserved, and `found`
     // written pairs are initialised. The caller promises the rest.
     unsafe {
-        let weight = ThermostatWeight::<I::F32>::new(&tables.inverse_range, &tables.exponent);
-        let amplitude = TableLookup::<I::F32>::new(&tables.amplitude);
-        let before = pairs.len();
-        let to_pairs = pairs.as_mut_ptr().add(before);
+        let weight = ThermostatWeight::<A::Reals>::new(&tables.inverse_range, &tables.exponent);
+        let amplitude = TableLookup::<A::Reals>::new(&tables.amplitude);
         let to_tags = [a.as_mut_ptr().add(before), b.as_mut_ptr().add(before)];
-        let j_from = W::<I>::splat(j_from);
+        let per_distance = per_distance.as_mut_ptr().cast::<A::Scalar>();
+        let j_from = <A::Reals as Reals>::Words::splat(j_from);
         let mut found = 0;
         let mut k = 0;
         while k < batch.count {
             let PairsAt { geometry, species_pair, tags } = vectors.at(k);
             let w = weight.weight::<MULTISPECIES>(geometry.r, species_pair);
             let factor = amplitude.lookup::<MULTISPECIES>(species_pair) * w * geometry.inverse;
-            let mut mask = I::F32::constant(0.0).mask_below(factor);
+            let mut mask = A::Reals::constant(0.0).mask_below(factor);
             if batch.count - k < lanes {
                 mask &= (1 << (batch.count - k)) - 1;
             }
             *kept.get_unchecked_mut(k / lanes) = [mask, found as u32];
             let [dx, dy, dz] = geometry.d;
-            let j = W::<I>::load(batch.j_offsets.as_ptr().add(k)).sub(j_from).shift_right::<OFFSET_BITS>();
-            let columns = [factor * dx, factor * dy, factor * dz, I::of_bits(j)];
-            I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
-            I::of_bits(tags[0]).compress(mask).store(to_tags[0].add(found).cast());
-            I::of_bits(tags[1]).compress(mask).store(to_tags[1].add(found).cast());
+            let j = <A::Reals as Reals>::Words::load(batch.j_offsets.as_ptr().add(k));
+            let j = j.sub(j_from).shift_right::<OFFSET_BITS>();
+            let columns = [factor * dx, factor * dy, factor * dz, A::of_words(j)];
+            A::Reals::store_rows(columns, mask, to_pairs.add(found).cast());
+            A::store_kept(tags[0], mask, to_tags[0].add(found));
+            A::store_kept(tags[1], mask, to_tags[1].add(found));
             if terms.with_stretch {
-                factor.compress(mask).store(per_distance.as_mut_ptr().add(found));
+                factor.compress(mask).store(per_distance.add(found));
             }
             found += mask.count_ones() as usize;
             k += lanes;
@@ -241,13 +354,12 @@ pub unsafe fn append_batch<I: Isa, const MULTISPECIES: bool>(
             let below = mask & !(u32::MAX << (at % lanes));
             start.push(before as u32 + found + below.count_ones());
         }
-        pairs.set_len(before + found);
         a.set_len(before + found);
         b.set_len(before + found);
         if terms.with_stretch {
-            stretch
-                .extend(per_distance.get_unchecked(..found).iter().map(|factor| f64::from(factor.recip())));
+            stretch.extend((0..found).map(|k| (*per_distance.add(k)).wide().recip()));
         }
+        A::pairs(list).set_len(before + found);
     }
 }
 
@@ -285,7 +397,7 @@ pub unsafe fn list_pairs(
     // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before it lists any
     // plane, and writes none of them while it lists.
     unsafe {
-        match inputs.terms.tables.species {
+        match inputs.terms.species() {
             1 => run(set, WithSpecies::<false>(task)),
             _ => run(set, WithSpecies::<true>(task)),
         }
@@ -336,9 +448,9 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
             let ListInputs { packed, terms, .. } = self.inputs;
             let packed = packed.as_ptr();
             <Mixed as Arithmetic<I>>::load_i_particles(packed.add(batch.first), self.i_particles);
-            let (metric, i_particles, species) = (self.metric, &*self.i_particles, terms.tables.species);
+            let (metric, i_particles, species) = (self.metric, &*self.i_particles, terms.species());
             let computed = Computed::<I, MULTISPECIES> { metric, packed, i_particles, batch, species };
-            append_batch::<I, MULTISPECIES>(self.lists.of(batch), terms, batch, &computed);
+            append_batch::<I, Mixed, MULTISPECIES>(self.lists.of(batch), terms, batch, &computed);
         }
     }
 }
@@ -352,9 +464,9 @@ struct Computed<'a, I: Isa, const MULTISPECIES: bool> {
     species: usize,
 }
 
-impl<I: Isa, const MULTISPECIES: bool> VectorsOfPairs<I> for Computed<'_, I, MULTISPECIES> {
+impl<I: Isa, const MULTISPECIES: bool> VectorsOfPairs<I, Mixed> for Computed<'_, I, MULTISPECIES> {
     #[inline(always)]
-    unsafe fn at(&self, k: usize) -> PairsAt<I> {
+    unsafe fn at(&self, k: usize) -> PairsAt<I::F32> {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
         let Computed { metric, packed, i_particles, batch, species } = self;
         // SAFETY: the search pads the lists of a batch by a vector of valid particles.

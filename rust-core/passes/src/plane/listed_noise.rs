@@ -1,5 +1,6 @@
 //! The noise of listed pairs.
 
+use super::list::PairList;
 use crate::instruction_set::InstructionSet;
 use crate::noise::{Law, PairNoise, normal, thirteen_rounds};
 use crate::simd::{Isa, Kernel, run};
@@ -9,6 +10,15 @@ impl PairNoise {
     pub fn fill(&self, law: Law, a: &[u32], b: &[u32], xi: &mut [f32]) {
         // SAFETY: the kernel requires the instruction set only, which `InstructionSet::best` has found.
         unsafe { run(InstructionSet::best(), Fill { noise: *self, law, a, b, xi }) }
+    }
+}
+
+impl PairList {
+    /// Draws the noise of the pairs.
+    pub fn draw(&mut self, noise: PairNoise, law: Law) {
+        let PairList { tags: [a, b], xi, .. } = self;
+        xi.resize(a.len(), 0.0);
+        noise.fill(law, a, b, xi);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Sums over the listed pairs of a plane.
 
-use super::list::{ExactPair, Pair, PairList};
+use super::list::{ExactPair, Listed, Pair, PairList};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
@@ -29,34 +29,51 @@ impl std::ops::DerefMut for Wide {
     }
 }
 
-/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`, with the opposite term of the pair for `j`; without noise,
-/// `a = 0`, it does not read `xi`. `p` and `sums` have entries for the particles of the plane, followed by those of the next.
+/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i` of a plane, without noise if `a = 0`.
+///
+/// A pair of two owned particles adds the opposite to the sum of `j`; ghosts have no sums. `all` has a vector for each sorted
+/// particle; of those from `first` on, `sums` has entries for the particles of the plane, followed by those of the next.
 ///
 /// # Safety
-/// Both arrays have entries for all particles of the list.
+/// The arrays have entries for all particles of the lists.
 ///
 /// # Panics
-/// Panics if there is noise and `xi` has not an entry for each pair.
+/// Panics if there is noise that has not been drawn for all pairs, and if pairs with ghosts are not in double precision.
 pub unsafe fn add_pairs(
     set: InstructionSet,
-    list: &PairList,
-    xi: &[f32],
+    lists: &Listed,
     noise: f64,
-    p: &[Wide],
+    all: &[Wide],
+    first: usize,
     sums: &mut [Wide],
 ) {
-    match list.exact.is_empty() {
-        true => add(set, AddPairs { start: &list.start, pairs: &list.pairs, xi, noise, p, sums }),
-        false => add(set, AddPairs { start: &list.start, pairs: &list.exact, xi, noise, p, sums }),
+    let p = &all[first..];
+    let Listed { own, with_ghosts } = lists;
+    match own.exact.is_empty() {
+        true => add::<_, true>(set, own, &own.pairs, noise, [p, p], sums),
+        false => add::<_, true>(set, own, &own.exact, noise, [p, p], sums),
+    }
+    if with_ghosts.start.last().is_some_and(|end| *end > 0) {
+        add::<_, false>(set, with_ghosts, &with_ghosts.exact, noise, [p, all], sums);
     }
 }
 
-fn add<P: Entry>(set: InstructionSet, task: AddPairs<P>) {
+/// Sums over the pairs of owned particles, with `BOTH`, or adds those with ghosts; `p` has the vectors of first and of second particles.
+fn add<P: Entry, const BOTH: bool>(
+    set: InstructionSet,
+    PairList { start, xi, .. }: &PairList,
+    pairs: &[P],
+    noise: f64,
+    p: [&[Wide]; 2],
+    sums: &mut [Wide],
+) {
+    assert!(pairs.len() == start.last().map_or(0, |end| *end as usize), "pairs in this precision");
+    let task = AddPairs { start, pairs, xi, noise, p, sums };
     // SAFETY: `InstructionSet` guarantees the instructions, the caller of `add_pairs` the particles.
     unsafe {
-        match task.noise == 0.0 {
-            true => run(set, WithNoise::<P, false>(task)),
-            false => run(set, WithNoise::<P, true>(task)),
+        match noise == 0.0 {
+            true => run(set, WithNoise::<P, BOTH, false>(task)),
+            false => run(set, WithNoise::<P, BOTH, true>(task)),
         }
     }
 }
@@ -88,7 +105,7 @@ impl Entry for Pair {
 impl Entry for ExactPair {
     #[inline(always)]
     fn j(&self) -> usize {
-        self.j as usize
+        ExactPair::j(self) as usize
     }
 
     #[inline(always)]
@@ -103,22 +120,25 @@ struct AddPairs<'a, P> {
     pairs: &'a [P],
     xi: &'a [f32],
     noise: f64,
-    p: &'a [Wide],
+    p: [&'a [Wide]; 2],
     sums: &'a mut [Wide],
 }
 
-struct WithNoise<'a, P, const NOISE: bool>(AddPairs<'a, P>);
+/// With `BOTH` the sums begin at zero, and the opposite is added to second particles.
+struct WithNoise<'a, P, const BOTH: bool, const NOISE: bool>(AddPairs<'a, P>);
 
-impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
+impl<P: Entry, const BOTH: bool, const NOISE: bool> Kernel for WithNoise<'_, P, BOTH, NOISE> {
     type Out = ();
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
         let AddPairs { start, pairs, xi, noise, p, sums } = self.0;
-        assert!(p.len() >= start.len() - 1 && sums.len() >= start.len() - 1, "particles of the list");
+        assert!(p[0].len() >= start.len() - 1 && sums.len() >= start.len() - 1, "particles of the list");
         assert!(!NOISE || xi.len() >= pairs.len(), "noise of the pairs");
-        sums.fill(Wide::ZERO);
-        let (p, sums) = (p.as_ptr(), sums.as_mut_ptr());
+        if BOTH {
+            sums.fill(Wide::ZERO);
+        }
+        let ([p, second], sums) = (p.map(<[Wide]>::as_ptr), sums.as_mut_ptr());
         // SAFETY: `start` has indices of pairs, and these have particles that the arrays contain.
         unsafe {
             let (minus_noise, first) = (I::Quad::splat(-noise), pairs.as_ptr());
@@ -132,8 +152,8 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
                     let (a, b) = (&*next, &*next.add(1));
                     let (j_a, j_b) = (a.j(), b.j());
                     let (g_a, g_b) = (a.g::<I>(), b.g::<I>());
-                    let d_a = at.sub(I::Quad::load(p.add(j_a).cast()));
-                    let d_b = at.sub(I::Quad::load(p.add(j_b).cast()));
+                    let d_a = at.sub(I::Quad::load(second.add(j_a).cast()));
+                    let d_b = at.sub(I::Quad::load(second.add(j_b).cast()));
                     let [mut along_a, mut along_b] = d_a.mul(g_a).totals(d_b.mul(g_b));
                     if NOISE {
                         along_a = I::Quad::splat_f32(*xi).mul_add(minus_noise, along_a);
@@ -141,21 +161,27 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
                         xi = xi.add(2);
                     }
                     sum = along_a.mul_add(g_a, sum);
-                    push_away::<I>(along_a, g_a, sums.add(j_a));
+                    if BOTH {
+                        push_away::<I>(along_a, g_a, sums.add(j_a));
+                    }
                     sum = along_b.mul_add(g_b, sum);
-                    push_away::<I>(along_b, g_b, sums.add(j_b));
+                    if BOTH {
+                        push_away::<I>(along_b, g_b, sums.add(j_b));
+                    }
                     next = next.add(2);
                 }
                 if next < end {
                     let (j, g) = ((*next).j(), (*next).g::<I>());
-                    let d = at.sub(I::Quad::load(p.add(j).cast()));
+                    let d = at.sub(I::Quad::load(second.add(j).cast()));
                     let [mut along, _] = d.mul(g).totals(I::Quad::zero());
                     if NOISE {
                         along = I::Quad::splat_f32(*xi).mul_add(minus_noise, along);
                         xi = xi.add(1);
                     }
                     sum = along.mul_add(g, sum);
-                    push_away::<I>(along, g, sums.add(j));
+                    if BOTH {
+                        push_away::<I>(along, g, sums.add(j));
+                    }
                     next = next.add(1);
                 }
                 sum.store(sums.add(i).cast());

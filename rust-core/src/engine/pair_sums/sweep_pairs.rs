@@ -23,7 +23,6 @@ pub struct SweepPairs {
     kinds: Vec<i32>,
     tags: Vec<i32>,
     planes: Vec<PlanePairs>,
-    places: Places,
 }
 
 impl std::fmt::Debug for SweepPairs {
@@ -36,32 +35,31 @@ impl SweepPairs {
     /// Creates the search for pairs in the range of the conservative interactions.
     pub fn new(fluid: &Fluid) -> SweepPairs {
         let (range, species) = (fluid.conservative_range(), fluid.species.len());
-        let inverse_range = 1.0 / (range * (1.0 + MARGIN));
         SweepPairs {
             lists: PairLists::new(InstructionSet::best(), fluid.dimensions),
             pool: Pool::new(NonZeroUsize::MIN),
             dimensions: fluid.dimensions,
             range,
-            terms: ListTerms {
-                tables: WeightTables {
+            terms: ListTerms::new(
+                WeightTables {
                     species,
                     amplitude: SpeciesPairTable::of(species * species, 1.0),
-                    inverse_range: SpeciesPairTable::of(species * species, inverse_range as f32),
+                    inverse_range: SpeciesPairTable::of(species * species, 1.0 / range),
                     exponent: Exponent::One,
                 },
-                with_stretch: false,
-            },
+                MARGIN,
+                false,
+            ),
             kinds: (0..species as i32).collect(),
             tags: Vec::new(),
             planes: Vec::new(),
-            places: Places::default(),
         }
     }
 
     /// Adds the pairs of particles at `x`, and returns whether it could: it cannot if a particle may be
     /// near two images of another, or if a position is not finite.
     pub fn find(&mut self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox, pairs: &mut Pairs) -> bool {
-        let SweepPairs { lists, pool, dimensions, range, terms, kinds, tags, planes, places } = self;
+        let SweepPairs { lists, pool, dimensions, range, terms, kinds, tags, planes } = self;
         let is_periodic = [0, 1, 2].map(|k| domain.periodic()[k] && k < *dimensions);
         let search_range = *range * (1.0 + MARGIN);
         let is_wide = |k: usize| !is_periodic[k] || domain.height(k) > 2.0 * search_range;
@@ -75,14 +73,14 @@ impl SweepPairs {
         if lists.find(pool, around, &particles, kinds, terms, [*range, MARGIN], planes).is_err() {
             return false;
         }
-        let copies = planes.last().map_or(0..0, |last| last.next.clone());
-        places.gather(*dimensions, domain, x, lists.order(), copies);
-        let (places, x, images) = (&*places, places.x(), places.images());
-        for PlanePairs { own, list, .. } in planes {
-            for (i, of_i) in pairs_of_each(&list.start) {
-                for pair in &list.pairs[of_i] {
+        let places = Places::new(*dimensions, domain, x, lists.order());
+        let images = places.images();
+        for PlanePairs { own, lists, .. } in planes {
+            for (i, of_i) in pairs_of_each(&lists.own.start) {
+                for pair in &lists.own.pairs[of_i] {
                     let (i, j) = (own.start + i, own.start + pair.j as usize);
-                    let mut d = [0, 1, 2].map(|c| [x[i][c] - x[j][c]]);
+                    let (a, b) = (places.x(i), places.x(j));
+                    let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
                     images.find_nearest(&mut d);
                     let d = d.map(|[d]| d);
                     if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < *range * *range {

@@ -37,7 +37,7 @@ use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
-use psidpd_passes::plane::list::{ListTerms, PairList};
+use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::{Tally, Want};
 use region::{can_stretch, is_open, region};
@@ -286,9 +286,7 @@ impl Sweep {
         let input =
             Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
                 .excluding(&self.exclusions);
-        let can_list = self.settings.precision == Precision::Mixed
-            && input.thermostat.is_none()
-            && self.exclusions.is_empty();
+        let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
         let listed = self.asked.take().filter(|_| can_list);
         self.has_listed = false;
         let set = self.set;
@@ -307,31 +305,28 @@ impl Sweep {
     }
 
     /// Asks the next evaluation to list pairs for a thermostat, with the geometry that it computes anyway. It lists them
-    /// in mixed precision, without excluded pairs, and if drag and noise are not among the forces.
+    /// without excluded pairs, and if drag and noise are not among the forces.
     pub(super) fn ask_for_pairs(&mut self, terms: Option<ListTerms>) {
         (self.asked, self.has_listed) = (terms, false);
     }
 
     /// Takes lists that nobody needs, for the memory of the pairs that the next evaluation lists.
-    pub(super) fn lend_lists(&mut self, lists: impl ExactSizeIterator<Item = PairList>) {
+    pub(super) fn lend_lists(&mut self, planes: &mut [PlanePairs]) {
+        let lists = planes.iter_mut().map(|plane| std::mem::take(&mut plane.lists));
         with!(&mut self.workspace, m => m.lend_lists(lists));
     }
 
     /// Moves the pairs that the last evaluation has listed, once; returns whether it has listed any. Particles of a cell
     /// are in the order of the host.
-    pub(super) fn take_pairs<T: AsMut<PlanePairs> + Default + Send>(
-        &mut self,
-        lists: &mut PairLists,
-        planes: &mut Vec<T>,
-    ) -> bool {
+    pub(super) fn take_pairs(&mut self, lists: &mut PairLists, planes: &mut Vec<PlanePairs>) -> bool {
         let has_listed = std::mem::take(&mut self.has_listed);
         if has_listed {
             with!(&mut self.workspace, m => {
                 let cells = m.sorted();
-                planes.resize_with(cells.grid.planes, T::default);
-                planes.iter_mut().enumerate().for_each(|(k, plane)| plane.as_mut().lie_in(cells, k));
-                let with_ghosts = m.move_lists(planes.iter_mut().map(|plane| &mut plane.as_mut().list));
-                lists.follow(&self.pool, m.sorted(), planes, &with_ghosts);
+                planes.resize_with(cells.grid.planes, PlanePairs::default);
+                planes.iter_mut().enumerate().for_each(|(k, plane)| plane.lie_in(cells, k));
+                lists.follow(cells);
+                m.move_lists(planes.iter_mut().map(|plane| &mut plane.lists));
             });
         }
         has_listed

@@ -4,7 +4,6 @@
 //! depends on positions and tags alone.
 
 mod plane_pairs;
-mod with_ghosts;
 
 pub use plane_pairs::PlanePairs;
 
@@ -19,7 +18,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, Listed, PairList, list_pairs};
+use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
 use psidpd_passes::tally::Want;
 use psidpd_threads::{Pool, part};
 
@@ -30,21 +29,8 @@ pub struct PairLists {
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
-    /// Whether each sorted particle, or copy of one, is a ghost; empty without ghosts.
-    ghosts: Vec<bool>,
-    /// The pairs with ghosts of each plane's owned particles.
-    with_ghosts: Vec<PairList>,
     /// Sorted index by index of the host, or [`NOWHERE`].
     place: Vec<u32>,
-}
-
-/// Whether each sorted particle, or copy of one, is a ghost; empty without ghosts.
-fn flags_of_ghosts(cells: &CellOrder) -> Vec<bool> {
-    if cells.grid.layers == 1 {
-        return Vec::new();
-    }
-    let of_first_plane = &cells.order[..cells.copies()];
-    cells.order.iter().chain(of_first_plane).map(|k| *k as usize >= cells.owned).collect()
 }
 
 /// The sorted index of particles that are left out.
@@ -53,15 +39,13 @@ pub const NOWHERE: u32 = u32::MAX;
 impl Clone for PairLists {
     /// Copies the order; the clone has scratch arrays of its own.
     fn clone(&self) -> PairLists {
-        let PairLists { set, dimensions, cells, particles, ghosts, place, .. } = self;
+        let PairLists { set, dimensions, cells, particles, place, .. } = self;
         PairLists {
             set: *set,
             dimensions: *dimensions,
             cells: cells.clone(),
             particles: particles.clone(),
             buffers: Vec::new(),
-            ghosts: ghosts.clone(),
-            with_ghosts: Vec::new(),
             place: place.clone(),
         }
     }
@@ -75,8 +59,6 @@ impl PairLists {
             cells: CellOrder::new(dimensions),
             particles: SortedParticles::default(),
             buffers: Vec::new(),
-            ghosts: Vec::new(),
-            with_ghosts: Vec::new(),
             place: Vec::new(),
         }
     }
@@ -91,11 +73,6 @@ impl PairLists {
         &self.place
     }
 
-    /// Whether each sorted particle, or copy of one, is a ghost; empty without ghosts.
-    pub fn ghosts(&self) -> &[bool] {
-        &self.ghosts
-    }
-
     /// Finds the pairs of `particles` within `range`, extended by the fraction `margin` where the box
     /// is wide enough, for each plane of cells; two ghosts form no pair. Particles of a type with a
     /// negative species are left out.
@@ -104,7 +81,7 @@ impl PairLists {
     /// Fails for a position that is not finite, and for a box narrower than twice the range
     /// or skew along an open direction.
     #[allow(clippy::too_many_arguments)]
-    pub fn find<T: AsMut<PlanePairs> + Default + Send>(
+    pub fn find(
         &mut self,
         pool: &Pool,
         Around { domain, images }: Around,
@@ -112,7 +89,7 @@ impl PairLists {
         species_of_kind: &[i32],
         terms: &ListTerms,
         [range, margin]: [f64; 2],
-        planes: &mut Vec<T>,
+        planes: &mut Vec<PlanePairs>,
     ) -> Result<(), EngineError> {
         let input = Input::new(particles, images, &[], species_of_kind, &[], None, Want::FORCES);
         let set = self.set;
@@ -125,10 +102,8 @@ impl PairLists {
         }
         self.cells.sort(pool, set, geometry, grid, &input)?;
         self.sort_by_tags(pool, particles.tag);
-        self.fill(pool, &input, terms.tables.species > 1);
-        self.ghosts = flags_of_ghosts(&self.cells);
-        planes.resize_with(grid.planes, T::default);
-        self.with_ghosts.resize_with(grid.planes, PairList::default);
+        self.fill(pool, &input, terms.species() > 1);
+        planes.resize_with(grid.planes, PlanePairs::default);
         self.buffers.resize_with(pool.threads(), ListBuffers::default);
         let cells = &self.cells;
         let shared = self.particles.share();
@@ -148,7 +123,7 @@ impl PairLists {
         };
         let threads = pool.threads();
         let count = planes.len();
-        let mut rest = planes.iter_mut().zip(&mut self.with_ghosts).enumerate();
+        let mut rest = planes.iter_mut().enumerate();
         let mut work: Vec<_> = self
             .buffers
             .iter_mut()
@@ -158,36 +133,19 @@ impl PairLists {
             })
             .collect();
         pool.each(&mut work, |(buffers, planes)| {
-            for (number, (plane, with_ghosts)) in planes {
-                let plane = (*plane).as_mut();
+            for (number, plane) in planes {
                 plane.lie_in(cells, *number);
-                let [own, with_ghosts_here] = [&mut plane.list, with_ghosts].map(std::mem::take);
-                let mut lists = Listed { own, with_ghosts: with_ghosts_here };
                 // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
-                unsafe { list_pairs(set, inputs, *number, buffers, &mut lists) };
-                Listed { own: plane.list, with_ghosts: **with_ghosts } = lists;
+                unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.lists) };
             }
         });
-        if !self.ghosts.is_empty() {
-            with_ghosts::join(pool, planes, &self.with_ghosts);
-        }
         Ok(())
     }
 
-    /// Takes over the order of a sweep, and the pairs of its owned particles with ghosts, which it adds to the planes.
-    pub fn follow<T: AsMut<PlanePairs> + Send>(
-        &mut self,
-        pool: &Pool,
-        cells: &CellOrder,
-        planes: &mut [T],
-        with_ghosts: &[PairList],
-    ) {
+    /// Takes over the order of a sweep.
+    pub fn follow(&mut self, cells: &CellOrder) {
         self.cells.order.clone_from(&cells.order);
-        self.ghosts = flags_of_ghosts(cells);
         self.find_places(cells.all);
-        if !self.ghosts.is_empty() {
-            with_ghosts::join(pool, planes, with_ghosts);
-        }
     }
 
     /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag

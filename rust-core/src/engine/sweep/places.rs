@@ -2,7 +2,6 @@
 //! instead of fractions of a region, which differs between ranks.
 
 use psidpd_passes::domain::PeriodicBox;
-use std::ops::Range;
 
 /// Fraction by which the search range is extended, so that rounding to single precision loses no pair.
 pub const MARGIN: f64 = 1e-5;
@@ -11,11 +10,11 @@ pub const MARGIN: f64 = 1e-5;
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// Positions of the sorted particles, followed by those of the first plane's copies, for pairs of the last plane.
-#[derive(Debug, Clone, Default)]
-pub struct Places {
-    x: Vec<[f64; 3]>,
-    /// The host's index of each sorted particle.
-    host: Vec<u32>,
+#[derive(Debug, Clone, Copy)]
+pub struct Places<'a> {
+    dimensions: usize,
+    x: &'a [[f64; 3]],
+    order: &'a [u32],
     images: Images,
 }
 
@@ -27,42 +26,36 @@ pub struct Images {
     inverse: [[f64; 3]; 3],
 }
 
-impl Places {
-    /// Copies the positions `x` of the host in `order`, and again those of `copies`.
-    pub fn gather(
-        &mut self,
+impl Places<'_> {
+    /// The positions `x` of the host, sorted in `order`.
+    pub fn new<'a>(
         dimensions: usize,
         domain: &PeriodicBox,
-        x: &[[f64; 3]],
-        order: &[u32],
-        copies: Range<usize>,
-    ) {
+        x: &'a [[f64; 3]],
+        order: &'a [u32],
+    ) -> Places<'a> {
         let is_periodic = |k: usize| domain.periodic()[k] && k < dimensions;
         let of_periods =
             |rows: [[f64; 3]; 3]| [0, 1, 2].map(|k| if is_periodic(k) { rows[k] } else { [0.0; 3] });
-        self.images = Images {
+        let images = Images {
             edges: of_periods([0, 1, 2].map(|k| domain.edge(k))),
             inverse: of_periods(domain.inverse()),
         };
-        self.x.clear();
-        self.x.extend(order.iter().map(|k| {
-            let [x, y, z] = x[*k as usize];
-            [x, y, if dimensions > 2 { z } else { 0.0 }]
-        }));
-        self.x.extend_from_within(copies.clone());
-        self.host.clear();
-        self.host.extend(order);
-        self.host.extend_from_within(copies);
+        Places { dimensions, x, order, images }
     }
 
-    /// Positions of the sorted particles.
-    pub fn x(&self) -> &[[f64; 3]] {
-        &self.x
+    /// The position of a sorted particle.
+    #[inline(always)]
+    pub fn x(&self, k: usize) -> [f64; 3] {
+        let [x, y, z] = self.x[self.host(k)];
+        [x, y, if self.dimensions > 2 { z } else { 0.0 }]
     }
 
     /// The host's index of a sorted particle.
+    #[inline(always)]
     pub fn host(&self, k: usize) -> usize {
-        self.host[k] as usize
+        let n = self.order.len();
+        self.order[if k < n { k } else { k - n }] as usize
     }
 
     /// The periods of the box.

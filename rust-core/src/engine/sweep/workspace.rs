@@ -37,7 +37,7 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::pair_batch::inputs::PairInputs;
 use psidpd_passes::plane::data::PassData;
-use psidpd_passes::plane::list::{ListTerms, Listed, PairList};
+use psidpd_passes::plane::list::{ListTerms, Listed};
 use psidpd_threads::{Pool, part};
 use scheduler::{PassInput, Scheduler};
 use slopes::SlopeArrays;
@@ -198,37 +198,26 @@ impl<P: PairPrecision> Workspace<P> {
     }
 
     /// Gives lists, in the order of planes, to the threads that will need their memory.
-    pub fn lend_lists(&mut self, mut lists: impl ExactSizeIterator<Item = PairList>) {
+    pub fn lend_lists(&mut self, mut lists: impl ExactSizeIterator<Item = Listed>) {
         let (count, threads) = (lists.len(), self.threads.len());
         for (number, state) in self.threads.iter_mut().enumerate() {
-            let lists = lists.by_ref().take(part(count, number, threads).len());
-            state.lists = lists.map(|own| Listed { own, ..Listed::default() }).collect();
+            state.lists = lists.by_ref().take(part(count, number, threads).len()).collect();
         }
     }
 
     /// Moves the pairs that the last evaluation has listed to the lists of the planes, whose memory it keeps for the next.
-    /// Returns the pairs with ghosts of each plane.
-    pub fn move_lists<'a>(&mut self, lists: impl Iterator<Item = &'a mut PairList>) -> Vec<PairList> {
+    pub fn move_lists<'a>(&mut self, lists: impl Iterator<Item = &'a mut Listed>) {
         let Workspace { order, threads, .. } = self;
         let mut lists: Vec<_> = lists.collect();
-        let mut with_ghosts = vec![PairList::default(); lists.len()];
         for (units, state) in order.thread_slabs(threads.len()).iter().zip(threads) {
             for (plane, found) in order.planes_of(units).zip(&mut state.lists) {
                 // A plane may be in several slabs.
                 match found.own.first == order.plane_start(plane) {
-                    true => {
-                        std::mem::swap(lists[plane], &mut found.own);
-                        std::mem::swap(&mut with_ghosts[plane], &mut found.with_ghosts);
-                    }
-                    false => {
-                        lists[plane].append(&found.own);
-                        with_ghosts[plane].begin_at(found.with_ghosts.first);
-                        with_ghosts[plane].append(&found.with_ghosts);
-                    }
+                    true => std::mem::swap(lists[plane], found),
+                    false => lists[plane].append(found),
                 }
             }
         }
-        with_ghosts
     }
 
     /// Adds the times of the caller's thread; fails for ψ or a force that is not finite, and names the lowest tag.

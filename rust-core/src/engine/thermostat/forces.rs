@@ -23,7 +23,7 @@ impl PairThermostat {
             sums.p.fill(Wide::ZERO);
         }
         sums.compute(pool, *set, planes, noise);
-        let virial = virial(pool, planes, sums, lists.ghosts(), noise, factor);
+        let virial = virial(pool, planes, sums, noise, factor);
         // Frozen particles receive forces like others; the integrator does not move them.
         let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
         add_to_host(pool, lists.place(), &all, -factor, force);

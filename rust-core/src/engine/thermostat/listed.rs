@@ -16,3 +16,20 @@ impl Listed {
         self.dt == asked.dt && self.particles == asked.particles && (self.virial || !asked.virial)
     }
 }
+
+/// The pairs of the forces.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct FromForces {
+    /// Those that an engine has listed, for a search that follows.
+    pub listed: Option<Listed>,
+    /// Whether the present pairs are of the forces.
+    pub are_present: bool,
+}
+
+impl FromForces {
+    /// Takes the listed pairs, once, if they are those that are `asked` for; returns whether they are.
+    pub fn serve(&mut self, asked: Listed) -> bool {
+        self.are_present = self.listed.take().is_some_and(|there| there.serves(asked));
+        self.are_present
+    }
+}

@@ -1,17 +1,17 @@
-//! Computes the vectors of pairs in double precision.
+//! Computes the vectors of listed pairs in double precision: of all pairs that the search finds if the precision is double,
+//! and of all pairs with ghosts that are in single precision.
 //!
 //! The search uses fractions of the rank's region, in single precision: the vectors of a pair on two
 //! ranks differ by 10⁻⁷. From the coordinates of the host they agree to the rounding of double
 //! precision, and so do the lists of pairs.
 
 use super::PairThermostat;
-use super::planes::Plane;
 use crate::engine::particles::Particles;
 use crate::engine::plan::ThermostatPlan;
-use crate::engine::sweep::{Images, Places, Pool};
+use crate::engine::sweep::{Images, MARGIN, Places, PlanePairs, Pool};
 use crate::engine::vectors::{self, Loop};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::plane::list::{ExactPair, PairList};
+use psidpd_passes::plane::list::{ExactPair, Listed, PairList};
 
 /// Number of pairs in a block.
 const BLOCK: usize = 64;
@@ -22,6 +22,8 @@ struct Laws {
     amplitude: Vec<f64>,
     inverse_range: Vec<f64>,
     exponent: Exponent,
+    /// Least `1 − r/R` of a pair: pairs that are not surely listed on both ranks are left out on both.
+    least: f64,
 }
 
 /// Exponents of `w_R`, by pairs of species.
@@ -32,7 +34,7 @@ enum Exponent {
 }
 
 impl PairThermostat {
-    /// Computes the pairs that were found in double precision, and removes those beyond their range.
+    /// Computes the listed pairs in double precision where they should be and are not, and removes those beyond their range.
     pub(super) fn measure(
         &mut self,
         pool: &Pool,
@@ -40,11 +42,10 @@ impl PairThermostat {
         particles: &Particles,
         species_of_kind: &[i32],
     ) {
-        let PairThermostat { plan, dimensions, dt, set, lists, planes, places, wants_virial, .. } = self;
-        let copies = planes.last().map_or(0..0, |last| last.found.next.clone());
-        places.gather(*dimensions, domain, particles.x, lists.order(), copies);
-        let laws = Laws::new(plan, *dt);
-        let (places, set, with_stretch) = (&*places, *set, *wants_virial);
+        let PairThermostat { plan, dimensions, dt, set, lists, planes, is_exact, wants_virial, .. } = self;
+        let laws = Laws::new(plan, *dt, if *is_exact { 0.0 } else { MARGIN });
+        let places = Places::new(*dimensions, domain, particles.x, lists.order());
+        let (set, is_exact, with_stretch) = (*set, *is_exact, *wants_virial);
         let law = |i: usize, j: usize| match laws.species {
             1 => 0,
             count => {
@@ -53,17 +54,25 @@ impl PairThermostat {
                 a * count + b
             }
         };
-        pool.each(planes, |plane| {
+        pool.each(planes, |PlanePairs { own, next, lists: Listed { own: list, with_ghosts } }| {
             let mut block = Block::new(&laws);
-            plane.measure(places, with_stretch, &mut block, law, |block| {
+            let weigh = |block: &mut Block| {
                 vectors::run(set, Weigh { block, images: places.images(), laws: &laws });
-            });
+            };
+            if is_exact && list.exact.is_empty() {
+                // Each is read often.
+                let x: Vec<_> = (own.start..own.end + next.len()).map(|k| places.x(k)).collect();
+                measure(list, |k| x[k - own.start], with_stretch, &mut block, law, weigh);
+            }
+            if with_ghosts.exact.is_empty() {
+                measure(with_ghosts, |k| places.x(k), with_stretch, &mut block, law, weigh);
+            }
         });
     }
 }
 
 impl Laws {
-    fn new(plan: &ThermostatPlan, dt: f64) -> Laws {
+    fn new(plan: &ThermostatPlan, dt: f64, least: f64) -> Laws {
         let acts = |e: f64| plan.exponent.iter().zip(&plan.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
         Laws {
             species: plan.gamma.len().isqrt(),
@@ -79,66 +88,66 @@ impl Laws {
                 () if acts(2.0) => Exponent::Two,
                 () => Exponent::Any(plan.exponent.clone()),
             },
+            least,
         }
     }
 }
 
-impl Plane {
-    /// Gathers the pairs in blocks, for which `weigh` computes factors, and keeps pairs with a positive
-    /// factor; `law` takes two sorted particles.
-    fn measure(
-        &mut self,
-        places: &Places,
-        with_stretch: bool,
-        block: &mut Block,
-        law: impl Fn(usize, usize) -> usize,
-        weigh: impl Fn(&mut Block),
-    ) {
-        let first = self.found.own.start;
-        let x = &places.x()[first..];
-        let PairList { start, pairs, tags, exact, stretch, .. } = &mut self.found.list;
-        exact.reserve(pairs.len());
-        // The row of the next pair, and the number of kept pairs.
-        let (mut i, mut kept) = (0, 0);
-        for from in (0..pairs.len()).step_by(BLOCK) {
-            let to = pairs.len().min(from + BLOCK);
-            let mut row = i;
-            for (n, pair) in pairs[from..to].iter().enumerate() {
-                while from + n >= start[row + 1] as usize {
-                    row += 1;
-                }
-                let j = pair.j as usize;
-                let (a, b) = (x[row], x[j]);
-                (0..3).for_each(|c| block.d[c][n] = a[c] - b[c]);
-                block.law[n] = law(first + row, first + j);
+/// Gathers the pairs in blocks, for which `weigh` computes factors, and keeps pairs with a positive
+/// factor; `position` and `law` take sorted particles.
+fn measure(
+    list: &mut PairList,
+    position: impl Fn(usize) -> [f64; 3],
+    with_stretch: bool,
+    block: &mut Block,
+    law: impl Fn(usize, usize) -> usize,
+    weigh: impl Fn(&mut Block),
+) {
+    let PairList { first, j_from, start, pairs, tags, exact, stretch, .. } = list;
+    exact.reserve(pairs.len());
+    stretch.clear();
+    // The row of the next pair, and the number of kept pairs.
+    let (mut i, mut kept) = (0, 0);
+    for from in (0..pairs.len()).step_by(BLOCK) {
+        let to = pairs.len().min(from + BLOCK);
+        let mut row = i;
+        for (n, pair) in pairs[from..to].iter().enumerate() {
+            while from + n >= start[row + 1] as usize {
+                row += 1;
             }
-            weigh(block);
-            let [x, y, z] = &block.d;
-            for k in from..to {
-                while k >= start[i + 1] as usize {
-                    start[i + 1] = kept as u32;
-                    i += 1;
-                }
-                let (n, pair) = (k - from, pairs[k]);
-                let factor = block.factor[n];
-                // The comparison removes pairs whose factor is NaN too.
-                let acts = factor > 0.0 && factor < f64::INFINITY;
-                if !acts {
-                    continue;
-                }
-                pairs[kept] = pair;
-                tags.iter_mut().for_each(|tags| tags[kept] = tags[k]);
-                kept += 1;
-                exact.push(ExactPair { g: [factor * x[n], factor * y[n], factor * z[n]], j: pair.j.into() });
-                if with_stretch {
-                    stretch.push(factor.recip());
-                }
+            let [i, j] = [*first + row, *j_from + pair.j as usize];
+            let (a, b) = (position(i), position(j));
+            (0..3).for_each(|c| block.d[c][n] = a[c] - b[c]);
+            block.law[n] = law(i, j);
+        }
+        weigh(block);
+        let [x, y, z] = &block.d;
+        for k in from..to {
+            while k >= start[i + 1] as usize {
+                start[i + 1] = kept as u32;
+                i += 1;
+            }
+            let (n, pair) = (k - from, pairs[k]);
+            let factor = block.factor[n];
+            // The comparison removes pairs whose factor is NaN too.
+            let acts = factor > 0.0 && factor < f64::INFINITY;
+            if !acts {
+                continue;
+            }
+            pairs[kept] = pair;
+            tags.iter_mut().for_each(|tags| tags[kept] = tags[k]);
+            kept += 1;
+            exact.push(ExactPair::new([factor * x[n], factor * y[n], factor * z[n]], pair.j));
+            if with_stretch {
+                stretch.push(factor.recip());
             }
         }
-        start[i + 1..].fill(kept as u32);
-        pairs.truncate(kept);
-        tags.iter_mut().for_each(|tags| tags.truncate(kept));
     }
+    if let Some(rest) = start.get_mut(i + 1..) {
+        rest.fill(kept as u32);
+    }
+    pairs.truncate(kept);
+    tags.iter_mut().for_each(|tags| tags.truncate(kept));
 }
 
 /// A block of pairs, as parallel arrays.
@@ -188,22 +197,24 @@ impl Loop for Weigh<'_> {
             // The array stores the distance until the factor replaces it.
             factor[n] = (x[n] * x[n] + y[n] * y[n] + z[n] * z[n]).sqrt();
         }
+        let least = laws.least;
+        let inside = |ratio: f64| if 1.0 - ratio > least { 1.0 - ratio } else { 0.0 };
         match &laws.exponent {
             Exponent::One => {
                 for n in 0..BLOCK {
-                    let t = (1.0 - factor[n] * inverse_range[n]).max(0.0);
+                    let t = inside(factor[n] * inverse_range[n]);
                     factor[n] = amplitude[n] * t / factor[n];
                 }
             }
             Exponent::Two => {
                 for n in 0..BLOCK {
-                    let t = (1.0 - factor[n] * inverse_range[n]).max(0.0);
+                    let t = inside(factor[n] * inverse_range[n]);
                     factor[n] = amplitude[n] * t * t / factor[n];
                 }
             }
             Exponent::Any(exponent) => {
                 for n in 0..BLOCK {
-                    let t = 1.0 - factor[n] * inverse_range[n];
+                    let t = inside(factor[n] * inverse_range[n]);
                     let w = if t > 0.0 { t.powf(exponent[law[n]]) } else { 0.0 };
                     factor[n] = amplitude[n] * w / factor[n];
                 }

@@ -24,7 +24,7 @@
 use super::PairThermostat;
 use super::particle_loops::{Advance, Finish, Multiply, Start};
 use super::pass::{Sums, Wide, add_to_host, virial};
-use super::progress::Progress;
+use super::solution::{Progress, Solution};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
@@ -69,15 +69,15 @@ impl PairThermostat {
         pool: &Pool,
         work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let PairThermostat { planes, set, inertia, inverse_mass, sums, residual, solution, .. } = self;
-        let Sums { p, of_plane } = sums;
-        let mut rest = [&mut p[..], residual, solution];
+        let PairThermostat { planes, set, masses, sums, solution, .. } = self;
+        let (Sums { p, of_plane }, Solution { change, residual, .. }) = (sums, solution);
+        let mut rest = [&mut p[..], residual, change];
         let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
             .zip(planes.iter())
             .map(|((image, below), plane)| {
-                let own = plane.found.own.clone();
+                let own = plane.own.clone();
                 let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
-                let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
+                let (inertia, inverse_mass) = (&masses.inertia[own.clone()], &masses.inverse[own]);
                 (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
             })
             .collect();
@@ -110,10 +110,10 @@ impl PairThermostat {
     /// Computes the first residual and direction from the velocities `v` of the host, and returns the
     /// square of the residual's norm. On several ranks all sums here are those of one rank.
     pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
-        let PairThermostat { planes, lists, set, sums, residual, solution, kt, progress, .. } = self;
+        let PairThermostat { planes, lists, set, sums, solution, kt, .. } = self;
         let tolerance = if noise { TOLERANCE } else { TOLERANCE_OF_DRAG };
-        *progress = Progress { tolerance, ..Progress::default() };
-        for vectors in [residual, solution] {
+        solution.progress = Progress { tolerance, ..Progress::default() };
+        for vectors in [&mut solution.residual, &mut solution.change] {
             vectors.resize(lists.order().len(), Wide::ZERO);
         }
         sums.gather(pool, lists.order(), v);
@@ -140,7 +140,7 @@ impl PairThermostat {
     /// With `α = r·M⁻¹r / p·Ap` the next residual has the norm `α² Ap·M⁻¹Ap − r·M⁻¹r`, as residuals are
     /// orthogonal: so one sum over ranks is enough for each iteration.
     pub(super) fn advance(&mut self, pool: &Pool, [first, curvature, square]: [f64; 3]) -> bool {
-        let progress = &mut self.progress;
+        let progress = &mut self.solution.progress;
         if progress.iterations == 0 {
             progress.drag = ((square / first).sqrt() - 1.0).max(1.0);
             let relative = (progress.tolerance / progress.drag).max(FINEST);
@@ -155,10 +155,10 @@ impl PairThermostat {
         if !goes_on {
             let inaccurate =
                 next.is_nan() || next > progress.enough || progress.tolerance < FINEST * progress.drag;
-            self.effort.add(progress.iterations, self.are_listed, inaccurate);
+            self.effort.add(progress.iterations, self.from_forces.are_present, inaccurate);
         }
-        let rest = if self.progress.drag < STRONG { 1.0 } else { 0.0 };
-        let is_first = self.progress.iterations == 1;
+        let rest = if self.solution.progress.drag < STRONG { 1.0 } else { 0.0 };
+        let is_first = self.solution.progress.iterations == 1;
         self.on_planes(pool, |Share { p, image, inverse_mass, residual, solution, .. }, set| {
             match goes_on {
                 true => {
@@ -183,7 +183,7 @@ impl PairThermostat {
 
     /// Adds `factor` times the solution to the velocities `v`.
     pub(super) fn add_solution(&self, pool: &Pool, factor: f64, v: &mut [[f64; 3]]) {
-        add_to_host(pool, self.lists.place(), &self.solution, factor, v);
+        add_to_host(pool, self.lists.place(), &self.solution.change, factor, v);
     }
 
     /// The virial of drag at the velocities `v`, and of noise.
@@ -192,6 +192,6 @@ impl PairThermostat {
         let noise = if noise { kt.sqrt() } else { 0.0 };
         sums.gather(pool, lists.order(), v);
         sums.close(planes);
-        virial(pool, planes, sums, lists.ghosts(), noise, 2.0 / *dt)
+        virial(pool, planes, sums, noise, 2.0 / *dt)
     }
 }

@@ -20,19 +20,20 @@
 
 mod bodies;
 mod effort;
+mod exchange;
 mod forces;
 mod listed;
+mod masses;
 mod measure;
 mod midpoint;
 mod of_forces;
 mod particle_loops;
 mod pass;
-mod planes;
-mod progress;
 mod pulls;
 mod rank;
-mod round;
 mod sequential;
+mod solution;
+mod weights;
 
 #[cfg(test)]
 mod tests;
@@ -46,16 +47,16 @@ use super::error::EngineError;
 use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
-use super::sweep::{MARGIN, PairLists, Places, Pool};
-use listed::Listed;
-use pass::{Sums, Wide};
-use planes::Plane;
-use progress::Progress;
+use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
+use exchange::Exchange;
+use listed::{FromForces, Listed};
+use masses::Masses;
+use pass::Sums;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
-use round::Round;
+use solution::Solution;
 
 /// The rule that changes velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,31 +85,19 @@ pub struct PairThermostat {
     dt: f64,
     set: InstructionSet,
     lists: PairLists,
-    planes: Vec<Plane>,
+    planes: Vec<PlanePairs>,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
-    places: Places,
-    /// Mass of each sorted particle, 0 where it is infinite, and its inverse.
-    inertia: Vec<f64>,
-    inverse_mass: Vec<f64>,
+    masses: Masses,
     sums: Sums,
-    /// Residual and solution of each sorted particle.
-    residual: Vec<Wide>,
-    solution: Vec<Wide>,
+    solution: Solution,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
     impulses: Vec<Vec<f64>>,
-    progress: Progress,
     effort: Effort,
     /// Whether distances are stored.
     wants_virial: bool,
-    /// The pairs that an engine has listed, for a search that follows.
-    listed: Option<Listed>,
-    /// Whether the present pairs are those.
-    are_listed: bool,
-    /// State of a solution in rounds with other ranks.
-    round: Round,
-    /// Squared norm of the first residual of this rank.
-    first: f64,
+    from_forces: FromForces,
+    exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
 }
@@ -133,20 +122,14 @@ impl PairThermostat {
             lists: PairLists::new(set, plan.dimensions()),
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
-            places: Places::default(),
-            inertia: Vec::new(),
-            inverse_mass: Vec::new(),
+            masses: Masses::default(),
             sums: Sums::default(),
-            residual: Vec::new(),
-            solution: Vec::new(),
+            solution: Solution::default(),
             impulses: Vec::new(),
-            progress: Progress::default(),
             effort: Effort::default(),
             wants_virial: false,
-            listed: None,
-            are_listed: false,
-            round: Round::default(),
-            first: 0.0,
+            from_forces: FromForces::default(),
+            exchange: Exchange::default(),
             noise: [PairNoise::default(); 2],
         })
     }
@@ -184,24 +167,15 @@ impl PairThermostat {
         virial: bool,
         mass: impl Fn(usize) -> f64 + Sync,
     ) -> Result<(), EngineError> {
-        (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
-        let listed = Listed { dt, virial, particles: particles.x.len() };
-        self.are_listed = self.listed.take().is_some_and(|there| there.serves(listed));
-        if !self.are_listed {
+        (self.dt, self.wants_virial, self.exchange) = (dt, virial, Exchange::default());
+        if !self.from_forces.serve(Listed { dt, virial, particles: particles.x.len() }) {
             let terms = self.terms(dt, virial);
             let range = [self.plan.longest, self.margin()];
             let PairThermostat { lists, planes, .. } = self;
             lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
-            if self.is_exact {
-                self.measure(pool, around.domain, particles, species_of_kind);
-            }
         }
-        let order = self.lists.order();
-        pass::fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
-        pass::fill(pool, &mut self.inertia, order, |k| {
-            let m = mass(k);
-            if m.is_finite() { m } else { 0.0 }
-        });
+        self.measure(pool, around.domain, particles, species_of_kind);
+        self.masses.sort(pool, self.lists.order(), mass);
         Ok(())
     }
 
@@ -212,15 +186,17 @@ impl PairThermostat {
 
     /// The pairs for a time `dt`, with or without their distances.
     fn terms(&self, dt: f64, virial: bool) -> ListTerms {
-        let with_stretch = virial && !self.is_exact;
-        ListTerms { tables: planes::weights(&self.plan, dt, self.margin()), with_stretch }
+        ListTerms::new(weights::weights(&self.plan, dt), self.margin(), virial)
     }
 
     /// Draws the noise of the pairs of the last search.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
-        pool.each(&mut self.planes, |plane| plane.draw(noise[0], law));
+        pool.each(&mut self.planes, |plane| {
+            plane.lists.own.draw(noise[0], law);
+            plane.lists.with_ghosts.draw(noise[0], law);
+        });
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
@@ -238,15 +214,15 @@ impl PairThermostat {
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let moving = self.inertia.iter().filter(|m| **m > 0.0).count();
+        let moving = self.masses.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
             for [i, j, k] in plane.pairs() {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
-                let g = plane.found.list.g(k);
+                let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let inverse = self.inverse_mass[i] + self.inverse_mass[j];
+                let inverse = self.masses.inverse[i] + self.masses.inverse[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     squares += along * along / inverse;
@@ -262,7 +238,7 @@ impl PairThermostat {
 
     /// Number of iterations of the last implicit update.
     pub fn iterations(&self) -> usize {
-        self.progress.iterations
+        self.solution.progress.iterations
     }
 
     /// Iterations of all implicit updates so far.
@@ -272,7 +248,7 @@ impl PairThermostat {
 
     /// Number of pairs in range.
     pub fn pairs(&self) -> usize {
-        self.planes.iter().map(|plane| plane.found.list.pairs.len()).sum()
+        self.planes.iter().map(|plane| plane.lists.own.count() + plane.lists.with_ghosts.count()).sum()
     }
 }
 

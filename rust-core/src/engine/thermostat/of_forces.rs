@@ -1,7 +1,7 @@
 //! The pairs that an evaluation of forces lists on its way, where the thermostat acts at the same positions.
 //!
 //! A host asks for them before the evaluation, and gives them to the thermostat before its search, which then takes
-//! them instead. It may do so always: the search finds the pairs itself if the evaluation was no sweep, in double precision,
+//! them instead. It may do so always: the search finds the pairs itself if the evaluation was no sweep,
 //! with drag and noise among the forces or with excluded pairs, or if it was asked for another time. Listed particles of a cell
 //! are in the order of the host's arrays, instead of that of their tags.
 
@@ -13,13 +13,13 @@ impl PairThermostat {
     /// Asks the next evaluation of `engine`, which computes the same fluid, to list the pairs for a time `dt`, if it can.
     pub fn ask(&mut self, engine: &mut Engine, dt: f64, virial: bool) {
         // No search has so many particles: it needs what `take` takes.
-        self.listed = Some(Listed { dt, virial, particles: usize::MAX });
+        self.from_forces.listed = Some(Listed { dt, virial, particles: usize::MAX });
         let terms = self.terms(dt, virial);
         let sweep = engine.sweep_mut();
         sweep.ask_for_pairs(Some(terms));
         // The memory of lists goes to and fro, so that there is one list of all pairs, not two.
-        if self.are_listed {
-            sweep.lend_lists(self.planes.iter_mut().map(|plane| std::mem::take(&mut plane.found.list)));
+        if self.from_forces.are_present {
+            sweep.lend_lists(&mut self.planes);
         }
     }
 
@@ -28,6 +28,7 @@ impl PairThermostat {
     pub fn take(&mut self, engine: &mut Engine) {
         let taken = engine.sweep_mut().take_pairs(&mut self.lists, &mut self.planes);
         let particles = self.lists.place().len();
-        self.listed = self.listed.filter(|_| taken).map(|listed| Listed { particles, ..listed });
+        self.from_forces.listed =
+            self.from_forces.listed.filter(|_| taken).map(|listed| Listed { particles, ..listed });
     }
 }

@@ -3,10 +3,9 @@
 //! Each plane adds to its own particles and to those of the next in a buffer of its own, so that the
 //! order of each sum is fixed, whichever thread computes it.
 
-use super::planes::Plane;
-use crate::engine::sweep::{Pool, part};
+use crate::engine::sweep::{PlanePairs, Pool, part};
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::pairs_of_each;
+use psidpd_passes::plane::list::{PairList, pairs_of_each};
 pub use psidpd_passes::plane::pair_sums::Wide;
 use psidpd_passes::plane::pair_sums::add_pairs;
 
@@ -29,24 +28,23 @@ impl Sums {
     }
 
     /// Copies the vectors of the first plane to the end, for the pairs of the last plane.
-    pub fn close(&mut self, planes: &[Plane]) {
+    pub fn close(&mut self, planes: &[PlanePairs]) {
         let Some(last) = planes.last() else { return };
-        self.p.truncate(last.found.own.end);
-        self.p.extend_from_within(last.found.next.clone());
+        self.p.truncate(last.own.end);
+        self.p.extend_from_within(last.next.clone());
     }
 
-    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[Plane], noise: f64) {
+    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[PlanePairs], noise: f64) {
         self.close(planes);
         let Sums { p, of_plane } = self;
         of_plane.resize_with(planes.len(), Vec::new);
         let mut work: Vec<_> = planes.iter().zip(of_plane).collect();
         let p = &p[..];
         pool.each(&mut work, |(plane, sums)| {
-            let Plane { found, xi, .. } = plane;
-            let count = found.own.len() + found.next.len();
-            sums.resize(count, Wide::ZERO);
-            // SAFETY: the pairs of a plane are those of its own particles with each other and with the next.
-            unsafe { add_pairs(set, &found.list, xi, noise, &p[found.own.start..][..count], sums) };
+            let PlanePairs { own, next, lists } = plane;
+            sums.resize(own.len() + next.len(), Wide::ZERO);
+            // SAFETY: the pairs of a plane are those of its own particles with each other, with the next and with ghosts.
+            unsafe { add_pairs(set, lists, noise, p, own.start, sums) };
         });
     }
 
@@ -54,13 +52,13 @@ impl Sums {
     /// below; the latter are empty if that has no pairs with them.
     pub fn halves<'a>(
         of_plane: &'a mut [Vec<Wide>],
-        planes: &[Plane],
+        planes: &[PlanePairs],
     ) -> impl Iterator<Item = (&'a mut [Wide], &'a [Wide])> {
         let (own, next): (Vec<_>, Vec<_>) = of_plane
             .iter_mut()
             .zip(planes)
             .map(|(sums, plane)| {
-                let (own, next) = sums.split_at_mut(plane.found.own.len());
+                let (own, next) = sums.split_at_mut(plane.own.len());
                 (own, &*next)
             })
             .unzip();
@@ -71,8 +69,8 @@ impl Sums {
     }
 
     /// The sums of the particles of a plane.
-    pub fn of(&self, planes: &[Plane], number: usize) -> impl Iterator<Item = Wide> {
-        let own = &self.of_plane[number][..planes[number].found.own.len()];
+    pub fn of(&self, planes: &[PlanePairs], number: usize) -> impl Iterator<Item = Wide> {
+        let own = &self.of_plane[number][..planes[number].own.len()];
         let below = below(planes, number).map_or(&[][..], |(below, count)| &self.of_plane[below][count..]);
         let zeros = std::iter::repeat(&Wide::ZERO);
         own.iter().zip(below.iter().chain(zeros)).map(|(a, b)| Wide([0, 1, 2, 3].map(|c| a[c] + b[c])))
@@ -80,39 +78,34 @@ impl Sums {
 }
 
 /// The plane below, and the number of its own particles, if it has pairs with the particles of a plane.
-fn below(planes: &[Plane], number: usize) -> Option<(usize, usize)> {
+fn below(planes: &[PlanePairs], number: usize) -> Option<(usize, usize)> {
     let below = match number {
         0 => planes.len() - 1,
         number => number - 1,
     };
-    let below_has = &planes[below].found;
-    (below_has.next == planes[number].found.own).then_some((below, below_has.own.len()))
+    let below_has = &planes[below];
+    (below_has.next == planes[number].own).then_some((below, below_has.own.len()))
 }
 
-impl Plane {
-    /// Virial `Σ r_ij ⊗ F_ij` of the opposite, `g (a ξ − g·(p_i − p_j))`: xx, yy, zz, xy, xz, yz; half of it for pairs with
-    /// a ghost. `ghosts` may be empty.
-    pub fn virial(&self, p: &[Wide], ghosts: &[bool], noise: f64) -> [f64; 6] {
-        let ghosts = ghosts.get(self.found.own.start..).unwrap_or_default();
-        let is_ghost = |k: usize| ghosts.get(k).is_some_and(|ghost| *ghost);
-        let p = &p[self.found.own.start..];
-        let mut virial = [0.0; 6];
-        if self.found.list.stretch.is_empty() {
-            return virial;
+/// Virial `Σ r_ij ⊗ F_ij` of the opposite, `g (a ξ − g·(p_i − p_j))`: xx, yy, zz, xy, xz, yz; half of it for pairs with
+/// ghosts.
+fn virial_of_plane(PlanePairs { own, lists, .. }: &PlanePairs, p: &[Wide], noise: f64) -> [f64; 6] {
+    let mut virial = [0.0; 6];
+    for (list, share) in [(&lists.own, 1.0), (&lists.with_ghosts, 0.5)] {
+        let PairList { start, stretch, xi, j_from, .. } = list;
+        if stretch.is_empty() {
+            continue;
         }
-        for (i, of_i) in pairs_of_each(&self.found.list.start) {
+        for (i, of_i) in pairs_of_each(start) {
             for k in of_i {
-                let pair = &self.found.list.pairs[k];
-                let (g, other) = (self.found.list.g(k), p[pair.j as usize]);
-                let along: f64 = (0..3).map(|c| (p[i][c] - other[c]) * g[c]).sum();
-                let xi = self.xi.get(k).map_or(0.0, |xi| f64::from(*xi));
-                let share = if is_ghost(i) || is_ghost(pair.j as usize) { 0.5 } else { 1.0 };
-                let stretch = share * self.found.list.stretch[k];
-                add_virial(&mut virial, g, (noise * xi - along) * stretch);
+                let (g, a, b) = (list.g(k), p[own.start + i], p[j_from + list.second(k)]);
+                let along: f64 = (0..3).map(|c| (a[c] - b[c]) * g[c]).sum();
+                let xi = xi.get(k).map_or(0.0, |xi| f64::from(*xi));
+                add_virial(&mut virial, g, (noise * xi - along) * share * stretch[k]);
             }
         }
-        virial
     }
+    virial
 }
 
 /// Adds `factor g ⊗ g` to a virial.
@@ -123,19 +116,9 @@ pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
 }
 
 /// The virial of all planes, in their order, times `factor`.
-pub fn virial(
-    pool: &Pool,
-    planes: &[Plane],
-    sums: &Sums,
-    ghosts: &[bool],
-    noise: f64,
-    factor: f64,
-) -> [f64; 6] {
-    if planes.iter().all(|plane| plane.found.list.stretch.is_empty()) {
-        return [0.0; 6];
-    }
+pub fn virial(pool: &Pool, planes: &[PlanePairs], sums: &Sums, noise: f64, factor: f64) -> [f64; 6] {
     let mut parts: Vec<_> = planes.iter().map(|plane| (plane, [0.0; 6])).collect();
-    pool.each(&mut parts, |(plane, virial)| *virial = plane.virial(&sums.p, ghosts, noise));
+    pool.each(&mut parts, |(plane, virial)| *virial = virial_of_plane(plane, &sums.p, noise));
     let mut sum = [0.0; 6];
     for (_, virial) in parts {
         (0..6).for_each(|c| sum[c] += factor * virial[c]);
@@ -168,6 +151,17 @@ pub fn fill<T: Copy + Default + Send>(
 
 /// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not left out.
 pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &mut [[f64; 3]]) {
+    each_of_host(pool, place, from, to, |to, from| (0..3).for_each(|c| to[c] += factor * from[c]));
+}
+
+/// Changes vectors in the order of the host by the sorted ones, for particles that are not left out.
+pub fn each_of_host(
+    pool: &Pool,
+    place: &[u32],
+    from: &[Wide],
+    to: &mut [[f64; 3]],
+    change: impl Fn(&mut [f64; 3], &Wide) + Sync,
+) {
     let (count, mut rest, threads) = (to.len(), to, pool.threads());
     let mut parts: Vec<_> = (0..threads)
         .map(|number| {
@@ -178,7 +172,7 @@ pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &
     pool.each(&mut parts, |(to, place)| {
         for (to, place) in to.iter_mut().zip(*place) {
             if let Some(from) = from.get(*place as usize) {
-                (0..3).for_each(|c| to[c] += factor * from[c]);
+                change(to, from);
             }
         }
     });

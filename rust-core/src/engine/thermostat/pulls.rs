@@ -39,7 +39,7 @@ impl PairThermostat {
         let mut pulls = Vec::new();
         let order = self.lists.order();
         for (number, plane) in self.planes.iter().enumerate() {
-            let list = &plane.found.list;
+            let list = &plane.lists.own;
             if list.stretch.is_empty() {
                 continue;
             }

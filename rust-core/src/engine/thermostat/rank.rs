@@ -5,14 +5,12 @@
 //! ranks, and the rule continues. All ranks decide by the same sums, so that they need the same.
 
 use super::PairThermostat;
-use super::pass::Wide;
-use super::planes::{Plane, second};
-use super::round::Round;
+use super::exchange::Round;
+use super::pass::{Wide, each_of_host};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
-use crate::engine::sweep::{PlanePairs, Pool};
-use psidpd_passes::plane::list::{PairList, pairs_of_each};
+use crate::engine::sweep::Pool;
 
 /// The particles of a rank, owned particles first, and their surroundings.
 #[derive(Debug, Clone, Copy)]
@@ -74,53 +72,8 @@ impl PairThermostat {
         // Ghosts are moved by their owners.
         let mass = |k: usize| mass.get(k).copied().unwrap_or(f64::INFINITY);
         self.find(pool, around, &particles, species_of_kind, dt, virial, mass)?;
-        if !self.is_exact {
-            self.agree_with_other_ranks(rank, dt);
-        }
+        self.exchange.owned = particles.owned;
         Ok(())
-    }
-
-    /// Computes vectors of pairs with a ghost as the other rank does: from coordinates that differ by a
-    /// period, instead of fractions of this rank's own region.
-    fn agree_with_other_ranks(&mut self, rank: &Rank, dt: f64) {
-        let PairThermostat { plan, lists, planes, .. } = self;
-        let (order, ghosts) = (lists.order(), lists.ghosts());
-        if ghosts.is_empty() {
-            return;
-        }
-        let Rank { around, particles, species_of_kind, .. } = *rank;
-        let species = plan.gamma.len().isqrt();
-        for Plane { found, .. } in planes {
-            let PlanePairs { own, next, list: PairList { start, pairs, stretch, .. } } = found;
-            if [&*own, next].iter().all(|range| !ghosts[(*range).clone()].contains(&true)) {
-                continue;
-            }
-            for (i, of_i) in pairs_of_each(start) {
-                let i = own.start + i;
-                for k in of_i {
-                    let pair = &mut pairs[k];
-                    let j = second(own, next, pair.j);
-                    if ghosts[i] == ghosts[j] {
-                        continue;
-                    }
-                    let of_host = [i, j].map(|k| order[k] as usize);
-                    let [a, b] = of_host.map(|k| species_of_kind[particles.kind[k] as usize] as usize);
-                    let law = a * species + b;
-                    let [x, y] = of_host.map(|k| particles.x[k]);
-                    let d = around.domain.minimum_image(x, y);
-                    let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
-                    let (t, exponent) = ((1.0 - r / plan.range[law]).max(0.0), plan.exponent[law]);
-                    let w = if exponent == 1.0 { t } else { t.powf(exponent) };
-                    let factor = (0.5 * dt * plan.gamma[law]).sqrt() * w / r;
-                    if factor > 0.0 && factor.is_finite() {
-                        pair.g = d.map(|d| (factor * d) as f32);
-                        if let Some(stretch) = stretch.get_mut(k) {
-                            *stretch = factor.recip();
-                        }
-                    }
-                }
-            }
-        }
     }
 
     /// Begins the midpoint rule for the pairs and noise of the last search. `vectors` are velocities of
@@ -130,8 +83,8 @@ impl PairThermostat {
     /// Fails if the number of vectors is not that of the particles.
     pub fn begin_midpoint(&mut self, pool: &Pool, vectors: &mut [[f64; 3]]) -> Result<Need, EngineError> {
         self.check(vectors)?;
-        self.first = self.begin(pool, vectors, true);
-        Ok(self.show_direction(vectors))
+        self.exchange.first = self.begin(pool, vectors, true);
+        Ok(self.show_direction(pool, vectors))
     }
 
     /// Continues with the result of the host's task: totals, or the `vectors` of ghosts. `v` are the
@@ -150,20 +103,20 @@ impl PairThermostat {
         if v.len() > vectors.len() {
             return Err(CHANGED);
         }
-        match self.round {
+        match self.exchange.round {
             Round::Start => Err(EngineError::Host("the thermostat must begin before it continues")),
             Round::Direction => {
                 self.take_ghosts(vectors);
-                self.round = Round::Curvature;
+                self.exchange.round = Round::Curvature;
                 let [curvature, square] = self.curvature(pool);
-                Ok(Need::Totals([self.first, curvature, square]))
+                Ok(Need::Totals([self.exchange.first, curvature, square]))
             }
             Round::Curvature => match self.advance(pool, totals) {
-                true => Ok(self.show_direction(vectors)),
+                true => Ok(self.show_direction(pool, vectors)),
                 false if self.wants_virial => {
                     vectors[..v.len()].copy_from_slice(v);
                     self.add_direction(pool, &mut vectors[..v.len()]);
-                    self.round = Round::Middle;
+                    self.exchange.round = Round::Middle;
                     Ok(Need::Ghosts)
                 }
                 false => Ok(self.end(pool, v, [0.0; 6])),
@@ -180,26 +133,24 @@ impl PairThermostat {
     }
 
     /// Asks for the direction of ghosts.
-    fn show_direction(&mut self, vectors: &mut [[f64; 3]]) -> Need {
-        for (p, k) in self.sums.p.iter().zip(self.lists.order()) {
-            vectors[*k as usize] = [p[0], p[1], p[2]];
-        }
-        self.round = Round::Direction;
+    fn show_direction(&mut self, pool: &Pool, vectors: &mut [[f64; 3]]) -> Need {
+        let owned = &mut vectors[..self.exchange.owned];
+        each_of_host(pool, self.lists.place(), &self.sums.p, owned, |to, p| *to = [p[0], p[1], p[2]]);
+        self.exchange.round = Round::Direction;
         Need::Ghosts
     }
 
     fn end(&mut self, pool: &Pool, v: &mut [[f64; 3]], virial: [f64; 6]) -> Need {
         self.add_solution(pool, 2.0, v);
-        self.round = Round::Start;
+        self.exchange.round = Round::Start;
         Need::Nothing(virial)
     }
 
     fn take_ghosts(&mut self, vectors: &[[f64; 3]]) {
-        let ghosts = self.lists.ghosts();
-        for ((p, k), ghost) in self.sums.p.iter_mut().zip(self.lists.order()).zip(ghosts) {
-            if *ghost {
-                let [x, y, z] = vectors[*k as usize];
-                *p = Wide([x, y, z, 0.0]);
+        for ([x, y, z], place) in vectors.iter().zip(self.lists.place()).skip(self.exchange.owned) {
+            // Particles that are left out have no place.
+            if let Some(p) = self.sums.p.get_mut(*place as usize) {
+                *p = Wide([*x, *y, *z, 0.0]);
             }
         }
     }

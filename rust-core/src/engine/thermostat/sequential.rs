@@ -9,8 +9,7 @@
 
 use super::PairThermostat;
 use super::pass::add_virial;
-use super::planes::Plane;
-use crate::engine::sweep::Pool;
+use crate::engine::sweep::{PlanePairs, Pool};
 use psidpd_passes::noise::Law;
 use psidpd_passes::plane::list::pairs_of_each;
 
@@ -64,10 +63,10 @@ pub fn lowe_andersen(pair: &Encounter) -> f64 {
 }
 
 /// Sets of planes that are updated at once, one set after the other: no two planes of a set are neighbours.
-fn sets(planes: &[Plane]) -> [Vec<usize>; 3] {
+fn sets(planes: &[PlanePairs]) -> [Vec<usize>; 3] {
     let count = planes.len();
     // The last plane has pairs with the first, which may be in the same set.
-    let closes = count % 2 == 1 && count > 1 && !planes[count - 1].found.next.is_empty();
+    let closes = count % 2 == 1 && count > 1 && !planes[count - 1].next.is_empty();
     let paired = count - usize::from(closes);
     let last = if closes { vec![count - 1] } else { Vec::new() };
     [(0..paired).step_by(2).collect(), (1..paired).step_by(2).collect(), last]
@@ -75,7 +74,7 @@ fn sets(planes: &[Plane]) -> [Vec<usize>; 3] {
 
 /// A plane during an update: its velocities and those of the next plane.
 struct Share<'a> {
-    plane: &'a Plane,
+    plane: &'a PlanePairs,
     own: &'a mut [[f64; 3]],
     next: &'a mut [[f64; 3]],
     /// Inverse masses.
@@ -112,9 +111,9 @@ impl PairThermostat {
         order: Order,
         draws: bool,
     ) -> [f64; 6] {
-        let PairThermostat { planes, lists, inverse_mass, kt, dt, noise, impulses, .. } = self;
+        let PairThermostat { planes, lists, masses, kt, dt, noise, impulses, .. } = self;
         impulses.resize_with(planes.len(), Vec::new);
-        let (planes, inverse_mass, kt) = (&planes[..], &inverse_mass[..], *kt);
+        let (planes, inverse_mass, kt) = (&planes[..], &masses.inverse[..], *kt);
         let reversed = order == Order::Reversed;
         let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
@@ -125,23 +124,23 @@ impl PairThermostat {
         for set in sets {
             let mut rest = &mut sorted[..];
             let mut slices: Vec<Option<&mut [[f64; 3]]>> =
-                planes.iter().map(|p| rest.split_off_mut(..p.found.own.len())).collect();
+                planes.iter().map(|p| rest.split_off_mut(..p.own.len())).collect();
             let mut records: Vec<Option<&mut Vec<f64>>> = impulses.iter_mut().map(Some).collect();
             let mut shares: Vec<Share> = Vec::with_capacity(set.len());
             for number in set {
                 let plane = &planes[number];
                 let above = if number + 1 < planes.len() { number + 1 } else { 0 };
                 let own = slices[number].take().unwrap_or_default();
-                let next = if plane.found.next.is_empty() { None } else { slices[above].take() };
+                let next = if plane.next.is_empty() { None } else { slices[above].take() };
                 let Some(impulses) = records[number].take() else { continue };
                 impulses.clear();
-                impulses.resize(plane.found.list.stretch.len(), 0.0);
+                impulses.resize(plane.lists.own.stretch.len(), 0.0);
                 shares.push(Share {
                     plane,
                     own,
                     next: next.unwrap_or_default(),
-                    of_own: &inverse_mass[plane.found.own.clone()],
-                    of_next: &inverse_mass[plane.found.next.clone()],
+                    of_own: &inverse_mass[plane.own.clone()],
+                    of_next: &inverse_mass[plane.next.clone()],
                     chances: Vec::new(),
                     virial: [0.0; 6],
                     impulses,
@@ -149,7 +148,7 @@ impl PairThermostat {
             }
             pool.each(&mut shares, |share| {
                 if draws {
-                    let [a, b] = &share.plane.found.list.tags;
+                    let [a, b] = &share.plane.lists.own.tags;
                     share.chances.resize(a.len(), 0.0);
                     noise[1].fill(Law::Uniform, a, b, &mut share.chances);
                 }
@@ -169,7 +168,7 @@ impl PairThermostat {
 impl Share<'_> {
     fn update(&mut self, kt: f64, reversed: bool, rule: impl Fn(&Encounter) -> f64) {
         let plane = self.plane;
-        let particles = pairs_of_each(&plane.found.list.start);
+        let particles = pairs_of_each(&plane.lists.own.start);
         let mut meet = |i, k| self.encounter(i, k, kt, &rule);
         match reversed {
             true => particles.rev().for_each(|(i, of_i)| of_i.rev().for_each(|k| meet(i, k))),
@@ -179,8 +178,8 @@ impl Share<'_> {
 
     #[inline(always)]
     fn encounter(&mut self, i: usize, k: usize, kt: f64, rule: &impl Fn(&Encounter) -> f64) {
-        let list = &self.plane.found.list;
-        let (j, g) = (list.pairs[k].j as usize, list.g(k));
+        let list = &self.plane.lists.own;
+        let (j, g) = (list.second(k), list.g(k));
         let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
         let (other, inverse) = match j < own {
             true => (self.own[j], self.of_own[j]),
@@ -204,7 +203,7 @@ impl Share<'_> {
             square,
             mu: 1.0 / sum,
             kt,
-            xi: f64::from(self.plane.xi[k]),
+            xi: f64::from(self.plane.lists.own.xi[k]),
             chance,
         };
         let impulse = rule(&encounter);
@@ -215,7 +214,7 @@ impl Share<'_> {
         for c in 0..3 {
             other[c] -= impulse * inverse[1] * g[c];
         }
-        if let Some(stretch) = self.plane.found.list.stretch.get(k) {
+        if let Some(stretch) = self.plane.lists.own.stretch.get(k) {
             add_virial(&mut self.virial, g, impulse * *stretch);
             self.impulses[k] = rule(&Encounter { xi: 0.0, ..encounter });
         }

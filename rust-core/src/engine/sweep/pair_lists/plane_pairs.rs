@@ -1,16 +1,16 @@
 //! The pairs of a plane of cells.
 
 use super::super::workspace::CellOrder;
-use psidpd_passes::plane::list::PairList;
+use psidpd_passes::plane::list::{Listed, pairs_of_each};
 use std::ops::Range;
 
-/// The pairs whose first particle is in one plane; the second is in the same plane or in the next.
+/// The pairs whose first particle is in one plane; the second is in the same plane or in the next, or a ghost of any plane.
 #[derive(Debug, Clone, Default)]
 pub struct PlanePairs {
     /// The sorted particles of this plane, and of the next one.
     pub own: Range<usize>,
     pub next: Range<usize>,
-    pub list: PairList,
+    pub lists: Listed,
 }
 
 impl PlanePairs {
@@ -22,10 +22,12 @@ impl PlanePairs {
         self.own = cells.particles_of(&(plane..plane + 1));
         self.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
     }
-}
 
-impl AsMut<PlanePairs> for PlanePairs {
-    fn as_mut(&mut self) -> &mut PlanePairs {
-        self
+    /// The sorted indices of the two particles of each pair without a ghost, and the index of the pair in its list.
+    pub fn pairs(&self) -> impl Iterator<Item = [usize; 3]> {
+        let PlanePairs { own, next, lists } = self;
+        let second = |j: usize| j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
+        pairs_of_each(&lists.own.start)
+            .flat_map(move |(i, of_i)| of_i.map(move |k| [own.start + i, second(lists.own.second(k)), k]))
     }
 }

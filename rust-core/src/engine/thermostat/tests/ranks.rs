@@ -171,8 +171,13 @@ fn ranks_do_what_one_does() {
                 assert!((a - b).abs() < rounding(&cloud) * (1.0 + v.len() as f64), "cloud {number}: {a} {b}");
             }
             if cloud.frozen.is_empty() {
-                for (p, q) in cloud.momentum(&found).into_iter().zip(cloud.momentum(&cloud.v)) {
-                    assert!((p - q).abs() < 1e-11 * v.len() as f64, "cloud {number}, {ranks} ranks: {p} {q}");
+                for after in [&found, &listed] {
+                    for (p, q) in cloud.momentum(after).into_iter().zip(cloud.momentum(&cloud.v)) {
+                        assert!(
+                            (p - q).abs() < 1e-11 * v.len() as f64,
+                            "cloud {number}, {ranks} ranks: {p} {q}"
+                        );
+                    }
                 }
             }
         }

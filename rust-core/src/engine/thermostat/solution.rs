@@ -1,4 +1,14 @@
-//! How far the solution of an implicit update has come.
+//! The approximate solution of an implicit update, and how far it has come.
+
+use super::pass::Wide;
+
+#[derive(Debug, Clone, Default)]
+pub struct Solution {
+    /// The change of velocity of each sorted particle.
+    pub change: Vec<Wide>,
+    pub residual: Vec<Wide>,
+    pub progress: Progress,
+}
 
 /// State of a solution; all ranks have the same.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
