@@ -136,10 +136,6 @@ impl Style {
         self.settings.threads.get()
     }
 
-    pub fn model(&self) -> &Model {
-        &self.model
-    }
-
     /// One unit of the model in units of LAMMPS.
     pub fn scale(&self) -> Scale {
         self.scale

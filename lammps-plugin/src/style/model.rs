@@ -6,7 +6,6 @@ use crate::units::Scale;
 use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
 };
-use std::path::Path;
 
 /// Coefficients of those types that have any, in the form that presets take.
 struct Members<T> {
@@ -45,22 +44,8 @@ fn name_of_type(index: usize) -> String {
 }
 
 impl Style {
-    /// Reads a model file for a simulation in LAMMPS's units `units`, in which kT is given. `names` has the
-    /// species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
-    pub fn from_file(
-        path: &str,
-        units: &str,
-        kt: f64,
-        names: &[String],
-        dimensions: usize,
-    ) -> Result<Style, StyleError> {
-        guard(|| {
-            let model = Model::open(Path::new(path)).map_err(|e| StyleError(e.to_string()))?;
-            Style::in_units(model, units, kt, names, dimensions)
-        })
-    }
-
-    /// Reads the text of a model file, as [`Style::from_file`]; `source` names the file in messages.
+    /// Reads the text of a model file for a simulation in LAMMPS's units `units`, in which kT is given; `source` is its path.
+    /// `names` has the species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
     pub fn from_text(
         source: &str,
         text: &str,
