@@ -92,9 +92,10 @@ void PairDPDPsi::coeff(int narg, char **arg)
   set_names({arg + 3, arg + narg});
   std::string trouble;
   try {
-    style.emplace(style_from_file(path, update->unit_style, kt(), names, domain->dimension));
-    source = std::string((*style)->model_name());
-    text = std::string((*style)->model_text());
+    const std::string read(read_model(path));
+    style_from_text(path, read, update->unit_style, kt(), names, domain->dimension);
+    source = path;
+    text = read;
   } catch (const std::exception &e) {
     trouble = e.what();
   }

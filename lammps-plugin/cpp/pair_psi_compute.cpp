@@ -280,7 +280,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   // Forces may not have needed all densities.
   tell_left_out(false);
   attempt([&] { psidpd::sum_densities(**style, atoms(atom->nlocal + atom->nghost)); });
-  const auto densities = (*style)->densities_of_owned();
+  const auto densities = (*style)->local_densities();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;
   columns = static_cast<int>(width);

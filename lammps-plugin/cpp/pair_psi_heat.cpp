@@ -36,7 +36,7 @@ void PairPsi::forward_vectors()
 void PairPsi::expect_heat(double time, bool wants_virial)
 {
   refresh();
-  attempt([&] { thermostat_expected(**style, time, wants_virial); });
+  attempt([&] { (*style)->expect_thermostat(time, wants_virial); });
 }
 
 void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial)
@@ -70,7 +70,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   times(1.0 / velocity);
   std::array<double, 6> w{};
   if (alone) {
-    w = attempt([&] { return thermostat_alone(fluid, v); });
+    w = attempt([&] { return fluid.act_alone(v); });
   } else {
     auto &vectors = exchange.vectors;
     vectors.resize(3 * static_cast<size_t>(all));

@@ -5,6 +5,7 @@ use crate::error::StyleError;
 use crate::style::{Style, guard};
 use crate::thermostat::Noise;
 use nalgebra::Matrix3;
+use psidpd_core::document::Document;
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Effort, Need};
 use psidpd_core::engine::{
@@ -140,13 +141,8 @@ mod ffi {
     extern "Rust" {
         type Style;
 
-        fn style_from_file(
-            path: &str,
-            units: &str,
-            kt: f64,
-            names: &Vec<String>,
-            dimensions: usize,
-        ) -> Result<Box<Style>>;
+        /// The text of a model file.
+        fn read_model(path: &str) -> Result<String>;
         fn style_from_text(
             source: &str,
             text: &str,
@@ -171,8 +167,6 @@ mod ffi {
         ) -> Result<Box<Style>>;
 
         fn set_temperature(self: &mut Style, kt: f64) -> Result<()>;
-        fn model_text(self: &Style) -> String;
-        fn model_name(self: &Style) -> String;
         fn description(self: &Style, search: &str, listed: bool, apart: bool) -> String;
         fn cutoff(self: &Style) -> f64;
         fn slope_width(self: &Style) -> usize;
@@ -234,7 +228,7 @@ mod ffi {
         /// Sums all densities at the positions of the last evaluation.
         fn sum_densities(style: &mut Style, atoms: &Atoms) -> Result<()>;
         /// Densities of owned particles, a row of [`variables`] for each.
-        fn densities_of_owned(self: &mut Style) -> &[f64];
+        fn local_densities(self: &mut Style) -> &[f64];
         /// ψ of owned particles.
         fn excess_of_owned(self: &mut Style) -> Result<&[f64]>;
         fn style_single(
@@ -256,7 +250,7 @@ mod ffi {
         fn find_masses(self: &Style, unit: f64, movers: &Movers, held: &[u8], masses: &mut [f64]);
 
         /// Announces that the thermostat will act for a time where the next forces are computed.
-        fn thermostat_expected(style: &mut Style, time: f64, virial: bool) -> Result<()>;
+        fn expect_thermostat(self: &mut Style, time: f64, virial: bool) -> Result<()>;
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
         /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
         fn thermostat_pairs(
@@ -268,7 +262,7 @@ mod ffi {
             heat: &Heat,
         ) -> Result<bool>;
         /// Changes the velocities of all atoms, and returns the virial.
-        fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6]>;
+        fn act_alone(self: &mut Style, v: &mut [f64]) -> Result<[f64; 6]>;
         /// Begins the thermostat on several ranks, with velocities of all atoms and ghosts.
         fn thermostat_begin(style: &mut Style, vectors: &mut [f64]) -> Result<Round>;
         fn thermostat_go_on(
@@ -285,10 +279,6 @@ mod ffi {
 
 pub use ffi::Movers;
 
-fn thermostat_expected(style: &mut Style, time: f64, virial: bool) -> Result<(), StyleError> {
-    style.expect_thermostat(time, virial)
-}
-
 fn thermostat_pairs(
     style: &mut Style,
     extent: &ffi::Extent,
@@ -302,10 +292,6 @@ fn thermostat_pairs(
     let domain = style.scale().domain(domain_of(extent)?);
     let around = Around { domain: &domain, images };
     style.find_thermostat_pairs(around, &particles_of(atoms), mass, time, virial, noise)
-}
-
-fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
-    style.act_alone(v)
 }
 
 fn effort(style: &mut Style) -> ffi::Effort {
@@ -335,15 +321,11 @@ fn thermostat_go_on(
     style.next_round(totals, vectors, v).map(round)
 }
 
-#[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.
-fn style_from_file(
-    path: &str,
-    units: &str,
-    kt: f64,
-    names: &Vec<String>,
-    dimensions: usize,
-) -> Result<Box<Style>, StyleError> {
-    Style::from_file(path, units, kt, names, dimensions).map(Box::new)
+pub fn read_model(path: &str) -> Result<String, StyleError> {
+    guard(|| {
+        let document = Document::open(path.as_ref()).map_err(|e| StyleError(e.to_string()))?;
+        Ok(document.source().text().to_owned())
+    })
 }
 
 #[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.
@@ -494,14 +476,6 @@ fn style_single(
 }
 
 impl Style {
-    fn model_text(&self) -> String {
-        self.model().source().text().to_owned()
-    }
-
-    fn model_name(&self) -> String {
-        self.model().source().name().to_owned()
-    }
-
     fn variables(&self) -> usize {
         let plan = self.engine().plan();
         plan.densities().count() * plan.species().len()
@@ -540,10 +514,6 @@ impl Style {
             self.engine_mut().fetch_slopes(all);
             Ok(())
         })
-    }
-
-    fn densities_of_owned(&mut self) -> &[f64] {
-        self.local_densities()
     }
 
     fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {

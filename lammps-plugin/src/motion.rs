@@ -63,12 +63,10 @@ impl Style {
         });
     }
 
-    /// Adds shifts to positions.
     pub fn shift(&self, shifts: &[f64], x: &mut [f64]) {
         self.each(x, |k, x| *x += shifts[k]);
     }
 
-    /// Copies numbers.
     pub fn copy(&self, from: &[f64], to: &mut [f64]) {
         self.each(to, |k, to| *to = from[k]);
     }

@@ -96,9 +96,6 @@ impl Style {
     }
 
     /// Changes the temperature, on which the model's expressions and the noise depend.
-    ///
-    /// # Errors
-    /// Fails if the model is not valid at this temperature.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
         guard(|| {
             self.kt = kt / self.scale.energy;
@@ -119,9 +116,6 @@ impl Style {
     }
 
     /// Sets the precision, mixed or double, and the number of threads, of which there are at most as many as processors.
-    ///
-    /// # Errors
-    /// Fails for zero or too many threads, and as [`Style::set_temperature`].
     pub fn configure(&mut self, mixed: bool, threads: usize) -> Result<(), StyleError> {
         guard(|| {
             let precision = if mixed { Precision::Mixed } else { Precision::Double };
@@ -140,10 +134,6 @@ impl Style {
     /// The number of threads that run.
     pub fn threads(&self) -> usize {
         self.settings.threads.get()
-    }
-
-    pub fn model(&self) -> &Model {
-        &self.model
     }
 
     /// One unit of the model in units of LAMMPS.
@@ -234,9 +224,6 @@ impl Style {
     }
 
     /// Adds to `f` all forces on particles in a box that this rank has all of; the box is in units of the model.
-    ///
-    /// # Errors
-    /// Fails as [`Engine::forces`].
     pub fn evaluate(
         &mut self,
         domain: &PeriodicBox,
@@ -252,9 +239,6 @@ impl Style {
 
     /// First half of an evaluation: adds to `f` all forces but those of the slopes of ghosts. With pairs that LAMMPS lists
     /// all forces are added in the second half. Boxes are in units of the model.
-    ///
-    /// # Errors
-    /// Fails as [`Engine::first`].
     pub fn densities(
         &mut self,
         surroundings: Surroundings,
@@ -279,9 +263,6 @@ impl Style {
     }
 
     /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
-    ///
-    /// # Errors
-    /// Fails as [`Engine::sum_densities`].
     pub fn sum_densities(&mut self, particles: &Particles) -> Result<(), StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
@@ -311,9 +292,6 @@ impl Style {
 
     /// Energy of a pair of the given types at a distance, and the force along it. A many-body force
     /// uses the slopes that the two particles had in the last evaluation.
-    ///
-    /// # Errors
-    /// Fails for a particle that was not in the last evaluation.
     pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
         guard(|| {
             let r = r / self.scale.length;
@@ -337,9 +315,6 @@ impl Style {
     }
 
     /// Second half of an evaluation: adds the rest of the forces to `f`.
-    ///
-    /// # Errors
-    /// Fails without a first half, and as [`Pending::finish`].
     pub fn forces(&mut self, request: &Request, f: &mut [f64]) -> Result<Tally, StyleError> {
         guard(|| {
             let Style { engine, pending, scale, converted, .. } = self;

@@ -19,9 +19,6 @@ pub struct Noise {
 impl Style {
     /// Announces that the thermostat will act for `dt` where the next forces are computed: these then list its pairs, if
     /// they can.
-    ///
-    /// # Errors
-    /// Fails for an internal error only.
     pub fn expect_thermostat(&mut self, dt: f64, virial: bool) -> Result<(), StyleError> {
         let dt = dt / self.scale().time;
         guard(|| {
@@ -35,10 +32,6 @@ impl Style {
     /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no
     /// thermostat. `mass` has the masses of owned atoms, infinite for atoms that keep their velocities.
     /// With `virial` pair distances are stored.
-    ///
-    /// # Errors
-    /// Fails as
-    /// [`find_pairs_of_rank`](psidpd_core::engine::thermostat::PairThermostat::find_pairs_of_rank).
     pub fn find_thermostat_pairs(
         &mut self,
         around: Around,
@@ -73,9 +66,6 @@ impl Style {
     }
 
     /// Changes the velocities of all atoms of the last search for pairs, on one rank alone; returns the virial.
-    ///
-    /// # Errors
-    /// Fails if a velocity is not finite.
     pub fn act_alone(&mut self, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
         guard(|| {
             let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok([0.0; 6]) };
@@ -87,9 +77,6 @@ impl Style {
     }
 
     /// Begins the update on several ranks; `vectors` are the velocities of all atoms and ghosts, which become directions.
-    ///
-    /// # Errors
-    /// Fails if the atoms are not those of the last search for pairs.
     pub fn begin_rounds(&mut self, vectors: &mut [f64]) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
@@ -98,9 +85,6 @@ impl Style {
     }
 
     /// Continues with what the last round asked for; the last round changes the velocities `v` of the rank's atoms.
-    ///
-    /// # Errors
-    /// Fails as [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on), and if a velocity is not finite.
     pub fn next_round(
         &mut self,
         totals: [f64; 3],

@@ -7,17 +7,11 @@ use pyo3::types::PyDict;
 
 /// Contiguous 64-bit floating-point numbers in C order. An array that already has this form is borrowed; all others are
 /// copied.
-///
-/// # Errors
-/// The function fails if `object` is not an array of real numbers.
 pub fn numbers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     as_array(object, name, "float64", "iuf", "real numbers")
 }
 
 /// Contiguous 32-bit integers in C order.
-///
-/// # Errors
-/// The function fails if `object` is not an array of whole numbers.
 pub fn integers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, i32>> {
     refuse_masked(object, name)?;
     let array = object.py().import("numpy")?.call_method1("asarray", (object,))?;

@@ -228,10 +228,6 @@ impl Engine {
     }
 }
 
-/// Makes the settings of an engine.
-///
-/// # Errors
-/// The function fails for an unknown precision and for an invalid number of threads.
 pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
     let known = Precision::ALL.iter().find(|(name, _)| *name == precision);
     let (_, precision) =
@@ -239,8 +235,6 @@ pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
     Ok(Settings { precision: *precision, threads: thread_count(threads)?, ..Settings::default() })
 }
 
-/// # Errors
-/// The function fails for zero threads and for more threads than are allowed.
 pub fn thread_count(threads: usize) -> PyResult<NonZeroUsize> {
     Pool::count(threads).map(at_once).map_err(|e| wrong(e.to_string()))
 }

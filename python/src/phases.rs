@@ -38,9 +38,6 @@ impl Row {
 }
 
 /// The phases of `model` at one temperature. Two species need a total density.
-///
-/// # Errors
-/// The function fails without a mean field, for more than two species, and for two species without a density.
 pub fn row(model: &Model, kt: f64, density: Option<f64>) -> PyResult<Row> {
     let theory = MeanField::new(&model.at(kt).map_err(exception)?).map_err(exception)?;
     let mut row = Row { values: vec![("kT", kt)], note: String::new() };
@@ -78,9 +75,6 @@ pub fn row(model: &Model, kt: f64, density: Option<f64>) -> PyResult<Row> {
 }
 
 /// Rows as a pandas DataFrame.
-///
-/// # Errors
-/// The function fails if pandas is not installed.
 pub fn frame<'py>(py: Python<'py>, rows: &[Row]) -> PyResult<Bound<'py, PyAny>> {
     let list = PyList::empty(py);
     for row in rows {

@@ -5,9 +5,6 @@ use crate::error::StyleError;
 
 impl Style {
     /// Evaluates later forces on the device of a name: `cpu`, `gpu` (the first) or `gpu:N`.
-    ///
-    /// # Errors
-    /// There is no such device, or it cannot compute this model, or this plugin was built without support for GPUs.
     pub fn use_device(&mut self, name: &str) -> Result<(), StyleError> {
         let number = match name.split_once(':') {
             None if name == "cpu" => {

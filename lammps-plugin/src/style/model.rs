@@ -6,7 +6,6 @@ use crate::units::Scale;
 use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
 };
-use std::path::Path;
 
 /// Coefficients of those types that have any, in the form that presets take.
 struct Members<T> {
@@ -45,28 +44,8 @@ fn name_of_type(index: usize) -> String {
 }
 
 impl Style {
-    /// Reads a model file for a simulation in LAMMPS's units `units`, in which kT is given. `names` has the
-    /// species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
-    ///
-    /// # Errors
-    /// Fails for any error in the file, and for wrong dimensions or names.
-    pub fn from_file(
-        path: &str,
-        units: &str,
-        kt: f64,
-        names: &[String],
-        dimensions: usize,
-    ) -> Result<Style, StyleError> {
-        guard(|| {
-            let model = Model::open(Path::new(path)).map_err(|e| StyleError(e.to_string()))?;
-            Style::in_units(model, units, kt, names, dimensions)
-        })
-    }
-
-    /// Reads the text of a model file, as [`Style::from_file`]; `source` names the file in messages.
-    ///
-    /// # Errors
-    /// Fails as [`Style::from_file`].
+    /// Reads the text of a model file for a simulation in LAMMPS's units `units`, in which kT is given; `source` is its path.
+    /// `names` has the species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
     pub fn from_text(
         source: &str,
         text: &str,
@@ -86,9 +65,6 @@ impl Style {
     ///
     /// With `masses`, one for each type, the force law is that of LAMMPS's `mdpd`, whose densities are weighed
     /// by them and which has no potential.
-    ///
-    /// # Errors
-    /// Fails for coefficients that define no valid model, or none with a potential.
     pub fn from_coefficients(
         kt: f64,
         pairs: &[Option<WarrenPair>],
@@ -121,9 +97,6 @@ impl Style {
     }
 
     /// Spline DPD; `pairs` is a table as for [`Style::from_coefficients`], in which pairs of types may be missing.
-    ///
-    /// # Errors
-    /// Fails for coefficients that define no valid model.
     pub fn from_spline_coefficients(
         kt: f64,
         pairs: &[Option<SplinePair>],

@@ -98,9 +98,6 @@ pub struct Found {
 }
 
 /// The GPUs of this machine, graphics cards first.
-///
-/// # Errors
-/// There are none, or the program was built without support for them.
 pub fn gpus() -> Result<Vec<Found>, DeviceError> {
     #[cfg(not(feature = "gpu"))]
     return Err(DeviceError::NotBuilt);

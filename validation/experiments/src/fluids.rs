@@ -73,7 +73,6 @@ pub const FORMULA: Subject = Subject {
 pub const SUBJECTS: [Subject; 3] = [MDPD, DPD, FORMULA];
 
 impl Subject {
-    /// The model.
     pub fn model(&self) -> Result<Model, ExperimentError> {
         Ok(Model::parse(self.name, self.text)?)
     }

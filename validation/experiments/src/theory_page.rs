@@ -24,7 +24,6 @@ pub struct Scope<'a> {
     pub doubts: Vec<String>,
 }
 
-/// The page.
 pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     let species = model.species().len();
     let mut sections = Vec::new();

@@ -118,7 +118,6 @@ impl DataFile {
     }
 
     /// Appends the periodic directions to the title in the notation of LAMMPS's command `boundary`. LAMMPS ignores the title.
-    #[must_use]
     pub fn with_boundary(mut self, periodic: [bool; 3]) -> DataFile {
         let words = periodic.map(|p| if p { "p" } else { "f" }).join(" ");
         self.title = format!("{}{BOUNDARY}{words}", self.title);

@@ -107,9 +107,6 @@ impl GsdFile {
     }
 
     /// Opens a file to continue it after its first `frames` frames, and removes the others.
-    ///
-    /// # Errors
-    /// The file cannot be read or written, was not written by [`GsdFile`], or has fewer frames.
     pub fn reopen(path: &Path, frames: u64) -> io::Result<GsdFile> {
         let wrong = |what: &str| io::Error::new(ErrorKind::InvalidData, what.to_owned());
         let file = File::options().read(true).write(true).open(path)?;
@@ -146,10 +143,6 @@ impl GsdFile {
     }
 
     /// Writes a frame, with the masses of its species. Particles keep their order. Unknown velocities are written as 0.
-    ///
-    /// # Errors
-    /// The file cannot be written; it has no room; the first edge of the box is not along x, or the second not in the plane
-    /// of x and y.
     pub fn write(&mut self, frame: &Frame, masses: &[f64]) -> io::Result<()> {
         let wrong = |what: &str| io::Error::new(ErrorKind::InvalidInput, what.to_owned());
         if self.frames == self.most {

@@ -21,9 +21,6 @@ pub enum Which {
 
 impl Configuration {
     /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file; the content tells the format.
-    ///
-    /// # Errors
-    /// The function fails if the file cannot be read, has another format or lacks the frame.
     pub fn open(path: &Path, which: Which) -> Result<Configuration, FormatError> {
         let number = match which {
             Which::Last => None,

@@ -55,10 +55,6 @@ pub struct Converted {
 /// Converts the script in a file, with the files that it includes. If `out` names a file, the new script is written
 /// there, and included files and data files beside it. Returns the paths of written files, and the new script with its
 /// remarks.
-///
-/// # Errors
-/// A file cannot be read or written, a result exists and `overwrite` is not set, or a data file has too few
-/// columns.
 pub fn files(
     old: &Path,
     law: Law,

@@ -70,9 +70,6 @@ impl Host {
 }
 
 /// Checks the installation in `venv`.
-///
-/// # Errors
-/// The installation is incomplete or has other versions, or a file is truncated.
 pub(super) fn installed(venv: &Path) -> Result<Host, LammpsError> {
     let none = || LammpsError::NotInstalled { path: venv.to_owned() };
     let stamp = fs::read_to_string(venv.join(STAMP)).map_err(|_| none())?;

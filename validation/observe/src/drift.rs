@@ -25,11 +25,6 @@ pub struct Drift {
 ///
 /// The autocorrelation time of the residuals counts samples, so the error of
 /// the slope holds for times that are about evenly spaced.
-///
-/// # Errors
-///
-/// The function fails for slices of different lengths, for times that do not increase, and for every series that
-/// [`estimate`] refuses.
 pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, ObserveError> {
     if times.len() != values.len() {
         return Err(ObserveError::Times { times: times.len(), values: values.len() });

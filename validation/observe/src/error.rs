@@ -12,20 +12,8 @@ pub enum ObserveError {
     Times { times: usize, values: usize },
     #[error("time {index} is not a finite number later than the previous one")]
     Time { index: usize },
-    #[error("the pressure components differ in length: {xx} xx, {yy} yy, {zz} zz")]
-    Pressures { xx: usize, yy: usize, zz: usize },
-    #[error("the box length {0} along z is not a positive number")]
-    BoxLength(f64),
-    #[error("box length {length} and area {area} must be positive numbers")]
-    Box { length: f64, area: f64 },
-    #[error("{found} bins; a profile has between 1 and {most}")]
-    Bins { found: usize, most: usize },
-    #[error("coordinate {index} of the frame is not a finite number")]
-    Coordinate { index: usize },
-    #[error("the frame has no slab to be centred on")]
+    #[error("the frame has no slab to be centred on, or a coordinate that is not finite")]
     NoSlab,
-    #[error("no frames")]
-    NoFrames,
     /// Bytes that are not the output of [`Observers::to_bytes`](super::Observers::to_bytes).
     #[error(transparent)]
     Bytes(#[from] postcard::Error),

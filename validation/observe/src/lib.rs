@@ -21,7 +21,6 @@ pub mod profile;
 pub mod request;
 pub mod series;
 pub mod statistics;
-pub mod surface_tension;
 pub mod young_laplace;
 
 pub use drift::{Drift, drift};
@@ -33,7 +32,6 @@ pub use profile::{DensityProfile, ProfileAccumulator, interface_width};
 pub use request::{Observe, Request, read};
 pub use series::{Measured, Series};
 pub use statistics::{Comparison, Estimate, difference, estimate, threshold};
-pub use surface_tension::tension_series;
 
 #[cfg(test)]
 mod tests {

@@ -74,13 +74,11 @@ impl Observation {
         Observation { name: name.into(), title: title.into(), kind, ..Observation::default() }
     }
 
-    #[must_use]
     pub fn against(mut self, name: &str, unit: &str, values: Vec<f64>) -> Observation {
         self.x = Some(Abscissa { name: name.into(), unit: unit.into(), values });
         self
     }
 
-    #[must_use]
     pub fn column(
         mut self,
         name: &str,
@@ -93,18 +91,15 @@ impl Observation {
     }
 
     /// Adds a column of exact values.
-    #[must_use]
     pub fn exact(self, name: &str, unit: &str, values: impl IntoIterator<Item = f64>) -> Observation {
         self.column(name, unit, values.into_iter().map(|value| Measured { value, error: 0.0 }))
     }
 
-    #[must_use]
     pub fn samples(mut self, samples: u64) -> Observation {
         self.samples = samples;
         self
     }
 
-    #[must_use]
     pub fn note(mut self, text: impl AsRef<str>) -> Observation {
         if !self.note.is_empty() && !text.as_ref().is_empty() {
             self.note.push(' ');

@@ -130,9 +130,6 @@ impl Observers {
     }
 
     /// Reads the output of [`Observers::to_bytes`]. `self` must request the same observables and have no samples.
-    ///
-    /// # Errors
-    /// The function fails for other bytes and for bytes of other observables.
     pub fn restore(&self, bytes: &[u8]) -> Result<Observers, ObserveError> {
         let restored: Observers = postcard::from_bytes(bytes)?;
         let mut forgetful = restored.observers.clone();

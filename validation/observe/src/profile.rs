@@ -2,15 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use serde::Serialize;
-
 use super::edges::{Edges, edges};
 use super::error::ObserveError;
-use super::statistics::{MINIMUM_SAMPLES, estimate};
 use crate::least_squares::least_squares;
-
-/// The largest number of bins of a profile.
-pub const MAXIMUM_BINS: usize = 1 << 20;
 
 /// If the mean of the unit vectors exp(2πi z/L) is shorter than this, it has no direction.
 const LEAST_RESULTANT: f64 = 1e-10;
@@ -18,155 +12,97 @@ const LEAST_RESULTANT: f64 = 1e-10;
 /// The smallest number of bins to which a flank is fitted.
 const FLANK_BINS: usize = 6;
 
-/// Collects histograms of particle positions across a slab. Each frame is centred on its own slab so that drift does not
-/// smear the profile.
+/// Moves fractions of a period so that the circular mean (1/2π) arg Σ exp(2πi s) of those that count is ½; false if they have
+/// none. Unlike the plain mean it does not depend on where the boundary cuts the slab.
+pub fn centre(fractions: &mut [f64], counts: impl Fn(usize) -> bool) -> bool {
+    let (mut sine, mut cosine, mut count) = (0.0, 0.0, 0.0);
+    for (_, s) in fractions.iter().enumerate().filter(|(k, _)| counts(*k)) {
+        let (a, b) = (TAU * s).sin_cos();
+        sine += a;
+        cosine += b;
+        count += 1.0;
+    }
+    // A species without particles has no centre either.
+    let has_centre = f64::hypot(sine, cosine) > LEAST_RESULTANT * count;
+    if has_centre {
+        let centre = sine.atan2(cosine) / TAU;
+        fractions.iter_mut().for_each(|s| *s += 0.5 - centre);
+    }
+    has_centre
+}
+
+/// Histograms of particle positions across a slab, in a periodic box of `length` (r_c) along z and cross-section `area` (r_c²).
+/// Each frame is centred on its own slab so that drift does not smear the profile.
 #[derive(Debug, Clone)]
 pub struct ProfileAccumulator {
     length: f64,
     bins: usize,
     area: f64,
-    frames: Vec<Vec<u32>>,
+    frames: Vec<Vec<f64>>,
 }
 
 /// The number density against the distance from the centre of the slab.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DensityProfile {
     /// The middle of each bin from the centre of the slab, in (−L/2, L/2), increasing and evenly spaced; a length (r_c).
     pub centres: Vec<f64>,
     /// The mean of n/(A h) over the frames for n particles in the bin of height h; number per volume (r_c⁻³).
     pub density: Vec<f64>,
-    /// One standard deviation of `density` (r_c⁻³); 0 in a bin whose count never changed.
-    pub error: Vec<f64>,
 }
 
 impl ProfileAccumulator {
-    /// An accumulator for a periodic box of `length` (r_c) along z and cross-section `area` (r_c²), divided into `bins` of
-    /// height h = length/bins.
-    ///
-    /// # Errors
-    ///
-    /// The function fails for a length or area that is not a positive number, for no bins, and for more than
-    /// [`MAXIMUM_BINS`].
-    pub fn new(length: f64, bins: usize, area: f64) -> Result<Self, ObserveError> {
-        let positive = |x: f64| x.is_finite() && x > 0.0;
-        if !(positive(length) && positive(area) && positive(length * area)) {
-            return Err(ObserveError::Box { length, area });
-        }
-        if bins == 0 || bins > MAXIMUM_BINS {
-            return Err(ObserveError::Bins { found: bins, most: MAXIMUM_BINS });
-        }
-        Ok(Self { length, bins, area, frames: Vec::new() })
+    pub fn new(length: f64, bins: usize, area: f64) -> Self {
+        Self { length, bins, area, frames: Vec::new() }
     }
 
-    /// Adds a frame: the `z` (r_c) of all its particles, wrapped or unwrapped.
-    ///
-    /// The centre is the circular mean c = (L/2π) arg Σ exp(2πi z/L). Unlike the plain mean it does not depend on where the
-    /// boundary cuts the slab.
-    ///
-    /// # Errors
-    ///
-    /// The function fails for a coordinate that is not finite, and for particles without a centre. Then the frame is left out.
+    /// Adds a frame: the `z` (r_c) of all its particles, wrapped or unwrapped. A frame without a centre is left out.
     pub fn add(&mut self, z: &[f64]) -> Result<(), ObserveError> {
-        if let Some(index) = z.iter().position(|z| !z.is_finite()) {
-            return Err(ObserveError::Coordinate { index });
-        }
-        let (mut sine, mut cosine) = (0.0, 0.0);
-        for z in z {
-            let (s, c) = (TAU * (z / self.length).fract()).sin_cos();
-            sine += s;
-            cosine += c;
-        }
-        if z.is_empty() || f64::hypot(sine, cosine) / (z.len() as f64) < LEAST_RESULTANT {
+        let mut fractions: Vec<f64> = z.iter().map(|z| (z / self.length).fract()).collect();
+        if !centre(&mut fractions, |_| true) {
             return Err(ObserveError::NoSlab);
         }
-        let centre = sine.atan2(cosine) / TAU;
-        let mut counts = vec![0_u32; self.bins];
-        for z in z {
-            // Fraction of the box, the centre at one half.
-            let place = ((z / self.length).fract() - centre + 0.5).rem_euclid(1.0);
-            let bin = ((place * self.bins as f64) as usize).min(self.bins - 1);
-            counts[bin] = counts[bin].saturating_add(1);
+        let mut counts = vec![0.0; self.bins];
+        for s in fractions {
+            counts[((s.rem_euclid(1.0) * self.bins as f64) as usize).min(self.bins - 1)] += 1.0;
         }
         self.frames.push(counts);
         Ok(())
     }
 
-    #[must_use]
-    pub fn frames(&self) -> usize {
-        self.frames.len()
+    fn height(&self) -> f64 {
+        self.length / self.bins as f64
     }
 
-    /// The mean profile with error bars.
-    ///
-    /// The error of a bin is that of [`estimate`] over the frames. For fewer frames than [`estimate`] accepts it is the plain
-    /// standard error s/√M; for one frame it is Poisson's √n/(A h).
-    ///
-    /// # Errors
-    ///
-    /// The function fails without frames, and for densities too large to be averaged.
-    pub fn finish(&self) -> Result<DensityProfile, ObserveError> {
-        if self.frames.is_empty() {
-            return Err(ObserveError::NoFrames);
-        }
-        let height = self.length / self.bins as f64;
-        let volume = self.area * height;
-        let mut profile = DensityProfile {
-            centres: Vec::with_capacity(self.bins),
-            density: Vec::with_capacity(self.bins),
-            error: Vec::with_capacity(self.bins),
-        };
-        for bin in 0..self.bins {
-            let counts: Vec<f64> = self.frames.iter().map(|f| f64::from(f[bin])).collect();
-            let (mean, error) = mean_and_error(&counts)?;
-            let middle = bin as f64 + 0.5 - 0.5 * self.bins as f64;
-            profile.centres.push(middle * height);
-            profile.density.push(mean / volume);
-            profile.error.push(error / volume);
-        }
-        Ok(profile)
+    /// The lower end of a bin, from the centre of the slab.
+    fn low(&self, bin: usize) -> f64 {
+        bin as f64 * self.height() - 0.5 * self.length
     }
 
-    /// The number density (r_c⁻³) of each frame within `half_width` (r_c) of the centre of the slab,
-    /// N(|z| < half_width) / (2 A half_width).
-    ///
-    /// A bin that the limit cuts counts in proportion. A `half_width` above L/2 counts as L/2; one that is not positive gives
-    /// no densities.
-    #[must_use]
+    /// The mean profile.
+    pub fn finish(&self) -> DensityProfile {
+        let volume = self.area * self.height() * self.frames.len() as f64;
+        let density = |bin: usize| self.frames.iter().map(|counts| counts[bin]).sum::<f64>() / volume;
+        DensityProfile {
+            centres: (0..self.bins).map(|bin| self.low(bin) + 0.5 * self.height()).collect(),
+            density: (0..self.bins).map(density).collect(),
+        }
+    }
+
+    /// The number density (r_c⁻³) of each frame within `half_width` (r_c), at most L/2, of the centre of the slab. A bin that the
+    /// limit cuts counts in proportion.
     pub fn liquid_density(&self, half_width: f64) -> Vec<f64> {
-        if half_width.is_nan() || half_width <= 0.0 {
-            return Vec::new();
-        }
-        let limit = half_width.min(0.5 * self.length);
-        let height = self.length / self.bins as f64;
-        let weights: Vec<f64> = (0..self.bins)
-            .map(|bin| {
-                let low = bin as f64 * height - 0.5 * self.length;
-                let high = low + height;
-                (high.min(limit) - low.max(-limit)).max(0.0) / height
-            })
-            .collect();
+        let height = self.height();
+        let inside = |bin: usize| {
+            let low = self.low(bin);
+            ((low + height).min(half_width) - low.max(-half_width)).max(0.0) / height
+        };
+        let weights: Vec<f64> = (0..self.bins).map(inside).collect();
         // The sum of the weights has the same rounding as the counts; the limits do not.
         let volume = self.area * height * weights.iter().sum::<f64>();
-        self.frames
-            .iter()
-            .map(|counts| {
-                let pairs = counts.iter().zip(&weights);
-                pairs.map(|(&n, w)| f64::from(n) * w).sum::<f64>() / volume
-            })
-            .collect()
+        let density =
+            |counts: &Vec<f64>| counts.iter().zip(&weights).map(|(n, w)| n * w).sum::<f64>() / volume;
+        self.frames.iter().map(density).collect()
     }
-}
-
-fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), ObserveError> {
-    let frames = counts.len() as f64;
-    if counts.len() >= MINIMUM_SAMPLES {
-        let e = estimate(counts)?;
-        return Ok((e.mean, e.error));
-    }
-    let mean = counts.iter().sum::<f64>() / frames;
-    let squares: f64 = counts.iter().map(|n| (n - mean) * (n - mean)).sum();
-    let error = if counts.len() > 1 { (squares / (frames * (frames - 1.0))).sqrt() } else { mean.sqrt() };
-    Ok((mean, error))
 }
 
 /// The width of the interfaces (r_c) by Warren's definition (eq. 19), w = (ρ_L − ρ_V) / max|dρ/dz|; the mean over the two
@@ -183,7 +119,6 @@ fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), ObserveError> {
 ///
 /// The result is `None` if the profile is not that of a slab centred on 0: fewer than six bins in a flank, values that are
 /// not finite, no contrast of density, and interfaces beyond the flank, as wide as the flank, or narrower than one bin.
-#[must_use]
 pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
     Some(interface(profile)?.width)
 }
@@ -200,7 +135,6 @@ pub struct Interface {
 }
 
 /// The fit of [`interface_width`], as the mean of both flanks; `None` under the same conditions.
-#[must_use]
 pub fn interface(profile: &DensityProfile) -> Option<Interface> {
     let [a, b] = flanks(profile)?.map(|(points, height)| flank_interface(&points, height));
     let (a, b) = (a?, b?);
@@ -213,7 +147,6 @@ pub fn interface(profile: &DensityProfile) -> Option<Interface> {
 }
 
 /// The edges of both flanks without a fitted curve, as the mean of both; see [`edges`].
-#[must_use]
 pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
     let [a, b] = flanks(profile)?.map(|(points, height)| edges(&points, height));
     let (a, b) = (a?, b?);
@@ -325,6 +258,7 @@ fn ln_cosh(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::estimate;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 
     const LENGTH: f64 = 20.0;
@@ -345,7 +279,7 @@ mod tests {
 
     fn drifting(frames: usize) -> ProfileAccumulator {
         let mut rng = StdRng::seed_from_u64(24);
-        let mut accumulator = ProfileAccumulator::new(LENGTH, 100, AREA).unwrap();
+        let mut accumulator = ProfileAccumulator::new(LENGTH, 100, AREA);
         for frame in 0..frames {
             // The centre crosses the boundary several times.
             let centre = 0.37 * frame as f64;
@@ -361,7 +295,7 @@ mod tests {
         let liquid = estimate(&accumulator.liquid_density(2.5)).unwrap();
         assert!((liquid.mean - 6.0).abs() < 5.0 * liquid.error, "{liquid:?}");
         assert!(liquid.error < 0.03);
-        let profile = accumulator.finish().unwrap();
+        let profile = accumulator.finish();
         let mean = profile.density.iter().sum::<f64>() / 100.0;
         let particles = accumulator.liquid_density(LENGTH);
         let expected = particles.iter().sum::<f64>() / 200.0;
@@ -384,7 +318,7 @@ mod tests {
                     fine.sum::<f64>() / 100.0
                 })
                 .collect();
-            let profile = DensityProfile { error: vec![0.0; centres.len()], centres, density };
+            let profile = DensityProfile { centres, density };
             let width = interface_width(&profile).unwrap();
             assert!((width - 1.4).abs() < 1e-3, "{bins}: {width}");
         }
@@ -397,21 +331,10 @@ mod tests {
         let centres: Vec<f64> = (0..200).map(|i| (f64::from(i) + 0.5) * height - 10.0).collect();
         let rho = |z: f64| (6.0 * ((6.5 - z.abs()) / 3.0).clamp(0.0, 1.0)).powf(1.2);
         let density = centres.iter().map(|z| rho(*z)).collect();
-        let profile = DensityProfile { error: Vec::new(), centres, density };
+        let profile = DensityProfile { centres, density };
         let found = interface(&profile).unwrap();
         assert!(found.vapour >= 0.0 && found.liquid > 0.0, "{found:?}");
         assert!(slab_edges(&profile).unwrap().vapour >= 0.0);
-    }
-
-    #[test]
-    fn few_frames_still_have_errors() {
-        for frames in [1, 3] {
-            let profile = drifting(frames).finish().unwrap();
-            let middle = profile.error[50];
-            // Poisson statistics of 30 particles per bin.
-            let exact = (6.0 / 5.0 / frames as f64).sqrt();
-            assert!(middle > 0.05 * exact && middle < 3.0 * exact, "{middle}");
-        }
     }
 
     #[test]
@@ -419,7 +342,6 @@ mod tests {
         let flat = |rho: f64| DensityProfile {
             centres: (0..40).map(|i| f64::from(i) - 19.5).collect(),
             density: vec![rho; 40],
-            error: vec![0.0; 40],
         };
         for rho in [0.0, 3.0, f64::NAN] {
             assert_eq!(interface_width(&flat(rho)), None);
@@ -435,21 +357,13 @@ mod tests {
 
     #[test]
     fn bad_input_is_refused() {
-        assert!(ProfileAccumulator::new(0.0, 10, 1.0).is_err());
-        assert!(ProfileAccumulator::new(1.0, 10, f64::NAN).is_err());
-        assert_eq!(
-            ProfileAccumulator::new(1.0, 0, 1.0).err(),
-            Some(ObserveError::Bins { found: 0, most: MAXIMUM_BINS })
-        );
-        let mut accumulator = ProfileAccumulator::new(4.0, 8, 1.0).unwrap();
-        assert_eq!(accumulator.finish(), Err(ObserveError::NoFrames));
+        let mut accumulator = ProfileAccumulator::new(4.0, 8, 1.0);
+        assert_eq!(interface_width(&accumulator.finish()), None);
         assert_eq!(accumulator.add(&[]), Err(ObserveError::NoSlab));
         assert_eq!(accumulator.add(&[0.0, 2.0]), Err(ObserveError::NoSlab));
-        assert_eq!(accumulator.add(&[0.0, f64::INFINITY]), Err(ObserveError::Coordinate { index: 1 }));
-        assert_eq!(accumulator.frames(), 0);
+        assert_eq!(accumulator.add(&[0.0, f64::INFINITY]), Err(ObserveError::NoSlab));
+        assert!(accumulator.frames.is_empty());
         accumulator.add(&[1e300, -1e300, 0.3, 0.4]).unwrap();
-        assert!(accumulator.liquid_density(0.0).is_empty());
-        assert!(accumulator.liquid_density(f64::NAN).is_empty());
         assert_eq!(accumulator.liquid_density(9.0), vec![1.0]);
     }
 
@@ -466,15 +380,14 @@ mod tests {
             let even = (0..bins).map(|i| i as f64 - 0.5 * (bins as f64 - 1.0)).collect();
             for centres in [centres, even] {
                 let density = density[..bins].to_vec();
-                let _ = interface_width(&DensityProfile { centres, density, error: Vec::new() });
+                let _ = interface_width(&DensityProfile { centres, density });
             }
-            if let Ok(mut accumulator) = ProfileAccumulator::new(length, bins, 1.0) {
-                for _ in 0..9 {
-                    let _ = accumulator.add(&z);
-                }
-                let _ = accumulator.finish().map(|p| interface_width(&p));
-                let _ = accumulator.liquid_density(cut);
+            let mut accumulator = ProfileAccumulator::new(length, bins, 1.0);
+            for _ in 0..9 {
+                let _ = accumulator.add(&z);
             }
+            let _ = interface_width(&accumulator.finish());
+            let _ = accumulator.liquid_density(cut);
         }
     }
 }

@@ -25,10 +25,6 @@ pub struct Request {
 
 /// Reads `[observe]`. `slab` is the normal of the slab in the initial state; `drive` is the body force of two opposite
 /// flows, if the scene has one.
-///
-/// # Errors
-/// The function fails for unknown keys, for values out of their domain, and for observables that are not defined for the
-/// model or the box.
 pub fn read(
     root: &Section,
     model: &Model,

@@ -1,6 +1,6 @@
 //! Series of vectors in bounded memory, with error bars for functions of their means.
 
-use super::statistics::{MINIMUM_SAMPLES, estimate};
+use super::statistics::estimate;
 use serde::{Deserialize, Serialize};
 
 /// The largest number of rows in a [`Series`], an even number.
@@ -20,21 +20,24 @@ impl Measured {
     /// An unknown value.
     pub const NONE: Measured = Measured { value: f64::NAN, error: f64::NAN };
 
-    /// The mean of a correlated series with the error of [`estimate`]. For fewer samples than [`estimate`] accepts the error is
-    /// the plain standard error s/√M; for one sample it is unknown.
+    /// The mean of a correlated series with the error of [`estimate`], or of fewer samples than that accepts as if they were
+    /// independent.
     pub fn mean(values: &[f64]) -> Measured {
-        if let Ok(e) = estimate(values) {
-            return Measured { value: e.mean, error: e.error };
+        match estimate(values) {
+            Ok(e) => Measured { value: e.mean, error: e.error },
+            Err(_) => Measured::of_independent(values),
         }
+    }
+
+    /// The mean of independent values with its standard error s/√M; for one value the error is unknown.
+    pub fn of_independent(values: &[f64]) -> Measured {
         let count = values.len() as f64;
         let value = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|x| (x - value) * (x - value)).sum();
-        let plain = (2..MINIMUM_SAMPLES).contains(&values.len());
-        Measured { value, error: if plain { (squares / (count * (count - 1.0))).sqrt() } else { f64::NAN } }
+        Measured { value, error: (squares / (count * (count - 1.0))).sqrt() }
     }
 
     /// Multiplies value and error by a factor.
-    #[must_use]
     pub fn times(self, factor: f64) -> Measured {
         Measured { value: self.value * factor, error: self.error * factor.abs() }
     }

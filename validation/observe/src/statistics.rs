@@ -35,7 +35,6 @@ pub struct Estimate {
 
 impl Estimate {
     /// The number of independent samples behind the error, N / 2τ or N (dimensionless).
-    #[must_use]
     pub fn effective(&self) -> f64 {
         self.samples as f64 / (2.0 * self.tau).max(1.0)
     }
@@ -56,11 +55,6 @@ impl Estimate {
 /// is averaged over fits to the samples and to blocks of 2, 4, 8 and 16 samples, as long as there are 24 blocks.
 ///
 /// No estimate detects a correlation time that exceeds the length of the series. No error is below s/N.
-///
-/// # Errors
-///
-/// The function fails for fewer than [`MINIMUM_SAMPLES`] samples, for a sample that is not finite, and for samples so
-/// large that their sums overflow.
 pub fn estimate(series: &[f64]) -> Result<Estimate, ObserveError> {
     let deviations = Deviations::of(series)?;
     let n = series.len() as f64;
@@ -91,7 +85,6 @@ impl Comparison {
     ///
     /// For long series the condition is |z| > [`threshold`]`(checks, family_alarm)`; for short ones it allows for the
     /// uncertainty of the error bars. A comparison that is NaN is significant.
-    #[must_use]
     pub fn exceeds(&self, checks: usize, family_alarm: f64) -> bool {
         self.p_value.is_nan() || self.p_value < family_alarm / checks.max(1) as f64
     }
@@ -102,7 +95,6 @@ impl Comparison {
 /// The two-sided p-value is Student's, with Welch's degrees of freedom
 /// ν = (σ_a² + σ_b²)² / [σ_a⁴/(n_a − 1) + σ_b⁴/(n_b − 1)]. Here n is the number of independent samples,
 /// [`Estimate::effective`]; n − 1 is at least 1.
-#[must_use]
 pub fn difference(a: &Estimate, b: &Estimate) -> Comparison {
     let delta = a.mean - b.mean;
     let error = a.error.hypot(b.error);
@@ -127,7 +119,6 @@ pub fn difference(a: &Estimate, b: &Estimate) -> Comparison {
 /// most `family_alarm`: Bonferroni's Φ⁻¹(1 − family_alarm / 2 checks).
 ///
 /// Zero checks count as one. An alarm rate that is NaN or not above 0 gives infinity; one above 1 counts as 1.
-#[must_use]
 pub fn threshold(checks: usize, family_alarm: f64) -> f64 {
     let tail = 0.5 * family_alarm.min(1.0) / checks.max(1) as f64;
     if family_alarm.is_nan() || tail <= 0.0 {

@@ -9,9 +9,6 @@ const PER_SECOND: u16 = 8;
 
 /// The snapshots of a run as one animated PNG of half their size; `None` with fewer than two. At most forty
 /// evenly spaced snapshots are shown, the last one among them.
-///
-/// # Errors
-/// The function fails if a snapshot cannot be read or differs in size from the others.
 pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
     let all = snapshots(folder);
     if all.len() < 2 {

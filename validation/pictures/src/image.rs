@@ -53,7 +53,6 @@ impl Image {
         }
     }
 
-    /// Encodes the image as a PNG file.
     pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
         Image::to_apng(std::slice::from_ref(self), 1)
     }
@@ -113,9 +112,6 @@ impl Image {
     }
 
     /// Reads the first image of a PNG file with eight bits for red, green and blue, as [`Image::to_png`] writes it.
-    ///
-    /// # Errors
-    /// The function fails for any other file.
     pub fn from_png(bytes: &[u8]) -> Result<Image, String> {
         let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
         let mut reader = decoder.read_info().map_err(|e| e.to_string())?;

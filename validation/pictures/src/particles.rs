@@ -43,7 +43,6 @@ pub fn draw_particles(frame: &Frame, options: &ParticleOptions) -> (Image, Proje
     draw_coloured(frame, options, &colours)
 }
 
-/// Draws particles with one colour for each particle.
 pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) -> (Image, Projection) {
     let view = if frame.dimensions == 2 { View::Z } else { options.view };
     let radius = options.radius(frame).max(1e-9);

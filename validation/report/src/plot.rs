@@ -70,7 +70,6 @@ impl Series {
         Series { name: name.into(), points, errors: None, style }
     }
 
-    #[must_use]
     pub fn with_errors(self, errors: Vec<f64>) -> Series {
         Series { errors: Some(errors), ..self }
     }

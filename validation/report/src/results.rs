@@ -80,7 +80,6 @@ impl Check {
     }
 
     /// Adds a standard error for display; the verdict stays.
-    #[must_use]
     pub fn with_error(mut self, error: f64) -> Self {
         self.error = Some(error);
         self

@@ -28,7 +28,6 @@ impl<E: std::error::Error + Send + Sync + 'static> From<E> for Failure {
 
 impl Failure {
     /// Adds the input files of the verb, which are shown if the message names none of them.
-    #[must_use]
     pub fn of(mut self, inputs: &[PathBuf]) -> Failure {
         self.inputs = inputs.iter().map(|path| printable(&path.display().to_string())).collect();
         self

@@ -31,14 +31,11 @@ impl Files {
     }
 
     /// Adds output files.
-    #[must_use]
     pub fn writes(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Files {
         self.writes.extend(paths);
         self
     }
 
-    /// # Errors
-    /// The function fails if a file is both an input and an output.
     pub fn check(&self, json: Option<&Path>) -> Result<(), CliError> {
         let id =
             |path: &Path| std::fs::metadata(path).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));

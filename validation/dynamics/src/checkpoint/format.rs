@@ -65,9 +65,6 @@ pub fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
 }
 
 /// Reads a checkpoint from memory; messages name `path` as its file.
-///
-/// # Errors
-/// The bytes are no checkpoint, have another version of the format, or are truncated or damaged.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Checkpoint, CheckpointError> {
     let path = path.to_owned();
     let found = bytes.len() as u64;

@@ -85,9 +85,6 @@ pub struct Position {
 /// a run: then `checkpoint` in it is read, or, if that is damaged, `checkpoint.old`.
 ///
 /// The caller checks whether the particles fit a model, as for any other state.
-///
-/// # Errors
-/// There is no checkpoint, it is damaged, or it has another version of the format.
 pub fn read_state(path: &Path) -> Result<State, CheckpointError> {
     let checkpoint = if path.is_dir() {
         Store::new(path).find(|_| Ok(()))?.ok_or_else(|| CheckpointError::absent(path))?.checkpoint

@@ -74,10 +74,6 @@ impl State {
 
     /// Converts a data file to a state in a box with the given periodic directions; particles outside are
     /// wrapped along these. Types are species from 1. Missing masses are 1, missing velocities are 0.
-    ///
-    /// # Errors
-    /// A type is not a species of the model, a tag is larger than LAMMPS can count, the box has no volume, or
-    /// a tilted box has walls.
     pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, StateError> {
         let species = model.species().len();
         let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);

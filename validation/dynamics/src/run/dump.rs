@@ -4,9 +4,6 @@ use std::io::{self, Write};
 
 /// Writes a frame of a LAMMPS custom dump, `id type x y z vx vy vz`. Particles keep their order in the frame;
 /// types are species from 1. Unknown velocities are written as 0.
-///
-/// # Errors
-/// Writing to `to` fails, or the box is tilted.
 pub fn write_frame(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
     let (origin, lengths) = (frame.domain.origin(), frame.domain.lengths());
     let ids: Vec<u32> = frame.tag.iter().map(|t| *t as u32).collect();

@@ -20,9 +20,6 @@ pub struct Live {
 
 impl Live {
     /// Prepares the first step of a scene.
-    ///
-    /// # Errors
-    /// The initial state is invalid, or its particles do not fit into memory.
     pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
         memory::check(particles, memory::PARTICLE)?;
@@ -67,9 +64,6 @@ impl Live {
 
     /// Makes `steps` steps, with the totals after the last one. Beyond the end of the scene the steps are those of its last
     /// stage. `stop` is asked before each step; the step after its first `true` is the last.
-    ///
-    /// # Errors
-    /// The physics fails, as in [`Simulation::step`].
     pub fn run(&mut self, steps: u64, mut stop: impl FnMut() -> bool) -> Result<(), RunError> {
         for k in 1..=steps {
             if self.done == self.stage().steps && self.stage + 1 < self.scene.stages.len() {

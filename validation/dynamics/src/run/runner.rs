@@ -174,9 +174,6 @@ impl<'a> Runner<'a> {
     }
 
     /// Sets the number of threads; the default is one. The output of a run does not depend on it.
-    ///
-    /// # Errors
-    /// The model is invalid at the present temperature; this cannot happen, because it was valid before.
     pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
         let settings = self.run.simulation.settings();
         self.run.simulation.set_settings(Settings { threads, ..settings })

@@ -9,9 +9,6 @@ impl Scene {
     /// Creates a simulation from `state`, which belongs to this scene, at step 0, with the scene's seed and
     /// frozen particles. The precision is double, as for every new simulation; see
     /// [`Simulation::set_settings`].
-    ///
-    /// # Errors
-    /// `state` is invalid for the model.
     pub fn simulation(&self, state: State) -> Result<Simulation, RunError> {
         let mut simulation = Simulation::new(&self.model, self.kt, state, self.seed)?;
         simulation.set_frozen(&self.frozen);
@@ -19,9 +16,6 @@ impl Scene {
     }
 
     /// Puts a simulation of this scene on the scene's device.
-    ///
-    /// # Errors
-    /// There is no such device, or it does not compute what the scene asks for.
     pub(super) fn put_on_device(&self, simulation: &mut Simulation) -> Result<(), RunError> {
         let refused = match simulation.use_device(self.device) {
             Err(RunError::Device(error)) => Some(self.located(error, |_| None)),

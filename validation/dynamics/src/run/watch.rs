@@ -19,7 +19,7 @@ use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
 use psidpd_observe::statistics::MINIMUM_SAMPLES;
-use psidpd_observe::{Estimate, difference};
+use psidpd_observe::{Estimate, Measured, difference};
 use std::fmt;
 
 /// Largest and smallest number of steps between samples.
@@ -298,14 +298,9 @@ fn falls(samples: &[f64]) -> bool {
 
 /// Mean of the samples with its standard error; the error includes correlations if there are enough samples.
 fn estimate(samples: &[f64]) -> Option<Estimate> {
-    if let Ok(found) = psidpd_observe::estimate(samples) {
-        return Some(found);
-    }
-    let n = samples.len() as f64;
-    let mean = samples.iter().sum::<f64>() / n;
-    let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let plain = Estimate { mean, error: (variance / n).sqrt(), samples: samples.len(), tau: 0.5 };
-    (samples.len() >= 4 && mean.is_finite()).then_some(plain)
+    let Measured { value: mean, error } = Measured::of_independent(samples);
+    let plain = Estimate { mean, error, samples: samples.len(), tau: 0.5 };
+    psidpd_observe::estimate(samples).ok().or((samples.len() >= 4 && mean.is_finite()).then_some(plain))
 }
 
 /// `Σ a/Σ b` in units of kT. The error of each configuration comes from its blocks, and their number sets the

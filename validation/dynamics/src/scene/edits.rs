@@ -66,9 +66,6 @@ impl Edit {
 }
 
 /// Splits off the edits of the model, and applies the others to the text of the scene.
-///
-/// # Errors
-/// A key that is in several places, or a table that does not exist.
 pub fn edit_scene(
     text: &str,
     edits: &[Edit],

@@ -80,18 +80,12 @@ pub struct Scene {
 
 impl Scene {
     /// Reads a scene file and the model file it names.
-    ///
-    /// # Errors
-    /// Any fault in either file, with its line and key.
     pub fn open(path: &Path) -> Result<Scene, FileError> {
         let base = path.parent().unwrap_or(Path::new(""));
         Scene::read(&Document::open(path)?, base, &[])
     }
 
     /// Reads a scene file and the model file it names, after edits of their keys.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::open`], and an edit that matches no key.
     pub fn open_with(path: &Path, edits: &[Edit]) -> Result<Scene, FileError> {
         if edits.is_empty() {
             return Scene::open(path);

@@ -30,9 +30,6 @@ impl Format {
 
 /// Reads the particles and the box of a file. `periodic` sets the boundaries. Without it, a checkpoint keeps
 /// its boundaries, and so does a data file that names walls; other data files are periodic.
-///
-/// # Errors
-/// The file cannot be read, or is not a state of `model`; the error is its message.
 pub fn open(
     format: Format,
     path: &Path,

@@ -222,7 +222,7 @@ fn profiles_of_a_known_flow() {
         state.species[k] = i32::from(z >= 0.5);
     }
     let mut simulation = Simulation::new(&scene.model, 1.0, state, 1).unwrap();
-    simulation.set_step_number(1);
+    simulation.number = 1;
     let mut observers = observers(&scene);
     observers.sample(simulation.view(0.01), "settle");
     let all = observers.finish();
@@ -262,7 +262,7 @@ fn layers_that_drift_are_centred_on_a_species() {
             state.species[k] = i32::from(from < 0.5);
         }
         let mut simulation = Simulation::new(&scene.model, 1.0, state, 1).unwrap();
-        simulation.set_step_number(1 + u64::from(step));
+        simulation.number = 1 + u64::from(step);
         observers.sample(simulation.view(0.01), "settle");
     }
     let all = observers.finish();

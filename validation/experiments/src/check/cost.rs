@@ -26,7 +26,6 @@ const SAMPLE: usize = 20_000;
 
 const TRIAL: Duration = Duration::from_millis(250);
 
-/// The cost of a scene.
 pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
     let particles = match scene.initial.parts() {
         [] => scene.initial_state().len(),

@@ -10,7 +10,7 @@ use crate::fluids::{GAMMA, SET5, SET6, WarrenSet};
 use crate::jobs;
 use crate::start::{Filling, equilibrated};
 use psidpd_core::model::ForceLaw;
-use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width, tension_series};
+use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width};
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
 use serde_json::json;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -158,18 +158,19 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Slab, ExperimentErro
         estimate(kept).map_err(|source| ExperimentError::Statistics { what: what.to_owned(), source })
     };
     let bins = (height / 0.1).round() as usize;
-    let mut profile = ProfileAccumulator::new(height, bins, edge * edge)?;
+    let mut profile = ProfileAccumulator::new(height, bins, edge * edge);
     for frame in &trace.frames[trace.frames.len() / 5..] {
         profile.add(frame)?;
     }
     let liquid = profile.liquid_density(0.5 * (0.5 * height) - 2.0);
-    let shape = profile.finish()?;
-    let [xx, yy, zz, ..] = &trace.conservative;
-    let conservative_tension = match xx.is_empty() {
-        true => None,
-        false => Some(of("surface tension", &tension_series(height, xx, yy, zz)?)?),
+    let shape = profile.finish();
+    // Two interfaces share the excess of the pressure across them.
+    let tension = |[xx, yy, zz, ..]: &[Vec<f64>; 6]| {
+        let at = |k: usize| 0.5 * height * (zz[k] - 0.5 * (xx[k] + yy[k]));
+        of("surface tension", &(0..xx.len()).map(at).collect::<Vec<_>>())
     };
-    let [xx, yy, zz, ..] = &trace.pressure;
+    let known = !trace.conservative[0].is_empty();
+    let conservative_tension = known.then(|| tension(&trace.conservative)).transpose()?;
     let per_particle: Vec<f64> = trace.potential.iter().map(|u| u / trace.particles as f64).collect();
     Ok(Slab {
         temperature: of("temperature", &trace.temperature)?,
@@ -177,7 +178,7 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Slab, ExperimentErro
         energy: of("energy", &per_particle)?,
         liquid: estimate(&liquid)
             .map_err(|source| ExperimentError::Statistics { what: "liquid density".into(), source })?,
-        tension: of("surface tension", &tension_series(height, xx, yy, zz)?)?,
+        tension: tension(&trace.pressure)?,
         conservative_tension,
         width: interface_width(&shape),
         profile: shape.centres.iter().copied().zip(shape.density.iter().copied()).collect(),

@@ -116,7 +116,7 @@ fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
             }
         }
         for (k, r) in DISTANCES.into_iter().enumerate() {
-            let [ours, theirs] = [0, 1].map(|code: usize| independent_mean(&drawn[code][k]));
+            let [ours, theirs] = [0, 1].map(|code: usize| Measured::of_independent(&drawn[code][k]));
             let error = ours.error.hypot(theirs.error);
             let place = format!("γ = {gamma}, kT = {kt}, Δt = {dt}, r = {r}");
             for (code, what, delta, error) in [
@@ -151,14 +151,6 @@ fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
         }
     }
     Ok(table)
-}
-
-/// Mean of numbers that do not depend on each other.
-fn independent_mean(values: &[f64]) -> Measured {
-    let n = values.len() as f64;
-    let value = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0);
-    Measured { value, error: (variance / n).sqrt() }
 }
 
 /// Pairs along x at rest, with tags in turn.

@@ -35,7 +35,6 @@ pub fn names() -> String {
 }
 
 impl Substance {
-    /// The substance of this name.
     pub fn find(name: &str) -> Result<Substance, ExperimentError> {
         all()
             .into_iter()

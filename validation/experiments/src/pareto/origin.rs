@@ -25,9 +25,6 @@ const BATCH: u64 = 16;
 
 impl<'a> Origin<'a> {
     /// Runs the stages before the last one that has a thermostat and is no ramp, for at most `limit`.
-    ///
-    /// # Errors
-    /// There is no such stage, or the scene's own steps cannot be made.
     pub fn of(
         scene: &'a Scene,
         limit: Duration,

@@ -133,7 +133,6 @@ impl Quantities {
     }
 
     /// The same values as if they were known without error.
-    #[must_use]
     pub fn as_if_exact(&self) -> Quantities {
         let mut same = self.clone();
         same.scalars.iter_mut().for_each(|q| q.measured.error = 0.0);
@@ -142,7 +141,6 @@ impl Quantities {
     }
 
     /// The same with the diffusion and viscosities of another run, if there is one.
-    #[must_use]
     pub fn with_dynamics_of(mut self, other: Option<&Quantities>) -> Quantities {
         self.scalars.retain(|q| q.class.is_of_configurations());
         let theirs = other.iter().flat_map(|other| &other.scalars);

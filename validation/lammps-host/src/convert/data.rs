@@ -56,9 +56,6 @@ impl fmt::Display for Column {
 }
 
 /// Takes the density out of the atoms of a data file, and its style's name out of the title of the section.
-///
-/// # Errors
-/// An atom has too few columns.
 pub fn data_file(old: &str, column: Column) -> Result<String, TextError> {
     let mut new = String::new();
     let mut atoms = false;

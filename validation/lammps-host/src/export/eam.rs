@@ -33,9 +33,6 @@ impl Default for Grid {
 const MOST: u32 = 20_000_000;
 
 /// Writes the tables of `fluid`; `mass` holds the masses of its species, which become elements.
-///
-/// # Errors
-/// `eam/alloy` cannot represent the fluid, or the file cannot be written; see [`LammpsError`].
 pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(), LammpsError> {
     if fluid.dimensions != 3 {
         return Err(LammpsError::Flat);

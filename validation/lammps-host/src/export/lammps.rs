@@ -52,9 +52,6 @@ impl Default for Script<'_> {
 }
 
 /// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
-///
-/// # Errors
-/// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`LammpsError`].
 pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
     let script = script_of(scene, Script::default())?;
     let particles = scene.initial.parts().iter().map(|part| part.count).sum();
@@ -233,10 +230,6 @@ fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), LammpsEr
     data.write(path).map_err(|e| LammpsError::Native(e.into()))
 }
 
-/// A script of the scene.
-///
-/// # Errors
-/// The scene has no counterpart in LAMMPS.
 pub fn script_of(scene: &Scene, script: Script) -> Result<String, LammpsError> {
     check(scene)?;
     let mut s = String::new();

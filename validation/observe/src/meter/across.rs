@@ -2,13 +2,10 @@
 
 use crate::frame::View;
 use crate::options::Options;
+use crate::profile::centre;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
-
-/// If the mean of the unit vectors exp(2πi s) is shorter than this, it has no direction.
-const LEAST_RESULTANT: f64 = 1e-10;
 
 /// The point that is moved to the middle of the profile in each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,28 +117,12 @@ impl Across {
     pub fn fractions(&self, view: &View) -> Option<Vec<f64>> {
         let domain = view.domain;
         let mut s: Vec<f64> = view.x.iter().map(|x| domain.fraction(*x)[self.axis]).collect();
-        let counts = |species: i32| match self.centre {
+        let counts = |k: usize| match self.centre {
             Centre::Box => false,
             Centre::All => true,
-            Centre::Species(one) => species == one,
+            Centre::Species(one) => view.species[k] == one,
         };
-        if self.centre == Centre::Box {
-            return Some(s);
-        }
-        let (mut sine, mut cosine, mut count) = (0.0, 0.0, 0.0);
-        for (s, _) in s.iter().zip(view.species).filter(|(_, species)| counts(**species)) {
-            let (a, b) = (TAU * s).sin_cos();
-            sine += a;
-            cosine += b;
-            count += 1.0;
-        }
-        // A species without particles has no centre either.
-        if f64::hypot(sine, cosine) <= LEAST_RESULTANT * count {
-            return None;
-        }
-        let centre = sine.atan2(cosine) / TAU;
-        s.iter_mut().for_each(|s| *s += 0.5 - centre);
-        Some(s)
+        (self.centre == Centre::Box || centre(&mut s, counts)).then_some(s)
     }
 
     /// The bin of a fraction; `None` outside a box that is not periodic.

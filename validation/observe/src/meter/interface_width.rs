@@ -57,7 +57,7 @@ impl Meter for InterfaceWidth {
         let volume = self.across.bin_volume();
         let profile = |means: &[f64]| {
             let density = means.iter().map(|n| n / volume).collect();
-            DensityProfile { centres: centres.clone(), density, error: Vec::new() }
+            DensityProfile { centres: centres.clone(), density }
         };
         let mut fit = self.series.jackknife_many(|means| {
             let profile = profile(means);

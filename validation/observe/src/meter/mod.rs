@@ -49,9 +49,6 @@ pub trait Meter: Sized {
     const OF_MOTION: bool = false;
 
     /// Reads the settings of the observable.
-    ///
-    /// # Errors
-    /// The function fails for values out of their domain, and for a model or a box for which the observable is not defined.
     fn read(options: &Options) -> Result<Self, FileError>;
 
     /// The quantities that the forces of a sampled step must provide.

@@ -46,7 +46,6 @@ pub fn write_run_report(folder: &Path) -> Result<PathBuf, ReportError> {
     Ok(path)
 }
 
-/// The report of the run in a folder.
 pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
     if !FILES.iter().any(|(name, _)| folder.join(name).exists()) {
         let files: Vec<&str> = FILES.iter().map(|f| f.0).collect();

@@ -5,9 +5,6 @@ use crate::device::Device;
 
 impl Simulation {
     /// Sets the processor of later steps; a new simulation is on the CPU.
-    ///
-    /// # Errors
-    /// There is no such device, or it cannot compute this model in this box.
     pub fn use_device(&mut self, device: Device) -> Result<(), RunError> {
         match device {
             Device::Cpu => Ok(()),
@@ -33,9 +30,6 @@ impl Simulation {
 
     /// Copies the particles of the present step from the device into the arrays of the host. Until then the arrays are
     /// those of an earlier step; totals, temperature and pressure are always those of the present one.
-    ///
-    /// # Errors
-    /// A step before has failed on the device.
     pub fn fetch(&mut self) -> Result<(), RunError> {
         #[cfg(feature = "gpu")]
         self.fetch_from_gpu()?;

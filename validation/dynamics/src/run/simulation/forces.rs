@@ -165,9 +165,6 @@ impl Simulation {
     }
 
     /// Sets the settings of later evaluations; the default is double precision on one thread.
-    ///
-    /// # Errors
-    /// The model is invalid at the present temperature; this cannot happen, because it was valid before.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
         let Forces { model, kt, .. } = &self.forces;
         self.forces.replace(Engine::new(&model.at(*kt)?, settings)?);

@@ -78,9 +78,6 @@ fn rule(integrator: Integrator) -> Result<Rule, RunError> {
 
 impl Simulation {
     /// Makes later steps on a GPU.
-    ///
-    /// # Errors
-    /// There is no such GPU, or it cannot compute this model in this box.
     pub(super) fn use_gpu(&mut self, number: usize) -> Result<(), RunError> {
         let device = gpu::Device::open(Some(number)).map_err(failed)?;
         let conditions = self.conditions();

@@ -50,7 +50,7 @@ pub struct Simulation {
     motion: Motion,
     monte_carlo: MonteCarlo,
     seed: u64,
-    number: u64,
+    pub(crate) number: u64,
     /// Whether the forces belong to other positions than the present ones.
     stale: bool,
     /// The transport of momentum in the present step; `None` without recording.
@@ -97,11 +97,6 @@ impl Simulation {
 
     pub fn step_number(&self) -> u64 {
         self.number
-    }
-
-    /// Sets the number of the present step, for a resumed run.
-    pub fn set_step_number(&mut self, number: u64) {
-        self.number = number;
     }
 
     /// Restores a run from a checkpoint after step `number`, with the forces of that step: the next step is
@@ -152,19 +147,12 @@ impl Simulation {
     }
 
     /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces only.
-    ///
-    /// # Errors
-    /// The box is too narrow for the noise, or a position, ψ or a force is not finite.
     pub fn compute(&mut self, want: Want, step: Option<Step>) -> Result<(), RunError> {
         self.forces.compute(&mut self.particles, want, step, self.number)
     }
 
     /// Makes one step of `dt`. The forces of the previous step must be present: see
     /// [`Simulation::prepare_for`].
-    ///
-    /// # Errors
-    /// A position, velocity or force is not finite, ψ is singular, or a particle moved further than across
-    /// the box.
     pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         self.begin_step(dt, integrator, want)?;
         self.end_step()?;

@@ -21,9 +21,6 @@ pub(super) struct Particles {
 
 impl Particles {
     /// Creates particles with zero forces. Positions outside the box are wrapped.
-    ///
-    /// # Errors
-    /// `state` is invalid for a model with these numbers of species and dimensions.
     pub fn new(mut state: State, species: usize, dimensions: usize) -> Result<Particles, RunError> {
         if let Some(fault) = state.fault(species, dimensions) {
             return Err(RunError::State(fault));

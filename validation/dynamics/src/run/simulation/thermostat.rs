@@ -286,9 +286,6 @@ impl Simulation {
     }
 
     /// What the thermostat sees of the particles; `None` where it does not act, or sees none.
-    ///
-    /// # Errors
-    /// A position that is not finite.
     pub fn warmth(&mut self, dt: f64) -> Result<Option<Warmth>, RunError> {
         let Simulation { particles, external, forces, thermostat, number, .. } = self;
         let pairs = thermostat.find_pairs(particles, external, forces, (dt, false, *number))?;
