@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// A model at the style's temperature, ready to compute.
 #[derive(Debug)]
 pub struct Style {
-    model: Model,
+    pub model: Model,
     engine: Engine,
     /// The first half of an evaluation, until its second half.
     pending: Option<Pending>,
