@@ -69,10 +69,9 @@ fn every_function_is_documented() {
         let at = header.find(&format!("{name}(")).unwrap_or_else(|| panic!("{name} is not in the header"));
         assert_eq!(header.matches(&format!("{name}(")).count(), 1, "{name}");
         let begin = header[..at].rfind('\n').unwrap() + 1;
-        let before = header[..begin].trim_end();
-        assert!(before.ends_with("*/"), "{name} has no comment");
-        let comment = &before[before.rfind("/*").unwrap()..];
-        assert!(comment.len() > 40, "{name}: {comment}");
+        let lines = header[..begin].lines().rev().take_while(|line| line.starts_with("///"));
+        let comment: String = lines.collect();
+        assert!(comment.len() > 40, "{name} has no comment: {comment}");
         if header[begin..at].contains("psidpd_status") {
             assert!(comment.contains("# Errors") && comment.contains("# Safety"), "{name}: {comment}");
         }
