@@ -47,7 +47,7 @@ pub struct Unsupported {
 
 /// A step that failed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("step {step}: {fault} of particle {tag}")]
+#[error("step {step}, particle {tag}: {fault}")]
 pub struct Stop {
     /// Number of the step.
     pub step: u64,
@@ -61,15 +61,15 @@ pub struct Stop {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Fault {
     /// A velocity is not finite.
-    #[error("not finite: the velocity")]
+    #[error("its velocity is not finite")]
     Velocity,
     /// A particle moved by half of the box or more in one drift.
-    #[error("half of the box or more: the move")]
+    #[error("it moved by half of the box or more")]
     Runaway,
     /// ψ or its derivative is not finite.
-    #[error("not finite: the excess free energy")]
+    #[error("its excess free energy is not finite")]
     ExcessFreeEnergy,
     /// A force is not finite.
-    #[error("not finite: the force")]
+    #[error("its force is not finite")]
     Force,
 }

@@ -1,3 +1,5 @@
+//! Masses in the order of cells.
+
 use super::pass::fill;
 use psidpd_threads::Pool;
 

@@ -6,31 +6,21 @@
 //! precision, and so do the lists of pairs.
 
 use super::PairThermostat;
+use super::weights::weights;
 use crate::engine::particles::Particles;
-use crate::engine::plan::ThermostatPlan;
 use crate::engine::sweep::{Images, MARGIN, Places, PlanePairs, Pool};
 use crate::engine::vectors::{self, Loop};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::plane::list::{ExactPair, Listed, PairList};
+use psidpd_passes::ground::terms::Exponent;
+use psidpd_passes::plane::list::{ExactPair, Listed, PairList, WeightTables};
 
 /// Number of pairs in a block.
 const BLOCK: usize = 64;
 
-/// The amplitude `√(½ Δt γ)`, the inverse range and the exponent of `w_R`, by pairs of species.
+/// The weights of pairs, and the least `1 − r/R` of a pair: pairs that are not surely listed on both ranks are left out on both.
 struct Laws {
-    species: usize,
-    amplitude: Vec<f64>,
-    inverse_range: Vec<f64>,
-    exponent: Exponent,
-    /// Least `1 − r/R` of a pair: pairs that are not surely listed on both ranks are left out on both.
+    weights: WeightTables<f64>,
     least: f64,
-}
-
-/// Exponents of `w_R`, by pairs of species.
-enum Exponent {
-    One,
-    Two,
-    Any(Vec<f64>),
 }
 
 impl PairThermostat {
@@ -43,10 +33,10 @@ impl PairThermostat {
         species_of_kind: &[i32],
     ) {
         let PairThermostat { plan, dimensions, dt, set, lists, planes, is_exact, wants_virial, .. } = self;
-        let laws = Laws::new(plan, *dt, if *is_exact { 0.0 } else { MARGIN });
+        let laws = Laws { weights: weights(plan, *dt), least: if *is_exact { 0.0 } else { MARGIN } };
         let places = Places::new(*dimensions, domain, particles.x, lists.order());
         let (set, is_exact, with_stretch) = (*set, *is_exact, *wants_virial);
-        let law = |i: usize, j: usize| match laws.species {
+        let law = |i: usize, j: usize| match laws.weights.species {
             1 => 0,
             count => {
                 let [a, b] =
@@ -68,28 +58,6 @@ impl PairThermostat {
                 measure(with_ghosts, |k| places.x(k), with_stretch, &mut block, law, weigh);
             }
         });
-    }
-}
-
-impl Laws {
-    fn new(plan: &ThermostatPlan, dt: f64, least: f64) -> Laws {
-        let acts = |e: f64| plan.exponent.iter().zip(&plan.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
-        Laws {
-            species: plan.gamma.len().isqrt(),
-            amplitude: plan.gamma.iter().map(|gamma| (0.5 * dt * gamma).sqrt()).collect(),
-            // For a range of zero every pair is beyond the range.
-            inverse_range: plan
-                .range
-                .iter()
-                .map(|r| if *r > 0.0 { 1.0 / r } else { f64::INFINITY })
-                .collect(),
-            exponent: match () {
-                () if acts(1.0) => Exponent::One,
-                () if acts(2.0) => Exponent::Two,
-                () => Exponent::Any(plan.exponent.clone()),
-            },
-            least,
-        }
     }
 }
 
@@ -166,8 +134,8 @@ impl Block {
         Block {
             d: [[0.0; BLOCK]; 3],
             law: [0; BLOCK],
-            amplitude: [laws.amplitude[0]; BLOCK],
-            inverse_range: [laws.inverse_range[0]; BLOCK],
+            amplitude: [laws.weights.amplitude[0]; BLOCK],
+            inverse_range: [laws.weights.inverse_range[0]; BLOCK],
             factor: [0.0; BLOCK],
         }
     }
@@ -187,9 +155,10 @@ impl Loop for Weigh<'_> {
     fn run(self) {
         let Weigh { block: Block { d, law, amplitude, inverse_range, factor }, images, laws } = self;
         images.find_nearest(d);
-        if laws.species > 1 {
+        let Laws { weights, least } = laws;
+        if weights.species > 1 {
             for n in 0..BLOCK {
-                (amplitude[n], inverse_range[n]) = (laws.amplitude[law[n]], laws.inverse_range[law[n]]);
+                (amplitude[n], inverse_range[n]) = (weights.amplitude[law[n]], weights.inverse_range[law[n]]);
             }
         }
         let [x, y, z] = d;
@@ -197,9 +166,8 @@ impl Loop for Weigh<'_> {
             // The array stores the distance until the factor replaces it.
             factor[n] = (x[n] * x[n] + y[n] * y[n] + z[n] * z[n]).sqrt();
         }
-        let least = laws.least;
-        let inside = |ratio: f64| if 1.0 - ratio > least { 1.0 - ratio } else { 0.0 };
-        match &laws.exponent {
+        let inside = |ratio: f64| if 1.0 - ratio > *least { 1.0 - ratio } else { 0.0 };
+        match &weights.exponent {
             Exponent::One => {
                 for n in 0..BLOCK {
                     let t = inside(factor[n] * inverse_range[n]);
