@@ -50,13 +50,14 @@ struct Status {
     // Conjugate gradients: 0 going on, 1 at the last step, 2 done.
     state: u32,
     iterations: u32,
+    first: f32,
     now: f32,
-    enough: f32,
     drag: f32,
     alpha: f32,
     beta: f32,
-    rest: f32,
-    padding: u32,
+    // Residual and direction of a mode without drag, in units of its first residual.
+    residual: f32,
+    direction: f32,
 }
 
 @group(0) @binding(0) var<uniform> P: Params;

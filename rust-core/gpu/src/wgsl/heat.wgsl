@@ -78,9 +78,10 @@ fn sum_of_blocks(entry: u32, lane: u32) -> vec3<f32> {
     }
     if (status.iterations == 0u) {
         status.drag = max(sqrt(found.z / found.x) - 1.0, 1.0);
-        let relative = max(I.c / status.drag, I.d);
+        status.first = found.x;
         status.now = found.x;
-        status.enough = relative * relative * found.x;
+        status.residual = 1.0;
+        status.direction = 1.0;
     }
     status.iterations += 1u;
     status.alpha = 0.0;
@@ -105,14 +106,22 @@ fn sum_of_blocks(entry: u32, lane: u32) -> vec3<f32> {
     let next = sum_of_blocks(30u, lane).x;
     if (lane != 0u || halted() || status.state != 0u) { return; }
     status.beta = next / status.now;
-    status.rest = select(0.0, 1.0, status.drag < 10.0);
     status.now = next;
-    if (is_finite(next) && next > status.enough && status.iterations < 500u) { return; }
+    status.residual -= status.alpha * status.direction;
+    status.direction = status.residual + status.beta * status.direction;
+    let wanted = I.c / status.drag;
+    let accurate = wanted >= I.d && is_below(wanted) && (adds_residual() || abs(status.residual) <= 1e-2);
+    if (!accurate && !is_below(I.d) && is_finite(next) && status.iterations < 500u) { return; }
     status.state = 1u;
     status.updates += 1u;
     status.total_iterations += status.iterations;
-    if (!is_finite(next) || next > status.enough || I.c < I.d * status.drag) { status.inaccurate += 1u; }
+    if (!accurate) { status.inaccurate += 1u; }
 }
+
+fn is_below(relative: f32) -> bool { return status.now <= relative * relative * status.first; }
+
+// Whether the last residual is added to the solution: under strong drag it would become larger.
+fn adds_residual() -> bool { return status.drag < 2.0; }
 
 // Computes the next direction. After the last iteration it is the whole change to the midpoint, and the solution has the
 // residual added.
@@ -124,7 +133,7 @@ fn sum_of_blocks(entry: u32, lane: u32) -> vec3<f32> {
     } else {
         let at = solution[i];
         direction[i] = at;
-        solution[i] = at + (status.rest * inverse) * residual[i];
+        solution[i] = at + select(0.0, inverse, adds_residual()) * residual[i];
     }
 }
 

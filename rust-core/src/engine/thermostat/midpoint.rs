@@ -20,30 +20,17 @@
 //! small `k`: slow flow would be too cold. The solution therefore ends with `δ + M⁻¹ r`, which costs no pass, and
 //! whose residual is `−K M⁻¹ r`: the temperature of slow modes is then exact. The impulses are those of drag and noise at
 //! `v + δ`, which the virial uses.
+//!
+//! Where drag is stronger than twice the inertia, `−K M⁻¹ r` would be larger than `r` and is not added. `R` at `k = 0` is
+//! known from the coefficients of the iterations; they then go on until it is below 1 %.
 
 use super::PairThermostat;
 use super::particle_loops::{Advance, Finish, Multiply, Start};
 use super::pass::{Sums, Wide, add_to_host, virial};
-use super::solution::{Progress, Solution};
+use super::solution::{End, Move, Progress, Solution, TOLERANCE, TOLERANCE_OF_DRAG};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
-
-/// Relative residual at which iterations end, times drag per mass where that is above 1. The error of the
-/// temperature is below 0.1 % (see `the_temperature_is_right`), except that of pairs under strong drag: 0.2 % at γ = 100, Δt = 0.06.
-pub const TOLERANCE: f64 = 2e-2;
-
-/// The same for drag alone, where no noise makes up for a residual.
-pub const TOLERANCE_OF_DRAG: f64 = 1e-4;
-
-/// Least relative residual. With drag so strong that it should be less, the solution is inaccurate.
-const FINEST: f64 = 1e-6;
-
-/// Drag per mass beyond which the last residual is not added, as that would make it larger.
-const STRONG: f64 = 10.0;
-
-/// Most iterations: with more, drag is so strong that rounding errors stop the convergence.
-pub const MOST: usize = 500;
 
 /// The data of one plane during a step of the solver.
 struct Share<'a> {
@@ -112,7 +99,7 @@ impl PairThermostat {
     pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
         let PairThermostat { planes, lists, set, sums, solution, kt, .. } = self;
         let tolerance = if noise { TOLERANCE } else { TOLERANCE_OF_DRAG };
-        solution.progress = Progress { tolerance, ..Progress::default() };
+        solution.progress = Progress::new(tolerance);
         for vectors in [&mut solution.residual, &mut solution.change] {
             vectors.resize(lists.order().len(), Wide::ZERO);
         }
@@ -134,46 +121,32 @@ impl PairThermostat {
         })
     }
 
-    /// Moves along the direction, and computes the next one; returns false after the last iteration. The totals are the squared norm of the first residual, which is read in the
-    /// first iteration only, and the sums of [`PairThermostat::curvature`].
-    ///
-    /// With `α = r·M⁻¹r / p·Ap` the next residual has the norm `α² Ap·M⁻¹Ap − r·M⁻¹r`, as residuals are
-    /// orthogonal: so one sum over ranks is enough for each iteration.
-    pub(super) fn advance(&mut self, pool: &Pool, [first, curvature, square]: [f64; 3]) -> bool {
+    /// Moves along the direction, and computes the next one; returns false after the last iteration. The totals are the
+    /// squared norm of the first residual, which is read in the first iteration only, and the sums of
+    /// [`PairThermostat::curvature`].
+    pub(super) fn advance(&mut self, pool: &Pool, totals: [f64; 3]) -> bool {
         let progress = &mut self.solution.progress;
-        if progress.iterations == 0 {
-            progress.drag = ((square / first).sqrt() - 1.0).max(1.0);
-            let relative = (progress.tolerance / progress.drag).max(FINEST);
-            (progress.now, progress.enough) = (first, relative * relative * first);
+        let Move { alpha, beta, outcome } = progress.advance(totals);
+        let is_first = progress.iterations == 1;
+        let rest = if progress.adds_residual() { 1.0 } else { 0.0 };
+        if let Some(end) = outcome {
+            self.effort.add(self.iterations(), self.from_forces.are_present, end == End::Inaccurate);
         }
-        progress.iterations += 1;
-        let alpha = if curvature > 0.0 { progress.now / curvature } else { 0.0 };
-        let next = alpha * alpha * square - progress.now;
-        let goes_on = next > progress.enough && progress.iterations < MOST;
-        let beta = next / progress.now;
-        progress.now = next;
-        if !goes_on {
-            let inaccurate =
-                next.is_nan() || next > progress.enough || progress.tolerance < FINEST * progress.drag;
-            self.effort.add(progress.iterations, self.from_forces.are_present, inaccurate);
-        }
-        let rest = if self.solution.progress.drag < STRONG { 1.0 } else { 0.0 };
-        let is_first = self.solution.progress.iterations == 1;
         self.on_planes(pool, |Share { p, image, inverse_mass, residual, solution, .. }, set| {
-            match goes_on {
-                true => {
+            match outcome {
+                None => {
                     let advance =
                         Advance { is_first, alpha, beta, inverse_mass, image, solution, residual, p };
                     vectors::run(set, advance);
                 }
-                false => {
+                Some(_) => {
                     let finish = Finish { is_first, alpha, rest, inverse_mass, p, image, residual, solution };
                     vectors::run(set, finish);
                 }
             }
             [0.0; 2]
         });
-        goes_on
+        outcome.is_none()
     }
 
     /// Adds `p` to the velocities `v`: after the last iteration, δ without its residual.
