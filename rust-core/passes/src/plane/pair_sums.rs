@@ -2,7 +2,7 @@
 
 use super::list::{ExactPair, Listed, Pair, PairList};
 use crate::instruction_set::InstructionSet;
-use crate::simd::{Isa, Kernel, Quad, run};
+use crate::simd::{Isa, Kernel, Quad, prefetch, run};
 
 /// A vector in the size of a register, which no line of the cache ends in; the fourth component is 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -78,6 +78,10 @@ fn add<P: Entry, const BOTH: bool>(
     }
 }
 
+/// Bytes of the list that are asked for ahead of the present pair. The list of 50 000 particles is in no fast cache, and the
+/// processor's own prefetching stays behind: with this four passes take 20 % less time there, and the same with 6 000 particles.
+const AHEAD: usize = 2048;
+
 /// A pair in either precision.
 trait Entry {
     fn j(&self) -> usize;
@@ -150,6 +154,7 @@ impl<P: Entry, const BOTH: bool, const NOISE: bool> Kernel for WithNoise<'_, P, 
                 // Two pairs at once share the additions across elements.
                 while next.wrapping_add(1) < end {
                     let (a, b) = (&*next, &*next.add(1));
+                    prefetch(next.wrapping_byte_add(AHEAD));
                     let (j_a, j_b) = (a.j(), b.j());
                     let (g_a, g_b) = (a.g::<I>(), b.g::<I>());
                     let d_a = at.sub(I::Quad::load(second.add(j_a).cast()));

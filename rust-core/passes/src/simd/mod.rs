@@ -197,6 +197,18 @@ pub trait Quad: Copy {
     unsafe fn totals(self, other: Self) -> [Self; 2];
 }
 
+/// Asks for the memory at `p`, which need not exist, to be in the cache soon.
+#[inline(always)]
+pub fn prefetch<T>(p: *const T) {
+    // SAFETY: all processors of x86-64 have the instruction, and it faults at no address.
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(p.cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = p;
+}
+
 /// An instruction set.
 #[allow(clippy::missing_safety_doc)]
 pub trait Isa: Copy + Send + Sync + 'static {
