@@ -1,6 +1,6 @@
 //! Vectors for AVX2 with FMA and BMI2.
 
-use super::x86::{Quad4, operators};
+use super::x86::{Quad4, methods, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
 use crate::simd::OFFSET_BITS;
 use psidpd_model::kernel::Real;
@@ -67,30 +67,21 @@ impl Reals for F32x8 {
     type Words = U32x8;
     const LANES: usize = 8;
 
-    #[inline(always)]
-    unsafe fn splat(x: f32) -> Self {
-        unsafe { F32x8(_mm256_set1_ps(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f32) -> Self {
-        unsafe { F32x8(_mm256_loadu_ps(p)) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f32) {
-        unsafe { _mm256_storeu_ps(p, self.0) }
-    }
-    #[inline(always)]
-    unsafe fn of_signed(words: U32x8) -> Self {
-        unsafe { F32x8(_mm256_cvtepi32_ps(words.0)) }
+    methods! {
+        splat(x: f32) -> Self = F32x8(_mm256_set1_ps(x));
+        load(p: *const f32) -> Self = F32x8(_mm256_loadu_ps(p));
+        store(self, p: *mut f32) = _mm256_storeu_ps(p, self.0);
+        of_signed(words: U32x8) -> Self = F32x8(_mm256_cvtepi32_ps(words.0));
+        mul_add(self, a: Self, b: Self) -> Self = F32x8(_mm256_fmadd_ps(self.0, a.0, b.0));
+        smaller(self, other: Self) -> Self = F32x8(_mm256_min_ps(self.0, other.0));
+        store_whole(self, p: *mut i32) = _mm256_storeu_si256(p.cast(), _mm256_cvttps_epi32(self.0));
+        compress(self, mask: u32) -> Self = F32x8(_mm256_permutevar8x32_ps(self.0, order(mask)));
+        lookup(table: *const f32, index: U32x8) -> Self = F32x8(_mm256_i32gather_ps::<4>(table, index.0));
     }
     #[inline(always)]
     unsafe fn encode(words: U32x8) -> Self {
         let ordinary = ORDINARY_F32 as i32;
         unsafe { F32x8(_mm256_castsi256_ps(_mm256_add_epi32(words.0, _mm256_set1_epi32(ordinary)))) }
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { F32x8(_mm256_fmadd_ps(self.0, a.0, b.0)) }
     }
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
@@ -101,14 +92,6 @@ impl Reals for F32x8 {
             let c = _mm256_fmadd_ps(e, _mm256_set1_ps(0.375), _mm256_set1_ps(0.5));
             F32x8(_mm256_fmadd_ps(_mm256_mul_ps(y, e), c, y))
         }
-    }
-    #[inline(always)]
-    unsafe fn smaller(self, other: Self) -> Self {
-        unsafe { F32x8(_mm256_min_ps(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn store_whole(self, p: *mut i32) {
-        unsafe { _mm256_storeu_si256(p.cast(), _mm256_cvttps_epi32(self.0)) }
     }
     #[inline(always)]
     unsafe fn round(self) -> Self {
@@ -123,16 +106,8 @@ impl Reals for F32x8 {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32) -> Self {
-        unsafe { F32x8(_mm256_permutevar8x32_ps(self.0, order(mask))) }
-    }
-    #[inline(always)]
     unsafe fn pick(table: *const f32, which: U32x8) -> Self {
         unsafe { F32x8(_mm256_permutevar8x32_ps(_mm256_loadu_ps(table), which.0)) }
-    }
-    #[inline(always)]
-    unsafe fn lookup(table: *const f32, index: U32x8) -> Self {
-        unsafe { F32x8(_mm256_i32gather_ps::<4>(table, index.0)) }
     }
     #[inline(always)]
     unsafe fn store_transposed(columns: [Self; 4], p: *mut f32) {
@@ -205,21 +180,16 @@ impl Reals for F64x4 {
     type Words = U32x4;
     const LANES: usize = 4;
 
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        unsafe { F64x4(_mm256_set1_pd(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f64) -> Self {
-        unsafe { F64x4(_mm256_loadu_pd(p)) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f64) {
-        unsafe { _mm256_storeu_pd(p, self.0) }
-    }
-    #[inline(always)]
-    unsafe fn of_signed(words: U32x4) -> Self {
-        unsafe { F64x4(_mm256_cvtepi32_pd(words.0)) }
+    methods! {
+        splat(x: f64) -> Self = F64x4(_mm256_set1_pd(x));
+        load(p: *const f64) -> Self = F64x4(_mm256_loadu_pd(p));
+        store(self, p: *mut f64) = _mm256_storeu_pd(p, self.0);
+        of_signed(words: U32x4) -> Self = F64x4(_mm256_cvtepi32_pd(words.0));
+        mul_add(self, a: Self, b: Self) -> Self = F64x4(_mm256_fmadd_pd(self.0, a.0, b.0));
+        inverse_root(self) -> Self = F64x4(_mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(self.0)));
+        smaller(self, other: Self) -> Self = F64x4(_mm256_min_pd(self.0, other.0));
+        store_whole(self, p: *mut i32) = _mm_storeu_si128(p.cast(), _mm256_cvttpd_epi32(self.0));
+        lookup(table: *const f64, index: U32x4) -> Self = F64x4(_mm256_i32gather_pd::<8>(table, index.0));
     }
     #[inline(always)]
     unsafe fn encode(words: U32x4) -> Self {
@@ -227,22 +197,6 @@ impl Reals for F64x4 {
             let ordinary = _mm256_set1_epi64x(ORDINARY_F64 as i64);
             F64x4(_mm256_castsi256_pd(_mm256_or_si256(_mm256_cvtepu32_epi64(words.0), ordinary)))
         }
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { F64x4(_mm256_fmadd_pd(self.0, a.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn inverse_root(self) -> Self {
-        unsafe { F64x4(_mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(self.0))) }
-    }
-    #[inline(always)]
-    unsafe fn smaller(self, other: Self) -> Self {
-        unsafe { F64x4(_mm256_min_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn store_whole(self, p: *mut i32) {
-        unsafe { _mm_storeu_si128(p.cast(), _mm256_cvttpd_epi32(self.0)) }
     }
     #[inline(always)]
     unsafe fn round(self) -> Self {
@@ -275,10 +229,6 @@ impl Reals for F64x4 {
         }
     }
     #[inline(always)]
-    unsafe fn lookup(table: *const f64, index: U32x4) -> Self {
-        unsafe { F64x4(_mm256_i32gather_pd::<8>(table, index.0)) }
-    }
-    #[inline(always)]
     unsafe fn store_transposed([a, b, c, d]: [Self; 4], p: *mut f64) {
         unsafe {
             let store_transposed = transposed([a.0, b.0, c.0, d.0]);
@@ -294,37 +244,16 @@ impl Reals for F64x4 {
 impl Words for U32x8 {
     const LANES: usize = 8;
 
-    #[inline(always)]
-    unsafe fn splat(x: u32) -> Self {
-        unsafe { U32x8(_mm256_set1_epi32(x as i32)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const u32) -> Self {
-        unsafe { U32x8(_mm256_loadu_si256(p.cast())) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut u32) {
-        unsafe { _mm256_storeu_si256(p.cast(), self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        unsafe { U32x8(_mm256_add_epi32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        unsafe { U32x8(_mm256_sub_epi32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn xor(self, other: Self) -> Self {
-        unsafe { U32x8(_mm256_xor_si256(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        unsafe { U32x8(_mm256_min_epu32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        unsafe { U32x8(_mm256_max_epu32(self.0, other.0)) }
+    methods! {
+        splat(x: u32) -> Self = U32x8(_mm256_set1_epi32(x as i32));
+        load(p: *const u32) -> Self = U32x8(_mm256_loadu_si256(p.cast()));
+        store(self, p: *mut u32) = _mm256_storeu_si256(p.cast(), self.0);
+        add(self, other: Self) -> Self = U32x8(_mm256_add_epi32(self.0, other.0));
+        sub(self, other: Self) -> Self = U32x8(_mm256_sub_epi32(self.0, other.0));
+        xor(self, other: Self) -> Self = U32x8(_mm256_xor_si256(self.0, other.0));
+        min(self, other: Self) -> Self = U32x8(_mm256_min_epu32(self.0, other.0));
+        max(self, other: Self) -> Self = U32x8(_mm256_max_epu32(self.0, other.0));
+        load_bytes(p: *const u8) -> Self = U32x8(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast())));
     }
     #[inline(always)]
     unsafe fn rotate(self, by: u32) -> Self {
@@ -351,10 +280,6 @@ impl Words for U32x8 {
         unsafe { U32x8(_mm256_i32gather_epi32::<4>(table.cast(), index.0)) }
     }
     #[inline(always)]
-    unsafe fn load_bytes(p: *const u8) -> Self {
-        unsafe { U32x8(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast()))) }
-    }
-    #[inline(always)]
     unsafe fn pick(table: *const u32, which: Self) -> Self {
         unsafe { U32x8(_mm256_permutevar8x32_epi32(_mm256_loadu_si256(table.cast()), which.0)) }
     }
@@ -363,37 +288,15 @@ impl Words for U32x8 {
 impl Words for U32x4 {
     const LANES: usize = 4;
 
-    #[inline(always)]
-    unsafe fn splat(x: u32) -> Self {
-        unsafe { U32x4(_mm_set1_epi32(x as i32)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const u32) -> Self {
-        unsafe { U32x4(_mm_loadu_si128(p.cast())) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut u32) {
-        unsafe { _mm_storeu_si128(p.cast(), self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        unsafe { U32x4(_mm_add_epi32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        unsafe { U32x4(_mm_sub_epi32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn xor(self, other: Self) -> Self {
-        unsafe { U32x4(_mm_xor_si128(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        unsafe { U32x4(_mm_min_epu32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        unsafe { U32x4(_mm_max_epu32(self.0, other.0)) }
+    methods! {
+        splat(x: u32) -> Self = U32x4(_mm_set1_epi32(x as i32));
+        load(p: *const u32) -> Self = U32x4(_mm_loadu_si128(p.cast()));
+        store(self, p: *mut u32) = _mm_storeu_si128(p.cast(), self.0);
+        add(self, other: Self) -> Self = U32x4(_mm_add_epi32(self.0, other.0));
+        sub(self, other: Self) -> Self = U32x4(_mm_sub_epi32(self.0, other.0));
+        xor(self, other: Self) -> Self = U32x4(_mm_xor_si128(self.0, other.0));
+        min(self, other: Self) -> Self = U32x4(_mm_min_epu32(self.0, other.0));
+        max(self, other: Self) -> Self = U32x4(_mm_max_epu32(self.0, other.0));
     }
     #[inline(always)]
     unsafe fn rotate(self, by: u32) -> Self {
@@ -434,6 +337,10 @@ impl Isa for Avx2 {
     type F64 = F64x4;
     type Quad = Quad4;
 
+    methods! {
+        broadcast16(x: u16, p: *mut u16) = _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16));
+        of_bits(words: U32x8) -> F32x8 = F32x8(_mm256_castsi256_ps(words.0));
+    }
     #[inline(always)]
     unsafe fn distance_masks<const SHIFTS: bool>(
         x: [*const u16; 3],
@@ -472,10 +379,6 @@ impl Isa for Avx2 {
             }
             mask
         }
-    }
-    #[inline(always)]
-    unsafe fn broadcast16(x: u16, p: *mut u16) {
-        unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
     unsafe fn transpose_masks(masks: *mut u64) {
@@ -580,10 +483,6 @@ impl Isa for Avx2 {
             let [e, f, g, h] = if ALL { transposed(store_transposed[1]) } else { store_transposed[1] };
             [F64x4(a), F64x4(b), F64x4(c), F64x4(d), F64x4(e), F64x4(f), F64x4(g), F64x4(h)]
         }
-    }
-    #[inline(always)]
-    unsafe fn of_bits(words: U32x8) -> F32x8 {
-        unsafe { F32x8(_mm256_castsi256_ps(words.0)) }
     }
     #[inline(always)]
     unsafe fn halves(x: F64x4) -> [U32x4; 2] {

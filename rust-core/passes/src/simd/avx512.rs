@@ -1,7 +1,7 @@
 //! Vectors for AVX-512 (F, BW, DQ, VL), with or without VBMI2; with AVX2, FMA and BMI2.
 
 use super::avx2::{Avx2, U32x8};
-use super::x86::{Quad4, operators};
+use super::x86::{Quad4, methods, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
 use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
@@ -31,30 +31,21 @@ impl Reals for F32x16 {
     type Words = U32x16;
     const LANES: usize = 16;
 
-    #[inline(always)]
-    unsafe fn splat(x: f32) -> Self {
-        unsafe { F32x16(_mm512_set1_ps(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f32) -> Self {
-        unsafe { F32x16(_mm512_loadu_ps(p)) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f32) {
-        unsafe { _mm512_storeu_ps(p, self.0) }
-    }
-    #[inline(always)]
-    unsafe fn of_signed(words: U32x16) -> Self {
-        unsafe { F32x16(_mm512_cvtepi32_ps(words.0)) }
+    methods! {
+        splat(x: f32) -> Self = F32x16(_mm512_set1_ps(x));
+        load(p: *const f32) -> Self = F32x16(_mm512_loadu_ps(p));
+        store(self, p: *mut f32) = _mm512_storeu_ps(p, self.0);
+        of_signed(words: U32x16) -> Self = F32x16(_mm512_cvtepi32_ps(words.0));
+        mul_add(self, a: Self, b: Self) -> Self = F32x16(_mm512_fmadd_ps(self.0, a.0, b.0));
+        smaller(self, other: Self) -> Self = F32x16(_mm512_min_ps(self.0, other.0));
+        store_whole(self, p: *mut i32) = _mm512_storeu_si512(p.cast(), _mm512_cvttps_epi32(self.0));
+        mask_below(self, other: Self) -> u32 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) as u32;
+        compress(self, mask: u32) -> Self = F32x16(_mm512_maskz_compress_ps(mask as u16, self.0));
     }
     #[inline(always)]
     unsafe fn encode(words: U32x16) -> Self {
         let ordinary = ORDINARY_F32 as i32;
         unsafe { F32x16(_mm512_castsi512_ps(_mm512_add_epi32(words.0, _mm512_set1_epi32(ordinary)))) }
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { F32x16(_mm512_fmadd_ps(self.0, a.0, b.0)) }
     }
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
@@ -68,28 +59,12 @@ impl Reals for F32x16 {
         }
     }
     #[inline(always)]
-    unsafe fn smaller(self, other: Self) -> Self {
-        unsafe { F32x16(_mm512_min_ps(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn store_whole(self, p: *mut i32) {
-        unsafe { _mm512_storeu_si512(p.cast(), _mm512_cvttps_epi32(self.0)) }
-    }
-    #[inline(always)]
     unsafe fn round(self) -> Self {
         unsafe { F32x16(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
     }
     #[inline(always)]
     unsafe fn where_below(self, a: Self, b: Self) -> Self {
         unsafe { F32x16(_mm512_maskz_mov_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0), self.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mask_below(self, other: Self) -> u32 {
-        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) as u32 }
-    }
-    #[inline(always)]
-    unsafe fn compress(self, mask: u32) -> Self {
-        unsafe { F32x16(_mm512_maskz_compress_ps(mask as u16, self.0)) }
     }
     #[inline(always)]
     unsafe fn pick(table: *const f32, which: U32x16) -> Self {
@@ -155,21 +130,16 @@ impl Reals for F64x8 {
     type Words = U32x8;
     const LANES: usize = 8;
 
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        unsafe { F64x8(_mm512_set1_pd(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f64) -> Self {
-        unsafe { F64x8(_mm512_loadu_pd(p)) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f64) {
-        unsafe { _mm512_storeu_pd(p, self.0) }
-    }
-    #[inline(always)]
-    unsafe fn of_signed(words: U32x8) -> Self {
-        unsafe { F64x8(_mm512_cvtepi32_pd(words.0)) }
+    methods! {
+        splat(x: f64) -> Self = F64x8(_mm512_set1_pd(x));
+        load(p: *const f64) -> Self = F64x8(_mm512_loadu_pd(p));
+        store(self, p: *mut f64) = _mm512_storeu_pd(p, self.0);
+        of_signed(words: U32x8) -> Self = F64x8(_mm512_cvtepi32_pd(words.0));
+        mul_add(self, a: Self, b: Self) -> Self = F64x8(_mm512_fmadd_pd(self.0, a.0, b.0));
+        smaller(self, other: Self) -> Self = F64x8(_mm512_min_pd(self.0, other.0));
+        store_whole(self, p: *mut i32) = _mm256_storeu_si256(p.cast(), _mm512_cvttpd_epi32(self.0));
+        mask_below(self, other: Self) -> u32 = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) as u32;
+        compress(self, mask: u32) -> Self = F64x8(_mm512_maskz_compress_pd(mask as u8, self.0));
     }
     #[inline(always)]
     unsafe fn encode(words: U32x8) -> Self {
@@ -177,10 +147,6 @@ impl Reals for F64x8 {
             let ordinary = _mm512_set1_epi64(ORDINARY_F64 as i64);
             F64x8(_mm512_castsi512_pd(_mm512_or_si512(_mm512_cvtepu32_epi64(words.0), ordinary)))
         }
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { F64x8(_mm512_fmadd_pd(self.0, a.0, b.0)) }
     }
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
@@ -198,28 +164,12 @@ impl Reals for F64x8 {
         }
     }
     #[inline(always)]
-    unsafe fn smaller(self, other: Self) -> Self {
-        unsafe { F64x8(_mm512_min_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn store_whole(self, p: *mut i32) {
-        unsafe { _mm256_storeu_si256(p.cast(), _mm512_cvttpd_epi32(self.0)) }
-    }
-    #[inline(always)]
     unsafe fn round(self) -> Self {
         unsafe { F64x8(_mm512_roundscale_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
     }
     #[inline(always)]
     unsafe fn where_below(self, a: Self, b: Self) -> Self {
         unsafe { F64x8(_mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0), self.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mask_below(self, other: Self) -> u32 {
-        unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) as u32 }
-    }
-    #[inline(always)]
-    unsafe fn compress(self, mask: u32) -> Self {
-        unsafe { F64x8(_mm512_maskz_compress_pd(mask as u8, self.0)) }
     }
     #[inline(always)]
     unsafe fn pick(table: *const f64, which: U32x8) -> Self {
@@ -256,61 +206,27 @@ impl Reals for F64x8 {
 impl Words for U32x16 {
     const LANES: usize = 16;
 
-    #[inline(always)]
-    unsafe fn splat(x: u32) -> Self {
-        unsafe { U32x16(_mm512_set1_epi32(x as i32)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const u32) -> Self {
-        unsafe { U32x16(_mm512_loadu_si512(p.cast())) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut u32) {
-        unsafe { _mm512_storeu_si512(p.cast(), self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        unsafe { U32x16(_mm512_add_epi32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        unsafe { U32x16(_mm512_sub_epi32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn xor(self, other: Self) -> Self {
-        unsafe { U32x16(_mm512_xor_si512(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        unsafe { U32x16(_mm512_min_epu32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        unsafe { U32x16(_mm512_max_epu32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn rotate(self, by: u32) -> Self {
-        unsafe { U32x16(_mm512_rolv_epi32(self.0, _mm512_set1_epi32(by as i32))) }
+    methods! {
+        splat(x: u32) -> Self = U32x16(_mm512_set1_epi32(x as i32));
+        load(p: *const u32) -> Self = U32x16(_mm512_loadu_si512(p.cast()));
+        store(self, p: *mut u32) = _mm512_storeu_si512(p.cast(), self.0);
+        add(self, other: Self) -> Self = U32x16(_mm512_add_epi32(self.0, other.0));
+        sub(self, other: Self) -> Self = U32x16(_mm512_sub_epi32(self.0, other.0));
+        xor(self, other: Self) -> Self = U32x16(_mm512_xor_si512(self.0, other.0));
+        min(self, other: Self) -> Self = U32x16(_mm512_min_epu32(self.0, other.0));
+        max(self, other: Self) -> Self = U32x16(_mm512_max_epu32(self.0, other.0));
+        rotate(self, by: u32) -> Self = U32x16(_mm512_rolv_epi32(self.0, _mm512_set1_epi32(by as i32)));
+        mask_equal(self, other: Self) -> u32 = _mm512_cmpeq_epi32_mask(self.0, other.0) as u32;
+        mask_common(self, other: Self) -> u32 = _mm512_test_epi32_mask(self.0, other.0) as u32;
+        load_bytes(p: *const u8) -> Self = U32x16(_mm512_cvtepu8_epi32(_mm_loadu_si128(p.cast())));
     }
     #[inline(always)]
     unsafe fn shift_right<const BY: u32>(self) -> Self {
         unsafe { U32x16(_mm512_srlv_epi32(self.0, _mm512_set1_epi32(BY as i32))) }
     }
     #[inline(always)]
-    unsafe fn mask_equal(self, other: Self) -> u32 {
-        unsafe { _mm512_cmpeq_epi32_mask(self.0, other.0) as u32 }
-    }
-    #[inline(always)]
-    unsafe fn mask_common(self, other: Self) -> u32 {
-        unsafe { _mm512_test_epi32_mask(self.0, other.0) as u32 }
-    }
-    #[inline(always)]
     unsafe fn lookup(table: *const u32, index: Self) -> Self {
         unsafe { U32x16(_mm512_i32gather_epi32::<4>(index.0, table.cast())) }
-    }
-    #[inline(always)]
-    unsafe fn load_bytes(p: *const u8) -> Self {
-        unsafe { U32x16(_mm512_cvtepu8_epi32(_mm_loadu_si128(p.cast()))) }
     }
     #[inline(always)]
     unsafe fn pick(table: *const u32, which: Self) -> Self {
@@ -426,6 +342,10 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
     type F64 = F64x8;
     type Quad = Quad4;
 
+    methods! {
+        broadcast16(x: u16, p: *mut u16) = _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16));
+        of_bits(words: U32x16) -> F32x16 = F32x16(_mm512_castsi512_ps(words.0));
+    }
     #[inline(always)]
     unsafe fn distance_masks<const SHIFTS: bool>(
         x: [*const u16; 3],
@@ -454,10 +374,6 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
             let high = _mm512_cmplt_epi16_mask(sums[1], limit);
             low as u64 | (high as u64) << 32
         }
-    }
-    #[inline(always)]
-    unsafe fn broadcast16(x: u16, p: *mut u16) {
-        unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
     unsafe fn transpose_masks(masks: *mut u64) {
@@ -539,10 +455,6 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
             let [e, f, g, h] = if ALL { four_columns(base.add(32), offsets) } else { [zero; 4] };
             [a, b, c, d, e, f, g, h]
         }
-    }
-    #[inline(always)]
-    unsafe fn of_bits(words: U32x16) -> F32x16 {
-        unsafe { F32x16(_mm512_castsi512_ps(words.0)) }
     }
     #[inline(always)]
     unsafe fn halves(x: F64x8) -> [U32x8; 2] {

@@ -3,54 +3,36 @@
 use super::Quad;
 use std::arch::x86_64::*;
 
+/// Defines methods of traits that are one expression each: `name(arguments) -> type = expression;`.
+macro_rules! methods {
+    ($($name:ident($($arguments:tt)*) $(-> $out:ty)? = $value:expr;)*) => {
+        $(
+            #[inline(always)]
+            unsafe fn $name($($arguments)*) $(-> $out)? {
+                unsafe { $value }
+            }
+        )*
+    };
+}
+pub(super) use methods;
+
 /// Four `f64`, the sums of a particle.
 #[derive(Clone, Copy)]
 pub struct Quad4(__m256d);
 
 impl Quad for Quad4 {
-    #[inline(always)]
-    unsafe fn zero() -> Self {
-        unsafe { Quad4(_mm256_setzero_pd()) }
-    }
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        unsafe { Quad4(_mm256_set1_pd(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f64) -> Self {
-        unsafe { Quad4(_mm256_loadu_pd(p)) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f64) {
-        unsafe { _mm256_storeu_pd(p, self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        unsafe { Quad4(_mm256_add_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        unsafe { Quad4(_mm256_sub_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul(self, other: Self) -> Self {
-        unsafe { Quad4(_mm256_mul_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { Quad4(_mm256_fmadd_pd(self.0, a.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { Quad4(_mm256_fnmadd_pd(self.0, a.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn splat_f32(x: f32) -> Self {
-        unsafe { Quad4(_mm256_cvtps_pd(_mm_set1_ps(x))) }
-    }
-    #[inline(always)]
-    unsafe fn load_f32(p: *const f32) -> Self {
-        unsafe { Quad4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
+    methods! {
+        zero() -> Self = Quad4(_mm256_setzero_pd());
+        splat(x: f64) -> Self = Quad4(_mm256_set1_pd(x));
+        load(p: *const f64) -> Self = Quad4(_mm256_loadu_pd(p));
+        store(self, p: *mut f64) = _mm256_storeu_pd(p, self.0);
+        add(self, other: Self) -> Self = Quad4(_mm256_add_pd(self.0, other.0));
+        sub(self, other: Self) -> Self = Quad4(_mm256_sub_pd(self.0, other.0));
+        mul(self, other: Self) -> Self = Quad4(_mm256_mul_pd(self.0, other.0));
+        mul_add(self, a: Self, b: Self) -> Self = Quad4(_mm256_fmadd_pd(self.0, a.0, b.0));
+        neg_mul_add(self, a: Self, b: Self) -> Self = Quad4(_mm256_fnmadd_pd(self.0, a.0, b.0));
+        splat_f32(x: f32) -> Self = Quad4(_mm256_cvtps_pd(_mm_set1_ps(x)));
+        load_f32(p: *const f32) -> Self = Quad4(_mm256_cvtps_pd(_mm_loadu_ps(p)));
     }
     #[inline(always)]
     unsafe fn load_three_f32(p: *const f32) -> Self {
