@@ -1,6 +1,6 @@
 //! Vectors for AVX2 with FMA and BMI2.
 
-use super::x86::{Quad4, methods, operators};
+use super::x86::{Quad4, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
 use crate::simd::OFFSET_BITS;
 use psidpd_model::kernel::Real;

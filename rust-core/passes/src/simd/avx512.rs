@@ -1,7 +1,7 @@
 //! Vectors for AVX-512 (F, BW, DQ, VL), with or without VBMI2; with AVX2, FMA and BMI2.
 
 use super::avx2::{Avx2, U32x8};
-use super::x86::{Quad4, methods, operators};
+use super::x86::{Quad4, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
 use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;

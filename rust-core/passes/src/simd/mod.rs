@@ -15,6 +15,19 @@
 // These two conditions, on types and pointers, are the safety comments of some hundred blocks.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
+/// Defines methods of traits that are one expression each: `name(arguments) -> type = expression;`.
+macro_rules! methods {
+    ($($name:ident($($arguments:tt)*) $(-> $out:ty)? = $value:expr;)*) => {
+        $(
+            #[inline(always)]
+            #[allow(unused_unsafe)] // Some expressions are safe.
+            unsafe fn $name($($arguments)*) $(-> $out)? {
+                unsafe { $value }
+            }
+        )*
+    };
+}
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]

@@ -15,36 +15,38 @@ const LANES: usize = 8;
 #[derive(Clone, Copy)]
 pub struct Lanes<T>([T; LANES]);
 
+#[inline(always)]
+fn of_both<T: Copy, U, const N: usize>(a: [T; N], b: [T; N], of: impl Fn(T, T) -> U) -> [U; N] {
+    std::array::from_fn(|k| of(a[k], b[k]))
+}
+
+/// Bit `k` is set if flag `k` is.
+#[inline(always)]
+fn mask(flags: [bool; LANES]) -> u32 {
+    (0..LANES).map(|k| (flags[k] as u32) << k).sum()
+}
+
 macro_rules! lanes {
     ($scalar:ty, $encode:expr) => {
         impl Add for Lanes<$scalar> {
             type Output = Self;
             #[inline(always)]
-            fn add(mut self, other: Self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] += other.0[k];
-                }
-                self
+            fn add(self, other: Self) -> Self {
+                Lanes(of_both(self.0, other.0, |a, b| a + b))
             }
         }
         impl Sub for Lanes<$scalar> {
             type Output = Self;
             #[inline(always)]
-            fn sub(mut self, other: Self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] -= other.0[k];
-                }
-                self
+            fn sub(self, other: Self) -> Self {
+                Lanes(of_both(self.0, other.0, |a, b| a - b))
             }
         }
         impl Mul for Lanes<$scalar> {
             type Output = Self;
             #[inline(always)]
-            fn mul(mut self, other: Self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] *= other.0[k];
-                }
-                self
+            fn mul(self, other: Self) -> Self {
+                Lanes(of_both(self.0, other.0, |a, b| a * b))
             }
         }
         impl Real for Lanes<$scalar> {
@@ -53,11 +55,8 @@ macro_rules! lanes {
                 Lanes([x as $scalar; LANES])
             }
             #[inline(always)]
-            fn larger(mut self, other: Self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] = if self.0[k] > other.0[k] { self.0[k] } else { other.0[k] };
-                }
-                self
+            fn larger(self, other: Self) -> Self {
+                Lanes(of_both(self.0, other.0, |a, b| if a > b { a } else { b }))
             }
         }
 
@@ -66,47 +65,24 @@ macro_rules! lanes {
             type Words = Lanes<u32>;
             const LANES: usize = LANES;
 
-            #[inline(always)]
-            unsafe fn splat(x: $scalar) -> Self {
-                Lanes([x; LANES])
-            }
-            #[inline(always)]
-            unsafe fn load(p: *const $scalar) -> Self {
-                Lanes(unsafe { p.cast::<[$scalar; LANES]>().read_unaligned() })
-            }
-            #[inline(always)]
-            unsafe fn store(self, p: *mut $scalar) {
-                unsafe { p.cast::<[$scalar; LANES]>().write_unaligned(self.0) }
-            }
-            #[inline(always)]
-            unsafe fn of_signed(words: Lanes<u32>) -> Self {
-                let mut out = [0.0; LANES];
-                for k in 0..LANES {
-                    out[k] = words.0[k] as i32 as $scalar;
-                }
-                Lanes(out)
-            }
-            #[inline(always)]
-            unsafe fn encode(words: Lanes<u32>) -> Self {
-                Lanes(words.0.map($encode))
-            }
-            #[inline(always)]
-            unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-                self * a + b
-            }
-            #[inline(always)]
-            unsafe fn inverse_root(mut self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] = 1.0 / self.0[k].sqrt();
-                }
-                self
-            }
-            #[inline(always)]
-            unsafe fn smaller(mut self, other: Self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] = if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] };
-                }
-                self
+            methods! {
+                splat(x: $scalar) -> Self = Lanes([x; LANES]);
+                load(p: *const $scalar) -> Self = Lanes(p.cast::<[$scalar; LANES]>().read_unaligned());
+                store(self, p: *mut $scalar) = p.cast::<[$scalar; LANES]>().write_unaligned(self.0);
+                of_signed(words: Lanes<u32>) -> Self = Lanes(words.0.map(|w| w as i32 as $scalar));
+                encode(words: Lanes<u32>) -> Self = Lanes(words.0.map($encode));
+                mul_add(self, a: Self, b: Self) -> Self = self * a + b;
+                inverse_root(self) -> Self = Lanes(self.0.map(|x| 1.0 / x.sqrt()));
+                smaller(self, other: Self) -> Self =
+                    Lanes(of_both(self.0, other.0, |a, b| if a < b { a } else { b }));
+                where_below(self, a: Self, b: Self) -> Self =
+                    Lanes(std::array::from_fn(|k| if a.0[k] < b.0[k] { self.0[k] } else { 0.0 }));
+                mask_below(self, other: Self) -> u32 = mask(of_both(self.0, other.0, |a, b| a < b));
+                pick(table: *const $scalar, which: Lanes<u32>) -> Self =
+                    Self::lookup(table, Lanes(which.0.map(|w| w % LANES as u32)));
+                lookup(table: *const $scalar, index: Lanes<u32>) -> Self =
+                    Lanes(index.0.map(|k| unsafe { *table.add(k as usize) }));
+                store_transposed(columns: [Self; 4], p: *mut $scalar) = Self::store_rows(columns, !0, p);
             }
             #[inline(always)]
             unsafe fn store_whole(self, p: *mut i32) {
@@ -116,28 +92,10 @@ macro_rules! lanes {
                 }
             }
             #[inline(always)]
-            unsafe fn round(mut self) -> Self {
-                for k in 0..LANES {
-                    // Adding a number without room for a fraction rounds, without a function call.
-                    const ROOM: $scalar = 1.5 / <$scalar>::EPSILON;
-                    self.0[k] = (self.0[k] + ROOM) - ROOM;
-                }
-                self
-            }
-            #[inline(always)]
-            unsafe fn where_below(mut self, a: Self, b: Self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] = if a.0[k] < b.0[k] { self.0[k] } else { 0.0 };
-                }
-                self
-            }
-            #[inline(always)]
-            unsafe fn mask_below(self, other: Self) -> u32 {
-                let mut mask = 0;
-                for k in 0..LANES {
-                    mask |= ((self.0[k] < other.0[k]) as u32) << k;
-                }
-                mask
+            unsafe fn round(self) -> Self {
+                // Adding a number without room for a fraction rounds, without a function call.
+                const ROOM: $scalar = 1.5 / <$scalar>::EPSILON;
+                Lanes(self.0.map(|x| (x + ROOM) - ROOM))
             }
             #[inline(always)]
             unsafe fn compress(self, mask: u32) -> Self {
@@ -150,22 +108,6 @@ macro_rules! lanes {
                 let mut first = [0.0; LANES];
                 first.copy_from_slice(&out[..LANES]);
                 Lanes(first)
-            }
-            #[inline(always)]
-            unsafe fn pick(table: *const $scalar, which: Lanes<u32>) -> Self {
-                unsafe { Self::lookup(table, Lanes(which.0.map(|w| w % LANES as u32))) }
-            }
-            #[inline(always)]
-            unsafe fn lookup(table: *const $scalar, index: Lanes<u32>) -> Self {
-                let mut out = [0.0; LANES];
-                for k in 0..LANES {
-                    out[k] = unsafe { *table.add(index.0[k] as usize) };
-                }
-                Lanes(out)
-            }
-            #[inline(always)]
-            unsafe fn store_transposed(columns: [Self; 4], p: *mut $scalar) {
-                unsafe { Self::store_rows(columns, !0, p) }
             }
             #[inline(always)]
             unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut $scalar) {
@@ -188,91 +130,25 @@ lanes!(f64, |w: u32| f64::from_bits(ORDINARY_F64 | w as u64));
 impl Words for Lanes<u32> {
     const LANES: usize = LANES;
 
-    #[inline(always)]
-    unsafe fn splat(x: u32) -> Self {
-        Lanes([x; LANES])
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const u32) -> Self {
-        Lanes(unsafe { p.cast::<[u32; LANES]>().read_unaligned() })
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut u32) {
-        unsafe { p.cast::<[u32; LANES]>().write_unaligned(self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(mut self, other: Self) -> Self {
-        for k in 0..LANES {
-            self.0[k] = self.0[k].wrapping_add(other.0[k]);
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn sub(mut self, other: Self) -> Self {
-        for k in 0..LANES {
-            self.0[k] = self.0[k].wrapping_sub(other.0[k]);
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn xor(mut self, other: Self) -> Self {
-        for k in 0..LANES {
-            self.0[k] ^= other.0[k];
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn min(mut self, other: Self) -> Self {
-        for k in 0..LANES {
-            self.0[k] = if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] };
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn max(mut self, other: Self) -> Self {
-        for k in 0..LANES {
-            self.0[k] = if self.0[k] > other.0[k] { self.0[k] } else { other.0[k] };
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn rotate(mut self, by: u32) -> Self {
-        for k in 0..LANES {
-            self.0[k] = self.0[k].rotate_left(by);
-        }
-        self
+    methods! {
+        splat(x: u32) -> Self = Lanes([x; LANES]);
+        load(p: *const u32) -> Self = Lanes(p.cast::<[u32; LANES]>().read_unaligned());
+        store(self, p: *mut u32) = p.cast::<[u32; LANES]>().write_unaligned(self.0);
+        add(self, other: Self) -> Self = Lanes(of_both(self.0, other.0, u32::wrapping_add));
+        sub(self, other: Self) -> Self = Lanes(of_both(self.0, other.0, u32::wrapping_sub));
+        xor(self, other: Self) -> Self = Lanes(of_both(self.0, other.0, |a, b| a ^ b));
+        min(self, other: Self) -> Self = Lanes(of_both(self.0, other.0, Ord::min));
+        max(self, other: Self) -> Self = Lanes(of_both(self.0, other.0, Ord::max));
+        rotate(self, by: u32) -> Self = Lanes(self.0.map(|x| x.rotate_left(by)));
+        mask_equal(self, other: Self) -> u32 = mask(of_both(self.0, other.0, |a, b| a == b));
+        mask_common(self, other: Self) -> u32 = mask(of_both(self.0, other.0, |a, b| a & b != 0));
+        lookup(table: *const u32, index: Self) -> Self = Lanes(index.0.map(|k| unsafe { *table.add(k as usize) }));
+        load_bytes(p: *const u8) -> Self = Lanes(p.cast::<[u8; LANES]>().read_unaligned().map(u32::from));
+        pick(table: *const u32, which: Self) -> Self = Self::lookup(table, which);
     }
     #[inline(always)]
     unsafe fn shift_right<const BY: u32>(self) -> Self {
         Lanes(self.0.map(|x| x >> BY))
-    }
-    #[inline(always)]
-    unsafe fn mask_equal(self, other: Self) -> u32 {
-        let mut mask = 0;
-        for k in 0..LANES {
-            mask |= ((self.0[k] == other.0[k]) as u32) << k;
-        }
-        mask
-    }
-    #[inline(always)]
-    unsafe fn mask_common(self, other: Self) -> u32 {
-        let mut mask = 0;
-        for k in 0..LANES {
-            mask |= ((self.0[k] & other.0[k] != 0) as u32) << k;
-        }
-        mask
-    }
-    #[inline(always)]
-    unsafe fn lookup(table: *const u32, index: Self) -> Self {
-        Lanes(index.0.map(|k| unsafe { *table.add(k as usize) }))
-    }
-    #[inline(always)]
-    unsafe fn load_bytes(p: *const u8) -> Self {
-        Lanes(unsafe { p.cast::<[u8; LANES]>().read_unaligned() }.map(u32::from))
-    }
-    #[inline(always)]
-    unsafe fn pick(table: *const u32, which: Self) -> Self {
-        Lanes(which.0.map(|w| unsafe { *table.add(w as usize) }))
     }
 }
 
@@ -281,64 +157,23 @@ impl Words for Lanes<u32> {
 pub struct Four([f64; 4]);
 
 impl Quad for Four {
-    #[inline(always)]
-    unsafe fn zero() -> Self {
-        Four([0.0; 4])
-    }
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        Four([x; 4])
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f64) -> Self {
-        Four(unsafe { p.cast::<[f64; 4]>().read_unaligned() })
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f64) {
-        unsafe { p.cast::<[f64; 4]>().write_unaligned(self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(mut self, other: Self) -> Self {
-        for k in 0..4 {
-            self.0[k] += other.0[k];
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn sub(mut self, other: Self) -> Self {
-        for k in 0..4 {
-            self.0[k] -= other.0[k];
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn mul(mut self, other: Self) -> Self {
-        for k in 0..4 {
-            self.0[k] *= other.0[k];
-        }
-        self
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { self.mul(a).add(b) }
-    }
-    #[inline(always)]
-    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { b.sub(self.mul(a)) }
-    }
-    #[inline(always)]
-    unsafe fn splat_f32(x: f32) -> Self {
-        Four([f64::from(x); 4])
-    }
-    #[inline(always)]
-    unsafe fn load_f32(p: *const f32) -> Self {
-        let row = unsafe { p.cast::<[f32; 4]>().read_unaligned() };
-        Four([row[0] as f64, row[1] as f64, row[2] as f64, row[3] as f64])
+    methods! {
+        zero() -> Self = Four([0.0; 4]);
+        splat(x: f64) -> Self = Four([x; 4]);
+        load(p: *const f64) -> Self = Four(p.cast::<[f64; 4]>().read_unaligned());
+        store(self, p: *mut f64) = p.cast::<[f64; 4]>().write_unaligned(self.0);
+        add(self, other: Self) -> Self = Four(of_both(self.0, other.0, |a, b| a + b));
+        sub(self, other: Self) -> Self = Four(of_both(self.0, other.0, |a, b| a - b));
+        mul(self, other: Self) -> Self = Four(of_both(self.0, other.0, |a, b| a * b));
+        mul_add(self, a: Self, b: Self) -> Self = self.mul(a).add(b);
+        neg_mul_add(self, a: Self, b: Self) -> Self = b.sub(self.mul(a));
+        splat_f32(x: f32) -> Self = Four([f64::from(x); 4]);
+        load_f32(p: *const f32) -> Self = Four(p.cast::<[f32; 4]>().read_unaligned().map(f64::from));
     }
     #[inline(always)]
     unsafe fn load_three_f32(p: *const f32) -> Self {
-        let row = unsafe { p.cast::<[f32; 3]>().read_unaligned() };
-        Four([row[0] as f64, row[1] as f64, row[2] as f64, 0.0])
+        let [x, y, z] = unsafe { p.cast::<[f32; 3]>().read_unaligned() }.map(f64::from);
+        Four([x, y, z, 0.0])
     }
     #[inline(always)]
     unsafe fn load_three(p: *const f64) -> Self {

@@ -3,19 +3,6 @@
 use super::Quad;
 use std::arch::x86_64::*;
 
-/// Defines methods of traits that are one expression each: `name(arguments) -> type = expression;`.
-macro_rules! methods {
-    ($($name:ident($($arguments:tt)*) $(-> $out:ty)? = $value:expr;)*) => {
-        $(
-            #[inline(always)]
-            unsafe fn $name($($arguments)*) $(-> $out)? {
-                unsafe { $value }
-            }
-        )*
-    };
-}
-pub(super) use methods;
-
 /// Four `f64`, the sums of a particle.
 #[derive(Clone, Copy)]
 pub struct Quad4(__m256d);
