@@ -167,7 +167,6 @@ impl DataFile {
         Ok(())
     }
 
-    /// Sorts atoms and velocities by tag.
     pub fn sort_by_id(&mut self) {
         let mut order: Vec<usize> = (0..self.atoms.len()).collect();
         order.sort_by_key(|&i| self.atoms[i].id);

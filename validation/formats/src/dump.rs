@@ -10,9 +10,8 @@ use super::text::{Problem, TextError, any_f64, finite, shown, whole};
 pub struct Frame {
     pub step: i64,
     pub time: Option<f64>,
-    /// Lower corner of the box, not of the bounding box of a tilted box.
+    /// The corners are those of the box, not of the bounding box of a tilted box.
     pub boxlo: [f64; 3],
-    /// Upper corner of the box, not of the bounding box of a tilted box.
     pub boxhi: [f64; 3],
     /// Tilt factors xy, xz, yz of a triclinic box.
     pub tilt: Option<[f64; 3]>,

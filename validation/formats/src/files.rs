@@ -30,7 +30,6 @@ pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Writ
     write(path, bytes).map_err(WriteError::at(path))
 }
 
-/// Removes a file if it exists.
 pub fn remove_if_there(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(unless_missing)
 }

@@ -17,7 +17,6 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// An unknown value.
     pub const NONE: Measured = Measured { value: f64::NAN, error: f64::NAN };
 
     /// The mean of a correlated series with the error of [`estimate`], or of fewer samples than that accepts as if they were
@@ -37,7 +36,6 @@ impl Measured {
         Measured { value, error: (squares / (count * (count - 1.0))).sqrt() }
     }
 
-    /// Multiplies value and error by a factor.
     pub fn times(self, factor: f64) -> Measured {
         Measured { value: self.value * factor, error: self.error * factor.abs() }
     }
@@ -91,7 +89,6 @@ impl TryFrom<Unchecked> for Series {
 }
 
 impl Series {
-    /// A series of vectors of `width` numbers.
     pub fn new(width: usize) -> Series {
         Series::with_rows(width, MOST_ROWS)
     }
@@ -142,7 +139,6 @@ impl Series {
         self.block *= 2;
     }
 
-    /// The number of stored rows.
     pub fn len(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
@@ -156,7 +152,6 @@ impl Series {
         self.len() as u64 * self.block
     }
 
-    /// The number of components of a sample.
     pub fn width(&self) -> usize {
         self.width
     }
@@ -166,7 +161,6 @@ impl Series {
         self.rows.chunks_exact(self.width.max(1))
     }
 
-    /// One component of every row.
     pub fn channel(&self, k: usize) -> Vec<f64> {
         self.rows().map(|row| row[k]).collect()
     }

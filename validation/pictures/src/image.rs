@@ -4,7 +4,6 @@ use base64::Engine as _;
 /// Pixels are stored row after row from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
-    /// The number of pixels in a row.
     pub width: usize,
     pub height: usize,
     /// The slice has `width · height` colours.
@@ -131,7 +130,6 @@ impl Image {
     }
 }
 
-/// A PNG file as a data address.
 pub fn data_url(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }

@@ -45,7 +45,6 @@ const NAMES: f64 = 150.0;
 const CENTRE: Pos = Pos { h_pos: HPos::Center, v_pos: VPos::Center };
 
 impl Figure {
-    /// Draws the particles of a frame.
     pub fn particles(title: &str, frame: &Frame, options: &ParticleOptions) -> Figure {
         let (image, projection) = draw_particles(frame, options);
         let view = if frame.dimensions == 2 { View::Z } else { options.view };

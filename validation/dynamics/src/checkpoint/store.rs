@@ -103,7 +103,6 @@ impl Store {
             .map_err(WriteError::at(&newest))
     }
 
-    /// Removes all checkpoint files but the newest.
     pub fn keep_newest(&self) -> Result<(), WriteError> {
         self.remove(&[UNFINISHED, BEFORE])
     }

@@ -10,13 +10,11 @@ pub struct Thermo {
     pub temperature: f64,
     /// The energy `U` of the conservative forces.
     pub potential: f64,
-    /// The kinetic energy `½ Σ m v²`.
     pub kinetic: f64,
     /// The pressure: a third (in two dimensions half) of the trace of `tensor`.
     pub pressure: f64,
     /// The pressure tensor in the order xx, yy, zz, xy, xz, yz, thermostat forces included.
     pub tensor: [f64; 6],
-    /// The pressure of the conservative forces alone.
     pub conservative_pressure: f64,
 }
 
@@ -48,7 +46,6 @@ impl Sums {
         self.conservative_pressure += t.conservative_pressure;
     }
 
-    /// The means; `None` without rows.
     pub fn means(&self) -> Option<Means> {
         let count = self.rows as f64;
         (self.rows > 0).then(|| Means {

@@ -32,7 +32,6 @@ impl BodyForce {
         all.then_some(Drive { across, along, acceleration: self.acceleration[along] })
     }
 
-    /// The acceleration at the point `x` in the box.
     pub fn at(&self, domain: &PeriodicBox, x: [f64; 3]) -> [f64; 3] {
         match self.reversed_along {
             Some(k) if domain.fraction(x)[k] >= 0.5 => self.acceleration.map(|a| -a),

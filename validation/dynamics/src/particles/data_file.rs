@@ -9,7 +9,6 @@ use psidpd_formats::FormatError;
 use psidpd_formats::data::{Atom, DataFile};
 use std::path::Path;
 
-/// The error of particles that are no valid state of a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the initial state is not usable: {message}")]
 pub struct StateError {

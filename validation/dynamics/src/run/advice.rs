@@ -29,11 +29,9 @@ const WORTH: f64 = 0.01;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Advice {
     pub stage: String,
-    /// The time step Δt of the stage.
     pub dt: f64,
     /// The errors of the stage: of the configurational temperature, and of the carried pressure in ρkT.
     pub errors: [f64; 2],
-    /// The time step Δt of the better step.
     pub better_dt: f64,
     /// The errors of the better step, in the order of `errors`.
     pub better_errors: [f64; 2],
@@ -106,7 +104,6 @@ impl fmt::Display for Advice {
     }
 }
 
-/// Rounds a positive number to two digits.
 fn two_digits(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }

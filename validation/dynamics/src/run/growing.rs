@@ -33,7 +33,6 @@ impl GrowingFile {
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written })
     }
 
-    /// The file's name in the folder of the run.
     pub fn name(&self) -> &'static str {
         self.name
     }
@@ -47,7 +46,6 @@ impl GrowingFile {
         write(self).map_err(|source| RunError::Output { path: self.path.clone(), source })
     }
 
-    /// Writes the buffer and syncs the file to the disk.
     pub fn sync(&mut self) -> Result<(), RunError> {
         self.attempt(|file| {
             file.out.flush()?;

@@ -19,7 +19,6 @@ pub struct Live {
 }
 
 impl Live {
-    /// Prepares the first step of a scene.
     pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
         memory::check(particles, memory::PARTICLE)?;
@@ -56,7 +55,6 @@ impl Live {
         self.begin + self.done as f64 * self.stage().dt
     }
 
-    /// The steps of the scene that are left.
     pub fn left(&self) -> u64 {
         let all: u64 = self.scene.stages.iter().map(|stage| stage.steps).sum();
         all.saturating_sub(self.simulation.step_number())

@@ -38,7 +38,6 @@ pub enum Begin {
 #[derive(Debug)]
 pub enum Start {
     New,
-    /// The state of a checkpoint.
     Resumed {
         step: u64,
         /// The version of the program that wrote the checkpoint, if it differs from this program: later steps
@@ -49,7 +48,6 @@ pub enum Start {
         /// The fault of the newest checkpoint, if the run continues from the previous one.
         fallback: Option<CheckpointError>,
     },
-    /// The run has finished: no step is left.
     Finished,
 }
 
@@ -185,7 +183,6 @@ impl<'a> Runner<'a> {
         self.run.simulation.falsify(fault)
     }
 
-    /// Describes the evaluation of the forces for people; see [`Simulation::evaluation`].
     pub fn evaluation(&self) -> String {
         self.run.simulation.evaluation()
     }
@@ -216,7 +213,6 @@ impl<'a> Runner<'a> {
         run.go_on(stop, progress).map_err(|error| run.stop(error))
     }
 
-    /// Makes the remaining steps without interruption.
     pub fn run_to_end(&mut self, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
         loop {
             if let Outcome::Finished { summary, .. } = self.run(&AtomicUsize::new(0), progress)? {
@@ -274,7 +270,6 @@ fn usable(
     Ok(())
 }
 
-/// Returns an error if a new run would replace another.
 fn refuse_other_runs(store: &Store, identity: &Identity, out: &Path) -> Result<(), RunError> {
     if !store.exists() {
         return Ok(());

@@ -15,7 +15,6 @@ impl Scene {
         Ok(simulation)
     }
 
-    /// Puts a simulation of this scene on the scene's device.
     pub(super) fn put_on_device(&self, simulation: &mut Simulation) -> Result<(), RunError> {
         let refused = match simulation.use_device(self.device) {
             Err(RunError::Device(error)) => Some(self.located(error, |_| None)),

@@ -34,7 +34,6 @@ impl ThermoFile {
         Ok(this)
     }
 
-    /// Opens the file of a resumed run and truncates it to the bytes that were `written` at the checkpoint.
     pub fn reopen(folder: &Path, written: Written) -> Result<ThermoFile, RunError> {
         GrowingFile::reopen(folder, Self::NAME, written).map(ThermoFile)
     }

@@ -17,11 +17,9 @@ pub struct Timing {
 pub struct Session {
     /// The step after which the session began.
     pub from_step: u64,
-    /// The last step of the session.
     pub to_step: u64,
     /// Wall time of the session, output included, in seconds.
     pub wall_seconds: f64,
-    /// Particles times steps over the wall time.
     pub particle_steps_per_second: f64,
     /// The GPU that made the steps, with its driver; left out for the CPU.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -31,7 +29,6 @@ pub struct Session {
     pub thermostat: Option<Iterations>,
 }
 
-/// Iterations of the updates of an implicit thermostat.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iterations {
     pub mean: f64,

@@ -24,7 +24,6 @@ impl Walls {
         self.faces.iter().any(Option::is_some)
     }
 
-    /// Lower and upper face of each reflecting direction.
     pub fn faces(&self) -> [Option<[f64; 2]>; 3] {
         self.faces
     }

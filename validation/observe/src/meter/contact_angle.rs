@@ -21,7 +21,6 @@ const FEWEST: usize = 4;
 /// A wall: its direction, and whether it is at the upper end.
 type Face = (usize, bool);
 
-/// The density around the vertical through a drop on a wall, and the circle that fits its contour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ContactAngle {
     wall: Face,

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 /// The number of rows of fields that are kept for error bars.
 const ROWS: usize = 64;
 
-/// The mean density on a plane, averaged over the direction normal to it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DensityField {
     axes: [usize; 2],

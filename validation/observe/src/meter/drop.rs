@@ -126,7 +126,6 @@ impl Drop {
         sum / volume
     }
 
-    /// Warnings about the drop.
     fn doubts(&self, no_drop: bool) -> String {
         let mut doubts = Vec::new();
         let percolated = self.size.mean(3).value;

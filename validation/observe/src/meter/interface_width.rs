@@ -9,7 +9,6 @@ use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// The densities of a slab and of its vapour, and the width of the interfaces.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {
     across: Across,

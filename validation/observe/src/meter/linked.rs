@@ -102,7 +102,6 @@ impl Linked {
         self.labels[particle] == Some(cluster)
     }
 
-    /// Returns true if a cluster meets its own image.
     pub fn percolates(&self, cluster: usize) -> bool {
         self.percolates[cluster]
     }
@@ -146,12 +145,10 @@ impl Distance {
         Distance { given: Some(value), chosen: None, longest: value }
     }
 
-    /// The distance; `None` before the first sample.
     pub fn value(&self) -> Option<f64> {
         self.given.or(self.chosen)
     }
 
-    /// Forgets the choice.
     pub fn forget(&mut self) {
         self.chosen = None;
     }

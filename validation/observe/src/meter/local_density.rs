@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 /// The number of shells in the integral `[w g]` over the pair distribution.
 const SHELLS: usize = 200;
 
-/// The distribution of the local density, and the integrals of the kernel over g(r).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalDensity {
     name: String,

@@ -48,7 +48,6 @@ pub trait Meter: Sized {
     /// True if the observable needs motion in time, which Monte Carlo does not have.
     const OF_MOTION: bool = false;
 
-    /// Reads the settings of the observable.
     fn read(options: &Options) -> Result<Self, FileError>;
 
     /// The quantities that the forces of a sampled step must provide.

@@ -7,7 +7,6 @@ use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// The mean-square displacement and the diffusion coefficient of each species.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Msd {
     species: Vec<String>,

@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 /// The number of rows of density fields that are kept for error bars.
 const ROWS: usize = 64;
 
-/// The density isosurface of an axisymmetric drop, and its Bond number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pendant {
     axis: usize,

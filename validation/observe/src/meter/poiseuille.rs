@@ -8,7 +8,6 @@ use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// The viscosity from two opposite Poiseuille flows in a periodic box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Poiseuille {
     across: Across,

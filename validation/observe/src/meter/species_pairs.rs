@@ -9,7 +9,6 @@ pub struct SpeciesPairs {
 }
 
 impl SpeciesPairs {
-    /// The `species` are names.
     pub fn new(species: &[String]) -> SpeciesPairs {
         SpeciesPairs { species: species.to_vec() }
     }

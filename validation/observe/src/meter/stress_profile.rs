@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 /// The numbers in a bin: normal and tangential pressure of momenta, then of forces.
 const WIDTH: usize = 4;
 
-/// The pressure tensor of Irving and Kirkwood along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StressProfile {
     across: Across,

@@ -10,7 +10,6 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::{PeriodicBox, Want};
 use serde::{Deserialize, Serialize};
 
-/// The surface tension of interfaces normal to an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceTension {
     across: Across,

@@ -13,7 +13,6 @@ use std::collections::VecDeque;
 /// The number of rows of correlation functions that are kept for error bars.
 const ROWS: usize = 128;
 
-/// The shear viscosity from the fluctuations of the stress.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Viscosity {
     dimensions: usize,

@@ -36,7 +36,6 @@ pub struct HeadlineValue {
     pub unit: String,
     /// The file or observable that the value comes from.
     pub source: String,
-    /// The mean-field prediction, if there is one.
     pub mean_field: Option<f64>,
     /// The published value for this fluid at this kT, and its error.
     pub published: Option<[f64; 2]>,

@@ -139,7 +139,6 @@ impl<'a> Curves<'a> {
         )
     }
 
-    /// Means over the last stage.
     fn means(&self, particles: Option<usize>) -> super::super::Table {
         let mut out =
             super::super::Table::new(["quantity", "mean ± error", "independent rows", "unit", "what it is"]);

@@ -10,9 +10,7 @@ use psidpd_pictures::{FieldOptions, ParticleOptions, View};
 use psidpd_pictures::{animate, animation_url};
 use std::path::Path;
 
-/// The last state in a folder.
 pub struct State {
-    /// The name of the file with the state.
     pub file: &'static str,
     pub configuration: Configuration,
 }

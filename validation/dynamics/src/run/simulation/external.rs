@@ -76,7 +76,6 @@ impl External {
 }
 
 impl Simulation {
-    /// Adds body forces, and sets the forces on frozen particles to zero.
     pub(super) fn add_external_forces(&mut self) {
         self.external.add_forces(&mut self.particles, self.forces.pool());
     }
@@ -88,7 +87,6 @@ impl Simulation {
         self.external.find_frozen(&mut self.particles);
     }
 
-    /// Whether each particle is frozen; empty if none is.
     pub fn frozen(&self) -> &[bool] {
         &self.external.frozen
     }

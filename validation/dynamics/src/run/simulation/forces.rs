@@ -24,7 +24,6 @@ pub(super) struct Forces {
 }
 
 impl Forces {
-    /// Creates the forces; fails if the model is invalid at `kt`.
     pub fn new(model: &Model, kt: f64) -> Result<Forces, RunError> {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         Ok(Forces {
@@ -72,7 +71,6 @@ impl Forces {
         self.tally = tally;
     }
 
-    /// Sets the totals of the last evaluation to infinity.
     pub fn set_infinite(&mut self) {
         self.tally = Tally { excess: f64::INFINITY, virial: [f64::INFINITY; 6], ..Tally::default() };
     }
@@ -133,7 +131,6 @@ impl Forces {
         self.earlier_out_of_bounds = earlier;
     }
 
-    /// Changes the temperature; fails if the model is invalid at `kt`.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         let (settings, pool) = (self.engine.settings(), self.engine.pool().clone());
         self.replace(Engine::with_pool(&self.model.at(kt)?, settings, pool)?);
@@ -176,7 +173,6 @@ impl Simulation {
         self.forces.settings()
     }
 
-    /// The engine, for its diagnostics.
     pub fn engine(&self) -> &Engine {
         &self.forces.engine
     }

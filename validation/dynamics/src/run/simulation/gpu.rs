@@ -77,7 +77,6 @@ fn rule(integrator: Integrator) -> Result<Rule, RunError> {
 }
 
 impl Simulation {
-    /// Makes later steps on a GPU.
     pub(super) fn use_gpu(&mut self, number: usize) -> Result<(), RunError> {
         let device = gpu::Device::open(Some(number)).map_err(failed)?;
         let conditions = self.conditions();
@@ -98,12 +97,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// The machine, for its diagnostics.
     pub fn gpu(&mut self) -> Option<&mut GpuSimulation> {
         self.gpu.as_mut().map(|gpu| &mut gpu.machine)
     }
 
-    /// The GPU in words; `None` on the CPU.
     pub fn gpu_name(&self) -> Option<String> {
         self.gpu.as_ref().map(|gpu| gpu.device.info().to_string())
     }

@@ -51,7 +51,6 @@ impl Simulation {
         self.monte_carlo.found
     }
 
-    /// Sets the largest displacement, for a resumed run.
     pub fn set_max_move(&mut self, found: Option<f64>) {
         self.monte_carlo.found = found;
     }
@@ -62,7 +61,6 @@ impl Simulation {
         accepted as f64 / trials.max(1) as f64
     }
 
-    /// The random generator of the present step.
     pub(in crate::run) fn random_of_step(&self) -> ChaCha8Rng {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.seed.to_le_bytes());

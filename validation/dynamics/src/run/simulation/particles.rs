@@ -59,7 +59,6 @@ impl Particles {
         &self.force
     }
 
-    /// The particles and mutable forces.
     pub fn forces_mut(&mut self) -> (&State, &mut [[f64; 3]]) {
         (&self.state, &mut self.force)
     }
@@ -81,7 +80,6 @@ impl Particles {
         std::mem::replace(&mut self.state.domain, domain)
     }
 
-    /// A number that changes with the positions.
     pub fn moves(&self) -> u64 {
         self.moves
     }
@@ -173,7 +171,6 @@ impl Simulation {
         &self.particles.state.tag
     }
 
-    /// Number of box edges travelled in each direction.
     pub fn image_flags(&self) -> &[[i32; 3]] {
         &self.particles.state.image
     }

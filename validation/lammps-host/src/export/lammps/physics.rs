@@ -102,7 +102,6 @@ impl<'a> Physics<'a> {
         move |a| format!("mass*({a:?}){}", half.as_deref().unwrap_or_default())
     }
 
-    /// Writes the group that a body force acts on.
     fn write_group(
         &self,
         s: &mut impl Write,
@@ -123,7 +122,6 @@ impl<'a> Physics<'a> {
         Ok(group)
     }
 
-    /// Writes the commands that remove the body forces.
     pub fn write_end_of_body_forces(&self, s: &mut impl Write) -> Result {
         for k in 1..=self.scene.body_forces.len() {
             writeln!(s, "unfix         body{k}")?;
