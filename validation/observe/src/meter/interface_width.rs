@@ -1,13 +1,6 @@
-use super::Meter;
 use super::across::Across;
-use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, PLAIN, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
+use super::*;
 use crate::profile::{DensityProfile, interface, slab_edges};
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {

@@ -1,12 +1,5 @@
-use super::Meter;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
+use super::*;
 use psidpd_core::model::kernel::Kernel;
-use serde::{Deserialize, Serialize};
 
 /// The number of shells in the integral `[w g]` over the pair distribution.
 const SHELLS: usize = 200;
