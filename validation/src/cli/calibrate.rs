@@ -1,16 +1,7 @@
-use super::inputs::Files;
 use super::run::threads_at_once;
-use super::say::{self, say};
-use super::settings::temperature;
-use super::{Failure, Verdict, write_json};
-use psidpd_core::model::Model;
-use psidpd_experiments::ExperimentError;
+use super::*;
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
-use psidpd_formats::files::write_atomically;
-use psidpd_report::Table;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 
 /// Find the corrected density with which a model has the pressure it was made for.
 ///

@@ -1,8 +1,4 @@
-use super::inputs::Files;
-use super::say::say;
-use super::settings::temperature;
-use super::{Failure, Settings, Verdict, write_json};
-use psidpd_core::document::Document;
+use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_dynamics::run::bytes_per_particle;
 use psidpd_experiments::check::{
@@ -10,7 +6,6 @@ use psidpd_experiments::check::{
 };
 use psidpd_formats::memory::{self, shown};
 use psidpd_report::quantity::{decimal, number};
-use std::path::{Path, PathBuf};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
 #[derive(Debug, clap::Args)]

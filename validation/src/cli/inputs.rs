@@ -1,9 +1,8 @@
 //! No verb overwrites a file that it reads.
 
-use super::error::CliError;
-use psidpd_core::document::{Document, Section, Value};
+use super::{CliError, Document, Path, PathBuf};
+use psidpd_core::document::{Section, Value};
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
 
 /// The input and output files of a verb.
 #[derive(Debug, Default)]

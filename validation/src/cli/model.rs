@@ -1,13 +1,7 @@
 use super::run::threads_at_once;
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
-use psidpd_experiments::ExperimentError;
+use super::*;
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::from_eos::{Options, Substance, from_eos};
-use psidpd_formats::files::write_atomically;
-use psidpd_report::Table;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 
 /// Make a model file.
 #[derive(Debug, clap::Subcommand)]

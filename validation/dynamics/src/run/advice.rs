@@ -1,7 +1,7 @@
 //! Advice about an integrator with larger steps than velocity Verlet.
 
-use super::simulation::Simulation;
-use crate::integrator::{Coupling, Integrator};
+use super::{Integrator, Simulation};
+use crate::integrator::Coupling;
 use crate::scene::Stage;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::configurational;

@@ -1,6 +1,6 @@
 //! Particles in the order of files.
 
-use super::simulation::Simulation;
+use super::Simulation;
 use crate::particles::order_of_tags;
 use psidpd_formats::Frame;
 

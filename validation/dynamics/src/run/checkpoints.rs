@@ -1,4 +1,4 @@
-use super::error::RunError;
+use super::RunError;
 use crate::checkpoint::{Checkpoint, Store};
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-use super::error::RunError;
+use super::RunError;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-use super::error::RunError;
+use super::RunError;
 use crate::checkpoint::Written;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};

@@ -1,5 +1,4 @@
-use super::error::RunError;
-use super::simulation::Simulation;
+use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::{Settings, Want};
 use psidpd_formats::memory;

@@ -1,10 +1,6 @@
 //! Reports to the caller of a run: its progress, and its outcome.
 
-use super::advice::Advice;
-use super::summary::Summary;
-use super::timing::Timing;
-use super::watch::Deviation;
-use crate::checkpoint::Thermo;
+use super::{Advice, Deviation, Summary, Thermo, Timing};
 
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {

@@ -1,10 +1,9 @@
 //! The files of a run in its folder, except checkpoints and `timing.json`.
 
-use super::dump::write_frame;
-use super::error::RunError;
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
-use crate::checkpoint::{Checkpoint, Store, Thermo, Written};
+use super::{RunError, Thermo, write_frame};
+use crate::checkpoint::{Checkpoint, Store, Written};
 use crate::scene::{Scene, every};
 use psidpd_formats::files::remove_if_there;
 use psidpd_formats::{Frame, GsdFile, write_xyz};

@@ -1,16 +1,10 @@
 use super::checkpoints::Checkpoints;
-use super::error::RunError;
 use super::folder::Folder;
-use super::outcome::{Outcome, Progress};
 use super::output::{Output, replaces};
-use super::simulation::Simulation;
-use super::summary::Summary;
-use super::timing::Timing;
 use super::underway::Run;
-use super::watch::bytes_per_particle;
+use super::{Outcome, Progress, RunError, Simulation, State, Summary, Sums, Timing, bytes_per_particle};
 
-use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Written};
-use crate::particles::State;
+use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::memory;

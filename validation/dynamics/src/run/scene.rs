@@ -1,8 +1,6 @@
 //! Simulations of scenes.
 
-use super::error::RunError;
-use super::simulation::Simulation;
-use crate::particles::State;
+use super::{RunError, Simulation, State};
 use crate::scene::{Scene, Stage};
 
 impl Scene {

@@ -1,5 +1,4 @@
-use super::error::RunError;
-use crate::checkpoint::{Means, Thermo};
+use super::{Means, RunError, Thermo};
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;

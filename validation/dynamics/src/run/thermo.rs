@@ -1,7 +1,6 @@
-use super::error::RunError;
 use super::growing::GrowingFile;
-use super::simulation::Simulation;
-use crate::checkpoint::{Thermo, Written};
+use super::{RunError, Simulation, Thermo};
+use crate::checkpoint::Written;
 use std::io::Write;
 use std::path::Path;
 

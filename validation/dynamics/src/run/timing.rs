@@ -1,6 +1,6 @@
 //! Wall times of a run, in a file of their own because they differ from run to run.
 
-use super::error::RunError;
+use super::RunError;
 use psidpd_core::engine::thermostat::Effort;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

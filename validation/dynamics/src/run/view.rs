@@ -1,6 +1,6 @@
 //! Views of a simulation for observables and files.
 
-use super::simulation::Simulation;
+use super::Simulation;
 use psidpd_formats::Frame;
 use psidpd_observe::frame::View;
 

@@ -10,8 +10,7 @@
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
 use super::advice::MOST;
-use super::error::RunError;
-use super::simulation::Simulation;
+use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_formats::memory::PARTICLE;

@@ -1,11 +1,8 @@
 //! `[[body_force]]`: accelerations of some of the particles.
 
 use super::composition::unknown_species;
-use super::initial::Initial;
 use super::number::{axis, vector};
-use crate::particles::{BodyForce, Tags};
-use psidpd_core::document::{FileError, FileErrorKind, Section};
-use psidpd_core::model::Model;
+use super::{BodyForce, FileError, FileErrorKind, Initial, Model, Section, Tags};
 
 pub fn read(root: &Section, model: &Model, initial: &Initial) -> Result<Vec<BodyForce>, FileError> {
     let Some(value) = root.get("body_force") else { return Ok(Vec::new()) };

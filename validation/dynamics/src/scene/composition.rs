@@ -1,6 +1,6 @@
 //! `composition` and `species` of a filled region.
 
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use super::{FileError, FileErrorKind, Section};
 
 /// Number fractions of the species; they add up to 1.
 #[derive(Debug, Clone, PartialEq)]

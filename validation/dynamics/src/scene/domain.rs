@@ -1,7 +1,6 @@
 //! `[box]`, or `box = …`: the lengths and boundaries of the box.
 
-use psidpd_core::document::{FileError, Section, Value};
-use psidpd_core::engine::PeriodicBox;
+use super::{FileError, PeriodicBox, Section, Value};
 
 /// The names of boundaries, and whether they are periodic.
 pub const BOUNDARIES: [(&str, bool); 2] = [("periodic", true), ("reflecting", false)];

@@ -1,11 +1,10 @@
 //! Replacement values for keys of a scene or model, as `--set KEY=VALUE` gives them.
 
 use super::keys::TABLES;
-use psidpd_core::document::{FileError, Source};
+use super::{Arc, FileError, Source};
 use psidpd_core::model::keys as model_keys;
 use std::collections::BTreeSet;
 use std::str::FromStr;
-use std::sync::Arc;
 use toml_edit::{DocumentMut, Item, TableLike, Value, value};
 
 /// A key and its new value.

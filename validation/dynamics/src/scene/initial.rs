@@ -1,15 +1,10 @@
 //! The start of a scene: `[initial]`, `[[part]]`, or the density at the top level.
 
-use super::arrangement::{Arrangement, Lattice};
-use super::domain;
-use super::part::{Common, Part, WHOLE};
-use super::saved;
-use super::velocities::Velocities;
-use crate::particles::{State, Tags};
-use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::model::Model;
-use std::path::{Path, PathBuf};
+use super::part::{Common, WHOLE};
+use super::{
+    Arrangement, FileError, FileErrorKind, Lattice, Model, Part, Path, PathBuf, PeriodicBox, Section, State,
+    Tags, Value, Velocities, domain, saved,
+};
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {

@@ -1,8 +1,7 @@
 //! `[masses]`: the mass of each species.
 
-use super::Initial;
 use super::composition::unknown_species;
-use psidpd_core::document::{FileError, Section};
+use super::{FileError, Initial, Section};
 
 /// Reads the masses; by default those of the data file, or 1.
 pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec<f64>, FileError> {

@@ -1,6 +1,6 @@
 //! `[output]`: the files that a run writes.
 
-use psidpd_core::document::{FileError, Section};
+use super::{FileError, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {

@@ -1,14 +1,9 @@
 //! Starts from files of another run.
 
-use super::velocities::Velocities;
+use super::{FileError, Model, Path, PathBuf, PeriodicBox, Section, State, Tags, Velocities};
 use crate::checkpoint;
-use crate::particles::{State, Tags};
 use nalgebra::{Matrix3, Vector3};
-use psidpd_core::document::{FileError, Section};
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::model::Model;
 use psidpd_formats::data::DataFile;
-use std::path::{Path, PathBuf};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {

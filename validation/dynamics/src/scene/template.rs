@@ -1,6 +1,6 @@
 //! Templates for `psidpd new`: a commented scene file and its model.
 
-use std::path::{Path, PathBuf};
+use super::{Path, PathBuf};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Template {

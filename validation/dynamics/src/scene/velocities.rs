@@ -1,8 +1,8 @@
 //! `velocities` of a filled region or of a start from a file.
 
+use super::{FileError, Section};
 use crate::particles::thermal_velocities;
 use chacha20::ChaCha8Rng;
-use psidpd_core::document::{FileError, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {

@@ -1,14 +1,13 @@
 //! The main results of a run, with warnings about them.
 
-use super::super::quantity::with_error;
-use super::super::{Item, Section, Table};
+use super::super::Table;
 use super::series::{self, last_stage};
-use psidpd_formats::{About, Expected};
+use super::{About, Item, Path, Section, with_error};
+use psidpd_formats::Expected;
 use psidpd_observe::Observation;
 use psidpd_observe::drift::drift;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::Serialize;
-use std::path::Path;
 
 /// With fewer independent rows the error bars themselves are uncertain by a fifth.
 const FEW: f64 = 12.0;

@@ -10,6 +10,7 @@ mod series;
 mod state;
 
 use super::{Item, Report, ReportError, Section};
+use crate::quantity::with_error;
 use psidpd_formats::files::write_atomically;
 use psidpd_formats::{About, FormatError};
 use serde_json::Value;

@@ -1,13 +1,11 @@
 //! The content of `observables.json`: each observable as a number with its error, or as a plot.
 
 use super::super::figure::field_of_values;
-use super::super::quantity::with_error;
 use super::super::text::typeset;
-use super::super::{Item, Plot, Section, Series, Style, Table};
-use psidpd_formats::FormatError;
+use super::super::{Plot, Series, Style, Table};
+use super::{FormatError, Item, Path, Section, with_error};
 use psidpd_observe::observation::Column;
 use psidpd_observe::{Kind, Observation};
-use std::path::Path;
 
 /// Reads the list; `None` if the file does not exist.
 pub fn read(path: &Path) -> Result<Option<Vec<Observation>>, FormatError> {

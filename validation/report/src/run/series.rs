@@ -1,11 +1,10 @@
 //! Totals against time, and their means.
 
-use super::super::quantity::with_error;
 use super::super::text::typeset;
-use super::super::{Item, Plot, Section, Series, Style};
-use psidpd_formats::{About, FormatError, THERMO};
+use super::super::{Plot, Series, Style};
+use super::{About, FormatError, Item, Path, Section, with_error};
+use psidpd_formats::THERMO;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
-use std::path::Path;
 
 /// The numbers of `thermo.csv`.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,13 +2,12 @@
 
 use super::super::figure::Figure;
 use super::super::text::escape;
-use super::super::{Item, Section};
+use super::{About, Item, Path, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_formats::memory;
-use psidpd_formats::{About, Configuration, Which};
+use psidpd_formats::{Configuration, Which};
 use psidpd_pictures::{FieldOptions, ParticleOptions, View};
 use psidpd_pictures::{animate, animation_url};
-use std::path::Path;
 
 pub struct State {
     pub file: &'static str,

@@ -19,10 +19,7 @@ mod thermostat;
 
 pub(super) use thermostat::Heat;
 
-use super::error::RunError;
-use super::reorder;
-use crate::integrator::Integrator;
-use crate::particles::State;
+use super::{Integrator, RunError, State, reorder};
 use external::External;
 use forces::Forces;
 use monte_carlo::MonteCarlo;
