@@ -1,5 +1,4 @@
-use super::Failure;
-use super::{Document, Model, Path};
+use super::{Document, Failure, Model, Path};
 use psidpd_core::document::{FileError, Source};
 use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use std::sync::Arc;

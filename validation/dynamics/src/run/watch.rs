@@ -14,11 +14,10 @@ use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_formats::memory::PARTICLE;
-use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
 use psidpd_observe::statistics::MINIMUM_SAMPLES;
-use psidpd_observe::{Estimate, Measured, difference};
+use psidpd_observe::{Estimate, Measured, configurational, difference};
 use std::fmt;
 
 /// Largest and smallest number of steps between samples.

@@ -4,10 +4,8 @@ use super::super::figure::Figure;
 use super::super::text::escape;
 use super::{About, Item, Path, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_formats::memory;
-use psidpd_formats::{Configuration, Which};
-use psidpd_pictures::{FieldOptions, ParticleOptions, View};
-use psidpd_pictures::{animate, animation_url};
+use psidpd_formats::{Configuration, Which, memory};
+use psidpd_pictures::{FieldOptions, ParticleOptions, View, animate, animation_url};
 
 pub struct State {
     pub file: &'static str,
