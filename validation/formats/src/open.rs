@@ -187,8 +187,9 @@ fn from_dump(frame: &dump::Frame) -> Result<Configuration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Frame;
     use crate::data::Atom;
-    use crate::dump::{Digits, DumpWriter, Snapshot};
+    use crate::dump::write_dump;
 
     #[test]
     fn the_same_particles_come_out_of_every_format() {
@@ -224,15 +225,11 @@ mod tests {
         data.write(&path("a.data")).unwrap();
         let mut file = std::fs::File::create(path("a.xyz")).unwrap();
         super::super::write_xyz(&direct.frame(), &mut file).unwrap();
-        let mut writer = DumpWriter::new(std::fs::File::create(path("a.dump")).unwrap(), Digits::All);
+        let mut file = std::fs::File::create(path("a.dump")).unwrap();
         for step in [0, 9] {
-            let (boxlo, boxhi) = ([0.0, 0.0, -1.0], [4.0, 5.0, 5.0]);
-            let (ids, kinds) = (&[5, 3][..], &[1, 2][..]);
-            writer
-                .write(&Snapshot { step, boxlo, boxhi, periodic: [true; 3], ids, kinds, x: &x, v: &v })
-                .unwrap();
+            write_dump(&Frame { step, ..direct.frame() }, &mut file).unwrap();
         }
-        drop(writer);
+        drop(file);
         for name in ["a.data", "a.xyz", "a.dump"] {
             let mut read = Configuration::open(&path(name), Which::Last).unwrap();
             read.name_species(&names, 3);

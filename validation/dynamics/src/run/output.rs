@@ -2,9 +2,10 @@
 
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
-use super::{RunError, Thermo, write_frame};
+use super::{RunError, Thermo};
 use crate::checkpoint::{Checkpoint, Store, Written};
 use crate::scene::{Scene, every};
+use psidpd_formats::dump::write_dump;
 use psidpd_formats::files::remove_if_there;
 use psidpd_formats::{Frame, GsdFile, write_xyz};
 use psidpd_observe::{Observation, write_csv, write_json};
@@ -91,7 +92,7 @@ impl Output {
     pub fn particles(&mut self, scene: &Scene, folder: &Path, frame: &Frame) -> Result<(), RunError> {
         let (step, intervals) = (frame.step, &scene.output);
         if let Some(file) = self.dump.as_mut().filter(|_| every(intervals.dump, step)) {
-            file.attempt(|file| write_frame(frame, file))?;
+            file.attempt(|file| write_dump(frame, file))?;
         }
         if let Some(file) = self.xyz.as_mut().filter(|_| every(intervals.xyz, step)) {
             file.attempt(|file| write_xyz(frame, file))?;
