@@ -79,10 +79,7 @@ impl Live {
                 self.simulation.refresh(want)?;
             }
             if last {
-                self.simulation.fetch()?;
-            }
-            if last {
-                break;
+                return self.simulation.fetch();
             }
         }
         Ok(())

@@ -7,7 +7,6 @@
 mod about;
 mod advice;
 mod bounds;
-mod by_tag;
 mod checkpoints;
 mod error;
 mod folder;
@@ -25,7 +24,6 @@ mod thermo;
 mod timing;
 mod underway;
 mod view;
-mod walls;
 mod watch;
 
 pub use crate::checkpoint::{self, Means, Sums, Thermo};

@@ -1,8 +1,8 @@
-use super::by_tag::ByTag;
 use super::checkpoints::Checkpoints;
 use super::folder::Folder;
 use super::output::{Output, write_observations};
 use super::timing::Clock;
+use super::view::ByTag;
 use super::watch::Watch;
 use super::{Advice, Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, write_data};
 use crate::checkpoint::{CheckpointError, Position};

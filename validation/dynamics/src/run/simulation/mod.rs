@@ -87,7 +87,7 @@ impl Simulation {
         if kt != self.kt() {
             self.forces.set_temperature(kt)?;
             self.thermostat.follow(&self.forces);
-            self.monte_carlo.forget_energy();
+            self.monte_carlo.energy = None;
         }
         Ok(())
     }
@@ -110,9 +110,9 @@ impl Simulation {
     ) {
         self.particles.replace(state, forces);
         self.external.find_frozen(&mut self.particles);
-        self.forces.count_out_of_bounds_from(out_of_bounds);
-        self.thermostat.forget_forces();
-        self.motion.forget_kick();
+        self.forces.earlier_out_of_bounds = out_of_bounds;
+        self.thermostat.in_forces = None;
+        self.motion.deferred = None;
         self.number = number;
         self.stale = false;
         #[cfg(feature = "gpu")]
@@ -128,7 +128,7 @@ impl Simulation {
     /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
     pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
-        self.thermostat.begin_step();
+        self.thermostat.impulse_virial = [0.0; 6];
         self.stale = false;
         #[cfg(feature = "gpu")]
         if self.gpu.is_some() {
@@ -180,12 +180,12 @@ impl Simulation {
             return self.step_on_gpu(dt, integrator, want);
         }
         self.number += 1;
-        self.thermostat.begin_step();
-        self.monte_carlo.begin_step(!integrator.has_time());
+        self.thermostat.impulse_virial = [0.0; 6];
+        self.monte_carlo.at_work = !integrator.has_time();
         self.open_record(dt);
         integrator.step(self, dt, want)?;
         self.close_record(integrator);
-        self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
+        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
         self.stale = !integrator.properties().forces_at_end;
         // The order of trials must not depend on positions.
         if reorder::is_due(self.number) && integrator.has_time() {
@@ -211,19 +211,19 @@ impl Simulation {
         if !self.stale {
             return Ok(());
         }
-        match self.monte_carlo.is_at_work() {
+        match self.monte_carlo.at_work {
             true => self.forces_or_infinite(want)?,
             false => self.conservative_forces(want)?,
         }
         self.stale = false;
-        self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
+        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
         Ok(())
     }
 
     /// Sorts all particle arrays into the order of the last sweep, if there was one.
     fn reorder(&mut self) {
-        let Some(order) = self.forces.order() else { return };
-        if self.particles.reorder(self.forces.pool(), order) {
+        let Some(order) = self.forces.engine.results().order else { return };
+        if self.particles.reorder(self.forces.engine.pool(), order) {
             self.external.find_frozen(&mut self.particles);
         }
     }

@@ -155,7 +155,7 @@ impl Simulation {
     }
 
     pub fn velocities(&self) -> &[[f64; 3]] {
-        debug_assert!(self.motion.is_at_end_of_step());
+        debug_assert!(self.motion.deferred.is_none());
         &self.particles.state.v
     }
 
@@ -180,13 +180,13 @@ impl Simulation {
     }
 
     pub fn state(&self) -> State {
-        debug_assert!(self.motion.is_at_end_of_step());
+        debug_assert!(self.motion.deferred.is_none());
         self.particles.state.clone()
     }
 
     /// Copies the particles into `state`, which belongs to this simulation, and reuses its memory.
     pub fn copy_state(&self, state: &mut State) {
-        debug_assert!(self.motion.is_at_end_of_step());
+        debug_assert!(self.motion.deferred.is_none());
         state.copy_particles(&self.particles.state);
     }
 }
