@@ -2,8 +2,8 @@
 
 use super::part::{Common, WHOLE};
 use super::{
-    Arrangement, FileError, FileErrorKind, Lattice, Model, Part, Path, PathBuf, PeriodicBox, Section, State,
-    Tags, Value, Velocities, domain, saved,
+    Arrangement, FileError, Lattice, Model, Part, Path, PathBuf, PeriodicBox, Section, State, Tags, Value,
+    Velocities, domain, saved,
 };
 
 #[derive(Debug, Clone, PartialEq)]
@@ -110,12 +110,7 @@ fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Resu
         "random" | "lattice" => common.shapes.whole(),
         "slab" | "sphere" => common.shapes.read(kind, key, section)?,
         "cylinder" if common.shapes.dimensions == 3 => common.shapes.read(kind, key, section)?,
-        _ => {
-            let known: Vec<&str> =
-                KINDS.iter().copied().filter(|k| common.shapes.dimensions == 3 || *k != "cylinder").collect();
-            let known = known.join(", ");
-            return Err(key.error(FileErrorKind::UnknownName { what: "kind", name: kind.to_owned(), known }));
-        }
+        _ => return Err(key.error(common.shapes.unknown("kind", kind, KINDS))),
     };
     let mut part = common.fill(section, WHOLE.to_owned(), shape)?;
     if kind == "lattice" && section.get("lattice").is_none() {

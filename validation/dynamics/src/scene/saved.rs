@@ -13,7 +13,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format of a kind of `[initial]`.
     pub fn of(kind: &str) -> Option<Format> {
         match kind {
             "data" => Some(Format::Data),
@@ -60,7 +59,6 @@ pub struct Saved {
     pub frozen: Tags,
 }
 
-/// Reads the keys of a start from a file, and the file.
 pub fn read(
     section: &Section,
     format: Format,
