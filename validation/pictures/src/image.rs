@@ -56,19 +56,20 @@ impl Image {
         Image::to_apng(std::slice::from_ref(self), 1)
     }
 
+    /// The first image of an animation, whose images must have one size.
+    fn first_of(images: &[Image]) -> Result<&Image, &'static str> {
+        let first = images.first().ok_or("an animation without images")?;
+        match images.iter().all(|i| (i.width, i.height) == (first.width, first.height)) {
+            true => Ok(first),
+            false => Err("the images of an animation differ in size"),
+        }
+    }
+
     /// Encodes an animated PNG file that repeats forever, with `per_second` frames in a second; one image gives a plain
     /// PNG. Programs that support only plain PNG show the first image.
     pub fn to_apng(images: &[Image], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
-        let wrong = |what: &str| {
-            png::EncodingError::IoError(std::io::Error::new(
-                std::io::ErrorKind::InvalidInput,
-                what.to_owned(),
-            ))
-        };
-        let Some(first) = images.first() else { return Err(wrong("an animation without images")) };
-        if images.iter().any(|i| (i.width, i.height) != (first.width, first.height)) {
-            return Err(wrong("the images of an animation differ in size"));
-        }
+        let wrong = |what| std::io::Error::new(std::io::ErrorKind::InvalidInput, what);
+        let first = Image::first_of(images).map_err(wrong)?;
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, first.width as u32, first.height as u32);
         encoder.set_color(png::ColorType::Rgb);
@@ -91,10 +92,7 @@ impl Image {
     /// # Errors
     /// The function fails for no images, for images of different sizes and for images wider than 65535 pixels.
     pub fn to_gif(images: &[Image], centiseconds: u16) -> Result<Vec<u8>, String> {
-        let Some(first) = images.first() else { return Err("an animation without images".into()) };
-        if images.iter().any(|i| (i.width, i.height) != (first.width, first.height)) {
-            return Err("the images of an animation differ in size".into());
-        }
+        let first = Image::first_of(images)?;
         let side = |n: usize| u16::try_from(n).map_err(|_| "the images are too large for a GIF".to_owned());
         let (width, height) = (side(first.width)?, side(first.height)?);
         let mut bytes = Vec::new();

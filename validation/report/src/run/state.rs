@@ -5,7 +5,7 @@ use super::super::text::escape;
 use super::{About, Item, Path, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_formats::{Configuration, Which, memory};
-use psidpd_pictures::{FieldOptions, ParticleOptions, View, animate, animation_url};
+use psidpd_pictures::{FieldOptions, ParticleOptions, View, animate, data_url};
 
 pub struct State {
     pub file: &'static str,
@@ -57,7 +57,7 @@ pub fn section(folder: &Path, state: Option<&State>, about: Option<&About>) -> S
             svg: format!(
                 "<img class=\"movie\" alt=\"{}\" src=\"{}\"/>",
                 escape("The particles along the run, repeated"),
-                animation_url(&png)
+                data_url(&png)
             ),
             caption: "The run, from the pictures in snapshots/.".into(),
         }),
