@@ -1,7 +1,7 @@
 //! `about.json`: a description of a run, and of the columns of its series.
 
 use super::FormatError;
-use crate::files::write_atomically;
+use crate::files::{read_json_if_there, write_atomically};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -136,19 +136,10 @@ impl About {
     /// Reads `about.json` of a folder; `None` if the file does not exist.
     pub fn read(folder: &Path) -> Result<Option<About>, FormatError> {
         let path = folder.join("about.json");
-        match std::fs::read_to_string(&path) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(FormatError::read(&path)(e)),
-            Ok(text) => {
-                let about: About = match serde_json::from_str(&text) {
-                    Ok(about) => about,
-                    Err(cause) => return Err(FormatError::Json { path, cause }),
-                };
-                match about.fault() {
-                    Some(message) => Err(FormatError::Content { path, message }),
-                    None => Ok(Some(about)),
-                }
-            }
+        let Some(about) = read_json_if_there::<About>(&path)? else { return Ok(None) };
+        match about.fault() {
+            Some(message) => Err(FormatError::Content { path, message }),
+            None => Ok(Some(about)),
         }
     }
 }

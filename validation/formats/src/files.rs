@@ -1,5 +1,7 @@
 //! Writing files whole or not at all.
 
+use super::FormatError;
+use serde::de::DeserializeOwned;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
@@ -32,6 +34,21 @@ pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Writ
 
 pub fn remove_if_there(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(unless_missing)
+}
+
+/// The text of a file; `None` if the file does not exist.
+pub fn read_if_there(path: &Path) -> Result<Option<String>, FormatError> {
+    match fs::read_to_string(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        read => read.map(Some).map_err(FormatError::read(path)),
+    }
+}
+
+/// The content of a JSON file; `None` if the file does not exist.
+pub fn read_json_if_there<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FormatError> {
+    let parse = |text: String| serde_json::from_str(&text);
+    let found = read_if_there(path)?.map(parse).transpose();
+    found.map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
 }
 
 /// Turns the error of a missing file into success.

@@ -2,9 +2,8 @@
 
 use super::super::Table;
 use super::series::{self, last_stage};
-use super::{About, Item, Path, Section, with_error};
+use super::{About, Item, Observation, Path, Section, Value, read_json_if_there, with_error};
 use psidpd_formats::Expected;
-use psidpd_observe::Observation;
 use psidpd_observe::drift::drift;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::Serialize;
@@ -44,8 +43,8 @@ pub struct HeadlineValue {
 pub fn headline(folder: &Path) -> Headline {
     let about = About::read(folder).ok().flatten();
     let table = series::Table::read(&folder.join("thermo.csv")).ok().flatten();
-    let observables = super::observables::read(&folder.join("observables.json")).ok().flatten();
-    let summary = super::json(&folder.join("summary.json")).ok().flatten();
+    let observables = read_json_if_there::<Vec<Observation>>(&folder.join("observables.json")).ok().flatten();
+    let summary = read_json_if_there::<Value>(&folder.join("summary.json")).ok().flatten();
     let particles = summary.and_then(|s| s.get("particles")?.as_f64());
     gather(about.as_ref(), particles, table.as_ref(), observables.as_deref().unwrap_or_default())
 }
