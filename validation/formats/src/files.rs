@@ -36,6 +36,14 @@ pub fn remove_if_there(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(unless_missing)
 }
 
+/// Removes those of some files in a folder that exist.
+pub fn remove_all(folder: &Path, names: &[&str]) -> Result<(), WriteError> {
+    names
+        .iter()
+        .map(|name| folder.join(name))
+        .try_for_each(|path| remove_if_there(&path).map_err(WriteError::at(&path)))
+}
+
 /// The text of a file; `None` if the file does not exist.
 pub fn read_if_there(path: &Path) -> Result<Option<String>, FormatError> {
     match fs::read_to_string(path) {

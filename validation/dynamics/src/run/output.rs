@@ -6,7 +6,7 @@ use super::{RunError, Thermo};
 use crate::checkpoint::{Checkpoint, Store, Written};
 use crate::scene::{Scene, every};
 use psidpd_formats::dump::write_dump;
-use psidpd_formats::files::remove_if_there;
+use psidpd_formats::files::{remove_all, remove_if_there};
 use psidpd_formats::{Frame, GsdFile, write_xyz};
 use psidpd_observe::{Observation, write_csv, write_json};
 use psidpd_pictures::{remove_snapshots, remove_vtk, write_snapshot, write_vtk};
@@ -47,9 +47,9 @@ pub(super) struct Output {
 impl Output {
     /// Creates empty files, and a description of the run.
     pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
-        remove(folder, &[THERMO, DUMP, XYZ, GSD])?;
+        remove_all(folder, &[THERMO, DUMP, XYZ, GSD])?;
         remove_tables(folder)?;
-        remove(folder, &LAST)?;
+        remove_all(folder, &LAST)?;
         remove_snapshots(folder)?;
         remove_vtk(folder)?;
         super::about::about(scene).write(folder)?;
@@ -65,7 +65,7 @@ impl Output {
     /// Opens the files of a resumed run and truncates them to what was written at its checkpoint.
     pub fn reopen(scene: &Scene, folder: &Path, checkpoint: &Checkpoint) -> Result<Output, RunError> {
         remove_tables(folder)?;
-        remove(folder, &LAST)?;
+        remove_all(folder, &LAST)?;
         let reopen = |name| {
             let written = checkpoint.files.get(name);
             written.map(|written| GrowingFile::reopen(folder, name, *written)).transpose()
@@ -172,13 +172,4 @@ fn remove_tables(folder: &Path) -> Result<(), RunError> {
         }
         _ => Ok(()),
     }
-}
-
-/// Removes files of an earlier run, or of an earlier stop of this run.
-fn remove(folder: &Path, names: &[&str]) -> Result<(), RunError> {
-    for name in names {
-        let path = folder.join(name);
-        remove_if_there(&path).map_err(RunError::output(&path))?;
-    }
-    Ok(())
 }
