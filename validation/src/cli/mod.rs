@@ -167,7 +167,7 @@ fn carry_out(arguments: Arguments) -> u8 {
         .check(json)
         .map_err(Failure::from)
         .and_then(|()| run_verb(&arguments.verb, json))
-        .map_err(|failure| failure.of(files.given()))
+        .map_err(|failure| failure.of(&files.given))
         .and_then(|verdict| say::lost().map_or(Ok(verdict), |cause| Err(CliError::Lost(cause).into())));
     match outcome {
         Ok(Verdict::Good) => 0,

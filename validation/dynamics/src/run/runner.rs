@@ -140,14 +140,14 @@ impl<'a> Runner<'a> {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
             let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
             let start = Start::Resumed { step: good.step, program, instructions, fallback };
-            (start, Some(Output::reopen(scene, folder.path(), &good)?))
+            (start, Some(Output::reopen(scene, &folder.path, &good)?))
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
-        let timing = Timing::read(folder.path());
+        let timing = Timing::read(&folder.path);
         // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
-        if !folder.path().join("about.json").is_file() {
+        if !folder.path.join("about.json").is_file() {
             super::about::about(scene)
-                .write(folder.path())
+                .write(&folder.path)
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
         let stored = Some(good.step);

@@ -3,7 +3,7 @@
 use super::{FileError, FileErrorKind, Section};
 use psidpd_core::document::Located;
 
-/// Number fractions of the species; they add up to 1.
+/// Number fractions of the species, in the order of the model; they add up to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Composition(pub(super) Vec<f64>);
 
@@ -42,11 +42,6 @@ impl Composition {
 
     pub(super) fn equal(count: usize) -> Composition {
         Composition(vec![1.0 / count as f64; count])
-    }
-
-    /// The fractions, in the order of the model's species.
-    pub fn fractions(&self) -> &[f64] {
-        &self.0
     }
 
     /// Divides `count` particles among the species: whole numbers that add up to `count`, each less than one

@@ -295,7 +295,7 @@ fn write_script(scene: &Scene, script: Script, s: &mut String) -> std::fmt::Resu
             if before.is_some() {
                 writeln!(s, "unfix         move")?;
             }
-            writeln!(s, "fix           move {} {}", physics.mobile(), motion(&stage.integrator))?;
+            writeln!(s, "fix           move {} {}", physics.mobile, motion(&stage.integrator))?;
         }
         match (before.is_some_and(|b| b.body_forces), stage.body_forces) {
             (false, true) => physics.write_body_forces(s)?,

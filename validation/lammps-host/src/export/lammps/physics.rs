@@ -13,7 +13,7 @@ pub struct Physics<'a> {
     /// Whether each direction has walls.
     walls: [bool; 3],
     /// The group of mobile particles: `all` if none is frozen.
-    mobile: &'static str,
+    pub mobile: &'static str,
 }
 
 impl<'a> Physics<'a> {
@@ -26,10 +26,6 @@ impl<'a> Physics<'a> {
 
     pub fn boundary(&self) -> String {
         self.walls.map(|wall| if wall { "f" } else { "p" }).join(" ")
-    }
-
-    pub fn mobile(&self) -> &'static str {
-        self.mobile
     }
 
     /// Writes the groups, the walls, and the fix of two dimensions.
