@@ -117,7 +117,7 @@ pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::IDEAL;
+    use crate::tests::support::IDEAL;
 
     /// LAMMPS's edges are (lx, 0, 0), (xy, ly, 0) and (xz, yz, lz).
     #[test]

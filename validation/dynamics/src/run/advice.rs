@@ -111,14 +111,14 @@ fn two_digits(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::{self, SET6};
+    use crate::tests::support::{self, SET6};
     use psidpd_core::engine::Want;
 
     fn advice(stage: &str) -> Option<Advice> {
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nseed = 7\nbox = 4.0\ndensity = 6.05\n[[stage]]\nname = \"run\"\nsteps = 1\n{stage}"
         );
-        let scene = test_support::scene(SET6, &text).unwrap();
+        let scene = support::scene(SET6, &text).unwrap();
         let mut run = scene.simulation(scene.initial_state()).unwrap();
         run.prepare(0.005, Want::FORCES).unwrap();
         run.advance(400, 0.005, Integrator::VelocityVerlet).unwrap();

@@ -84,7 +84,7 @@ fn last_inside(domain: &PeriodicBox, k: usize, mut end: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::run::{Integrator, Simulation, State};
-    use crate::test_support::{IDEAL, SOFT};
+    use crate::tests::support::{IDEAL, SOFT};
     use nalgebra::Matrix3;
     use psidpd_core::engine::Want;
     use psidpd_core::model::Model;

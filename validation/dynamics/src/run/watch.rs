@@ -335,7 +335,7 @@ fn configurational(simulation: &Simulation) -> Option<Configurational> {
 mod tests {
     use super::*;
     use crate::run::{Begin, Outcome, Runner};
-    use crate::test_support::{SET6, SOFT, scene};
+    use crate::tests::support::{SET6, SOFT, scene};
     use rand::{SeedableRng, rngs::StdRng};
     use rand_distr::{Distribution, StandardNormal};
     use std::sync::atomic::AtomicUsize;
