@@ -32,6 +32,12 @@ pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Writ
     write(path, bytes).map_err(WriteError::at(path))
 }
 
+/// Replaces a file whole, through the file `new` in its folder, without waiting for the disk. A killed run leaves at most
+/// `new`.
+pub fn replace_through(new: &Path, path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    fs::write(new, bytes).and_then(|()| fs::rename(new, path)).map_err(WriteError::at(path))
+}
+
 pub fn remove_if_there(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(unless_missing)
 }

@@ -88,9 +88,6 @@ impl Image {
     }
 
     /// Encodes an animated GIF file that repeats forever and shows each frame for `centiseconds`.
-    ///
-    /// # Errors
-    /// The function fails for no images, for images of different sizes and for images wider than 65535 pixels.
     pub fn to_gif(images: &[Image], centiseconds: u16) -> Result<Vec<u8>, String> {
         let first = Image::first_of(images)?;
         let side = |n: usize| u16::try_from(n).map_err(|_| "the images are too large for a GIF".to_owned());

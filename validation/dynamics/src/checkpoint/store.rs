@@ -69,10 +69,7 @@ impl Store {
     }
 
     /// Finds the newest checkpoint that is whole and that `usable` accepts; `None` if there is no checkpoint.
-    ///
-    /// # Errors
-    /// The fault of the newest checkpoint, if the previous one cannot be used either; a checkpoint of another
-    /// run.
+    /// The error is the fault of the newest checkpoint if the previous one cannot be used either.
     pub fn find(
         &self,
         usable: impl Fn(&Checkpoint) -> Result<(), CheckpointError>,

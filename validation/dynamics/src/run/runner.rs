@@ -46,10 +46,6 @@ pub enum Start {
 }
 
 /// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see [`Runner`].
-///
-/// # Errors
-/// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
-/// cannot be written.
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
     Runner::begin(scene, out, Begin::Overwrite)?.run_to_end(progress)
 }
@@ -70,12 +66,6 @@ pub struct Runner<'a> {
 
 impl<'a> Runner<'a> {
     /// Prepares a run in the folder `out`, which is created if it is missing.
-    ///
-    /// # Errors
-    /// [`RunError::Unfinished`] for [`Begin::New`] in the folder of an interrupted run;
-    /// [`RunError::Finished`] in that of a finished run; [`RunError::Checkpoint`] for [`Begin::Resume`] if
-    /// its checkpoints cannot be used; [`RunError::Busy`] if another run is writing there; an invalid model
-    /// or initial state; a folder that cannot be written.
     pub fn begin(scene: &'a Scene, out: &Path, begin: Begin) -> Result<Runner<'a>, RunError> {
         let folder = Folder::open(out)?;
         let store = Store::new(out);
@@ -186,9 +176,6 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop` is not 0.
-    ///
-    /// # Errors
-    /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] if a file cannot be written.
     pub fn run(
         &mut self,
         stop: &AtomicUsize,

@@ -5,8 +5,7 @@ use crate::scene::{Scene, Stage};
 
 impl Scene {
     /// Creates a simulation from `state`, which belongs to this scene, at step 0, with the scene's seed and
-    /// frozen particles. The precision is double, as for every new simulation; see
-    /// [`Simulation::set_settings`].
+    /// frozen particles, in double precision.
     pub fn simulation(&self, state: State) -> Result<Simulation, RunError> {
         let mut simulation = Simulation::new(&self.model, self.kt, state, self.seed)?;
         simulation.set_frozen(&self.frozen);

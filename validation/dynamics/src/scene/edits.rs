@@ -91,10 +91,7 @@ pub fn edit_scene(
 }
 
 /// Applies edits to the text of a model. A key without a path may be a parameter; the prefix `model.` is
-/// allowed, as in a scene.
-///
-/// # Errors
-/// The errors of `edit_scene`, and a parameter that the model does not have, which would change nothing.
+/// allowed, as in a scene. A parameter that the model does not have would change nothing and is refused.
 pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
     let mut document = parse(text);
     for edit in edits {

@@ -36,11 +36,8 @@ const FILES: [(&str, &str); 12] = [
     ("snapshots", "pictures of the particles along the run"),
 ];
 
-/// Makes `report.html` from the files in the folder of a run, and returns its path.
-///
-/// # Errors
-/// The function fails if the folder has none of the files, and if the page cannot be written. A file with invalid content is
-/// not an error: the page says what is wrong with it.
+/// Makes `report.html` from the files in the folder of a run, and returns its path. A file with invalid content is not an
+/// error: the page says what is wrong with it.
 pub fn write_run_report(folder: &Path) -> Result<PathBuf, ReportError> {
     let page = run_report(folder)?.render();
     let path = folder.join("report.html");

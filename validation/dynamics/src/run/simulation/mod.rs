@@ -195,10 +195,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing.
-    ///
-    /// # Errors
-    /// A velocity is not finite. On a GPU also the errors of steps before.
+    /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing. On a GPU it returns the errors of
+    /// steps before too.
     pub(super) fn end_step(&mut self) -> Result<(), RunError> {
         #[cfg(feature = "gpu")]
         self.make_collected(false)?;
