@@ -1,7 +1,7 @@
 //! `velocities` of a filled region or of a start from a file.
 
 use super::{FileError, Section};
-use crate::particles::thermal_velocities;
+use crate::particles::maxwell;
 use chacha20::ChaCha8Rng;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,7 +37,7 @@ impl Velocities {
         random: &mut ChaCha8Rng,
     ) -> Vec<[f64; 3]> {
         match self {
-            Velocities::Thermal => thermal_velocities(mass, kt, dimensions, random),
+            Velocities::Thermal => maxwell(mass, kt, dimensions, [true; 3], random),
             Velocities::Zero => mass.map(|_| [0.0; 3]).collect(),
         }
     }
