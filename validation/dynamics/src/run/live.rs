@@ -1,6 +1,6 @@
 use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
-use psidpd_core::engine::{Settings, Want};
+use psidpd_core::engine::Want;
 use psidpd_formats::memory;
 use std::num::NonZeroUsize;
 
@@ -21,11 +21,7 @@ impl Live {
     pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
         memory::check(particles, memory::PARTICLE)?;
-        let mut simulation = scene.simulation(scene.initial_state())?;
-        let precision = scene.precision();
-        simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;
-        simulation.set_reordering(true);
-        scene.put_on_device(&mut simulation)?;
+        let simulation = scene.simulation_of_run(scene.initial_state(), threads)?;
         let mut live = Live { scene, simulation, stage: 0, done: 0, begin: 0.0 };
         live.enter()?;
         Ok(live)

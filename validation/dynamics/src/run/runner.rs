@@ -2,7 +2,7 @@ use super::checkpoints::Checkpoints;
 use super::folder::Folder;
 use super::output::{Output, replaces};
 use super::underway::Run;
-use super::{Outcome, Progress, RunError, Simulation, State, Summary, Sums, Timing, bytes_per_particle};
+use super::{Outcome, Progress, RunError, Summary, Sums, Timing, bytes_per_particle};
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
@@ -86,7 +86,7 @@ impl<'a> Runner<'a> {
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
         memory::check(particles, bytes_per_particle(scene))?;
         let state = scene.initial_state();
-        let simulation = simulation(scene, state.clone())?;
+        let simulation = scene.simulation_of_run(state.clone(), NonZeroUsize::MIN)?;
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
@@ -114,7 +114,7 @@ impl<'a> Runner<'a> {
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
-        let mut simulation = simulation(scene, good.state.clone())?;
+        let mut simulation = scene.simulation_of_run(good.state.clone(), NonZeroUsize::MIN)?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
         }
@@ -201,15 +201,6 @@ impl<'a> Runner<'a> {
             }
         }
     }
-}
-
-/// The simulation of a scene in its precision, with reordering of particles.
-fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
-    let mut simulation = scene.simulation(state)?;
-    simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
-    simulation.set_reordering(true);
-    scene.put_on_device(&mut simulation)?;
-    Ok(simulation)
 }
 
 /// Checks that a run can continue from a checkpoint: it belongs to this scene, and the files hold the bytes that it records.
