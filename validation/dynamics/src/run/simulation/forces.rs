@@ -84,11 +84,6 @@ impl Forces {
         (0..6).for_each(|c| self.tally.thermostat_virial[c] += virial[c]);
     }
 
-    /// Asks the next evaluation to list the pairs of a thermostat for a time `dt`.
-    pub fn ask_for_pairs(&mut self, pairs: &mut PairThermostat, dt: f64, virial: bool) {
-        pairs.ask(&mut self.engine, dt, virial);
-    }
-
     /// Gives a thermostat the pairs that the last evaluation has listed, if it was at the positions of `particles`.
     pub fn give_pairs(&mut self, pairs: &mut PairThermostat, particles: &Particles) {
         if self.moves == particles.moves() {

@@ -108,7 +108,7 @@ impl Simulation {
         forces: &[[f64; 3]],
         out_of_bounds: [u64; 2],
     ) {
-        self.particles.replace(state, forces);
+        self.particles.replace_with(|present| present.copy_particles(state), forces);
         self.external.find_frozen(&mut self.particles);
         self.forces.earlier_out_of_bounds = out_of_bounds;
         self.thermostat.in_forces = None;

@@ -35,12 +35,7 @@ impl Particles {
         Ok(Particles { state, force, moves: 0, flux: OnceLock::new(), reordering: None })
     }
 
-    /// Replaces the particles, without wrapping; the box stays.
-    pub fn replace(&mut self, state: &State, forces: &[[f64; 3]]) {
-        self.replace_with(|present| present.copy_particles(state), forces);
-    }
-
-    /// Calls `replace` with the particles to replace them; the box stays.
+    /// Calls `replace` with the particles to replace them, without wrapping; the box stays.
     pub fn replace_with(&mut self, replace: impl FnOnce(&mut State), forces: &[[f64; 3]]) {
         replace(&mut self.state);
         self.force.clear();

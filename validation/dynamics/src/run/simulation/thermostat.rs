@@ -187,7 +187,7 @@ impl Simulation {
         if heat.update == Update::Midpoint
             && let Some(pairs) = thermostat.pairs.as_mut().filter(|_| thermostat.on)
         {
-            forces.ask_for_pairs(pairs, heat.time, want.virial);
+            pairs.ask(&mut forces.engine, heat.time, want.virial);
             thermostat.found = None;
         }
     }
