@@ -7,7 +7,6 @@ use serde::Serialize;
 use std::fmt;
 use std::str::FromStr;
 
-/// The processor that computes the steps of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Device {
     #[default]

@@ -107,14 +107,12 @@ impl Accuracy {
 /// What LAMMPS has for an integrator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counterpart {
-    /// `fix nve`.
     Nve,
     /// `fix dpd/splitting` of the plugin.
     Splitting,
     None,
 }
 
-/// The settings of an integrator, where it has them.
 pub struct Settings<'a> {
     /// λ, and the range that is allowed.
     pub lambda: Option<(&'a mut f64, [f64; 2])>,

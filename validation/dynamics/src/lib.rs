@@ -11,6 +11,4 @@ pub mod prediction;
 pub mod run;
 pub mod scene;
 #[cfg(test)]
-mod test_support;
-#[cfg(test)]
 mod tests;

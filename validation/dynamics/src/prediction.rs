@@ -13,7 +13,6 @@ const BEYOND: f64 = 6.0;
 /// The mean-field theory of a fluid of one species, and the corrections by correlations.
 #[derive(Debug, Clone)]
 pub struct Prediction {
-    /// The number density that the prediction holds for.
     pub density: f64,
     /// Whether the caller gave the density.
     asked: bool,
@@ -25,7 +24,6 @@ pub struct Prediction {
     pub phases: Result<Binodal, TheoryError>,
     /// Density of zero pressure with correlations to first order: close to that of the liquid.
     pub correlated_liquid: Option<f64>,
-    /// The mean-field interface between vapour and liquid.
     pub interface: Result<Interface, TheoryError>,
 }
 

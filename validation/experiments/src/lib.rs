@@ -30,6 +30,6 @@ pub mod theory_page;
 pub use error::ExperimentError;
 
 #[cfg(test)]
-#[path = "../../dynamics/src/test_support.rs"]
+#[path = "../../dynamics/src/tests/support.rs"]
 #[allow(dead_code, reason = "the tests of two crates share it")]
 mod test_support;

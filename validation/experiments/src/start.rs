@@ -5,7 +5,7 @@ use crate::fluids::Subject;
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Want};
 use psidpd_core::model::Model;
-use psidpd_dynamics::particles::thermal_velocities;
+use psidpd_dynamics::particles::maxwell;
 use psidpd_dynamics::run::{Integrator, RunError, Simulation, State};
 use rand::{RngExt, SeedableRng};
 use std::num::NonZeroUsize;
@@ -64,7 +64,7 @@ pub fn random(subject: &Subject, filling: Filling, seed: u64) -> Result<State, E
             [lx * u(), ly * u(), low + filling.thickness * u()]
         })
         .collect();
-    let v = thermal_velocities(std::iter::repeat_n(1.0, count), 1.0, 3, &mut random);
+    let v = maxwell(std::iter::repeat_n(1.0, count), 1.0, 3, [true; 3], &mut random);
     let kinds = subject.species.len();
     let species = (0..count).map(|k| (k % kinds) as i32).collect();
     Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })

@@ -1,7 +1,7 @@
 //! `about.json`: a description of a run, and of the columns of its series.
 
 use super::FormatError;
-use crate::files::write_atomically;
+use crate::files::{read_json_if_there, write_atomically};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -12,7 +12,6 @@ pub struct About {
     pub program: String,
     pub title: String,
     pub model: String,
-    /// The number of dimensions is 2 or 3.
     pub dimensions: usize,
     /// Names of the species; LAMMPS type k is the k-th species.
     pub species: Vec<String>,
@@ -20,7 +19,6 @@ pub struct About {
     pub densities: Vec<AboutDensity>,
     #[serde(rename = "kT")]
     pub kt: f64,
-    /// The seed serves the initial state and the noise.
     pub seed: u64,
     /// The precision of the pair forces; empty in files that do not say it.
     #[serde(default)]
@@ -40,12 +38,10 @@ pub struct About {
     pub expected: Vec<Expected>,
 }
 
-/// The expected value of one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     /// The name is that in the results of a run: `pressure`, `liquid`, `vapour`, `tension`, `width`.
     pub name: String,
-    /// The prediction of mean-field theory.
     pub mean_field: Option<f64>,
     /// The published value for this kT and its error.
     pub published: Option<[f64; 2]>,
@@ -65,7 +61,6 @@ pub struct AboutStage {
     pub name: String,
     /// The number of the step before the first step of the stage.
     pub begin: u64,
-    /// The number of the last step.
     pub end: u64,
     pub dt: f64,
     #[serde(rename = "kT")]
@@ -82,7 +77,6 @@ pub struct AboutStage {
 pub struct Column {
     /// The name in the header of the file.
     pub name: String,
-    /// A description in words.
     pub title: String,
     /// The unit in terms of the length, energy and mass of the model; empty for a pure number.
     pub unit: String,
@@ -107,7 +101,6 @@ pub const THERMO: [(&str, &str, &str); 12] = [
 pub const UNITS: &str = "reduced: length, energy and mass are those of the model file";
 
 impl About {
-    /// Writes `about.json` into the folder of a run.
     pub fn write(&self, folder: &Path) -> Result<(), FormatError> {
         let path = folder.join("about.json");
         match serde_json::to_string_pretty(self) {
@@ -143,19 +136,10 @@ impl About {
     /// Reads `about.json` of a folder; `None` if the file does not exist.
     pub fn read(folder: &Path) -> Result<Option<About>, FormatError> {
         let path = folder.join("about.json");
-        match std::fs::read_to_string(&path) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(FormatError::read(&path)(e)),
-            Ok(text) => {
-                let about: About = match serde_json::from_str(&text) {
-                    Ok(about) => about,
-                    Err(cause) => return Err(FormatError::Json { path, cause }),
-                };
-                match about.fault() {
-                    Some(message) => Err(FormatError::Content { path, message }),
-                    None => Ok(Some(about)),
-                }
-            }
+        let Some(about) = read_json_if_there::<About>(&path)? else { return Ok(None) };
+        match about.fault() {
+            Some(message) => Err(FormatError::Content { path, message }),
+            None => Ok(Some(about)),
         }
     }
 }

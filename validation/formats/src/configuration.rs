@@ -4,7 +4,6 @@ use psidpd_core::engine::PeriodicBox;
 /// The particles at one step, read from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
-    /// The number of the step, if the file has it.
     pub step: Option<u64>,
     /// The time since the start of the run, if the file has it.
     pub time: Option<f64>,

@@ -167,7 +167,6 @@ impl DataFile {
         Ok(())
     }
 
-    /// Sorts atoms and velocities by tag.
     pub fn sort_by_id(&mut self) {
         let mut order: Vec<usize> = (0..self.atoms.len()).collect();
         order.sort_by_key(|&i| self.atoms[i].id);
@@ -341,7 +340,7 @@ impl<'a> Parser<'a> {
                 "Masses" => data.masses = self.masses(data.types, n)?,
                 "Atoms" => data.atoms = self.atoms(comment, data.types, n)?,
                 "Velocities" => velocities = Some(self.velocities(n)?),
-                name if IGNORED.contains(&name) => while self.label().is_some() {},
+                name if IGNORED.contains(&name) => while self.numeric().is_some() {},
                 _ => return Err(Problem::Unknown(shown(&name)).at(n)),
             }
         }
@@ -361,11 +360,6 @@ impl<'a> Parser<'a> {
             data.velocities = Some(sorted);
         }
         Ok(())
-    }
-
-    /// Reads a line of an ignored section.
-    fn label(&mut self) -> Option<()> {
-        self.numeric().map(|_| ())
     }
 
     /// Reads exactly `count` lines of a section.

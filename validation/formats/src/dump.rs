@@ -1,4 +1,4 @@
-//! LAMMPS text dumps. The reader takes any `dump custom` and `dump atom`; the writer writes `id type x y z vx vy vz`.
+//! LAMMPS text dumps. The reader takes any `dump custom` and `dump atom`.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -10,9 +10,8 @@ use super::text::{Problem, TextError, any_f64, finite, shown, whole};
 pub struct Frame {
     pub step: i64,
     pub time: Option<f64>,
-    /// Lower corner of the box, not of the bounding box of a tilted box.
+    /// The corners are those of the box, not of the bounding box of a tilted box.
     pub boxlo: [f64; 3],
-    /// Upper corner of the box, not of the bounding box of a tilted box.
     pub boxhi: [f64; 3],
     /// Tilt factors xy, xz, yz of a triclinic box.
     pub tilt: Option<[f64; 3]>,
@@ -237,80 +236,50 @@ impl<R: BufRead> Iterator for DumpReader<R> {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Digits {
-    /// Six significant digits, as LAMMPS writes by default.
-    #[default]
-    Six,
-    /// Seventeen significant digits, which restore the exact value.
-    All,
-}
-
-#[derive(Debug, Clone, Copy)]
-pub struct Snapshot<'a> {
-    pub step: i64,
-    pub boxlo: [f64; 3],
-    pub boxhi: [f64; 3],
-    pub periodic: [bool; 3],
-    pub ids: &'a [u32],
-    /// Types are counted from 1.
-    pub kinds: &'a [u32],
-    pub x: &'a [[f64; 3]],
-    pub v: &'a [[f64; 3]],
-}
-
-/// Writes frames with the columns `id type x y z vx vy vz`, as LAMMPS does.
-#[derive(Debug)]
-pub struct DumpWriter<W> {
-    out: W,
-    digits: Digits,
-}
-
-impl<W: Write> DumpWriter<W> {
-    /// The output `out` should be buffered.
-    pub fn new(out: W, digits: Digits) -> Self {
-        DumpWriter { out, digits }
+/// Writes a frame with the columns `id type x y z vx vy vz` as LAMMPS does, with the digits that restore the exact values.
+/// Particles keep their order; types are species from 1. Unknown velocities are written as 0. Slices of different lengths are
+/// an error of kind `InvalidInput`.
+pub fn write_dump(frame: &super::Frame, out: &mut impl Write) -> io::Result<()> {
+    let n = frame.tag.len();
+    if [frame.species.len(), frame.x.len(), frame.v.map_or(n, <[_]>::len)] != [n; 3] {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "ids, types, positions and velocities differ in number",
+        ));
     }
-
-    /// Writes one frame. Slices of different lengths are an error of kind `InvalidInput`.
-    pub fn write(&mut self, s: &Snapshot) -> io::Result<()> {
-        let n = s.ids.len();
-        if [s.kinds.len(), s.x.len(), s.v.len()] != [n; 3] {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidInput,
-                "ids, types, positions and velocities differ in number",
-            ));
-        }
-        let boundary = s.periodic.map(|p| if p { "pp" } else { "ff" }).join(" ");
-        let out = &mut self.out;
-        writeln!(out, "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{n}", s.step)?;
-        writeln!(out, "ITEM: BOX BOUNDS {boundary}")?;
-        for d in 0..3 {
-            writeln!(out, "{:.16e} {:.16e}", s.boxlo[d], s.boxhi[d])?;
-        }
-        writeln!(out, "ITEM: ATOMS id type x y z vx vy vz")?;
-        for i in 0..n {
-            write!(out, "{} {}", s.ids[i], s.kinds[i])?;
-            for x in s.x[i].iter().chain(&s.v[i]) {
-                match self.digits {
-                    Digits::Six => write!(out, " {x:.5e}")?,
-                    Digits::All => write!(out, " {x:.16e}")?,
-                }
-            }
-            writeln!(out)?;
-        }
-        Ok(())
+    let boundary = frame.periodic().map(|p| if p { "pp" } else { "ff" }).join(" ");
+    writeln!(out, "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{n}", frame.step)?;
+    writeln!(out, "ITEM: BOX BOUNDS {boundary}")?;
+    for (low, length) in frame.domain.origin().into_iter().zip(frame.domain.lengths()) {
+        writeln!(out, "{low:.16e} {:.16e}", low + length)?;
     }
-
-    pub fn into_inner(self) -> W {
-        self.out
+    writeln!(out, "ITEM: ATOMS id type x y z vx vy vz")?;
+    for i in 0..n {
+        write!(out, "{} {}", frame.tag[i] as u32, frame.species[i] as u32 + 1)?;
+        for x in frame.x[i].into_iter().chain(frame.v.map_or([0.0; 3], |v| v[i])) {
+            write!(out, " {x:.16e}")?;
+        }
+        writeln!(out)?;
     }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use psidpd_core::engine::PeriodicBox;
+
+    fn frame<'a>(
+        step: u64,
+        domain: &'a PeriodicBox,
+        species: &'a [i32],
+        tag: &'a [i32],
+        x: &'a [[f64; 3]],
+        v: &'a [[f64; 3]],
+    ) -> crate::Frame<'a> {
+        crate::Frame { step, time: 0.0, dimensions: 3, domain, names: &[], x, v: Some(v), species, tag }
+    }
 
     const TWO: &str = "ITEM: UNITS\nlj\nITEM: TIME\n0.5\nITEM: TIMESTEP\n10\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS pp pp ff\n0 4\n-1 1\n0 3\n\
         ITEM: ATOMS id element c_pea f_1[2]\n2 He 1.5 -2\n1 Xe nan 1e-3\n\
@@ -403,20 +372,23 @@ mod tests {
         #[test]
         fn reading_what_was_written_gives_the_same_bits(
             rows in prop::collection::vec((any::<u32>(), 1u32..5, prop::array::uniform3(any::<f64>()), prop::array::uniform3(any::<f64>())), 0..20),
-            step in 0i64..i64::MAX, lo in prop::array::uniform3(-1e9..1e9f64), periodic in any::<[bool; 3]>(),
+            step in 0u64..i64::MAX as u64, lo in prop::array::uniform3(-1e9..1e9f64), periodic in any::<[bool; 3]>(),
         ) {
-            let ids: Vec<u32> = rows.iter().map(|r| r.0).collect();
-            let kinds: Vec<u32> = rows.iter().map(|r| r.1).collect();
+            let tag: Vec<i32> = rows.iter().map(|r| r.0 as i32).collect();
+            let species: Vec<i32> = rows.iter().map(|r| r.1 as i32 - 1).collect();
             let x: Vec<_> = rows.iter().map(|r| r.2).collect();
             let v: Vec<_> = rows.iter().map(|r| r.3).collect();
-            let s = Snapshot { step, boxlo: lo, boxhi: lo, periodic, ids: &ids, kinds: &kinds, x: &x, v: &v };
-            let mut w = DumpWriter::new(Vec::new(), Digits::All);
-            w.write(&s).unwrap();
-            w.write(&s).unwrap();
-            let frames = read_all(std::str::from_utf8(&w.into_inner()).unwrap()).unwrap();
+            let domain = PeriodicBox::orthogonal(lo, [1.0; 3], periodic).unwrap();
+            let s = frame(step, &domain, &species, &tag, &x, &v);
+            let mut w = Vec::new();
+            write_dump(&s, &mut w).unwrap();
+            write_dump(&s, &mut w).unwrap();
+            let frames = read_all(std::str::from_utf8(&w).unwrap()).unwrap();
             prop_assert_eq!(frames.len(), 2);
             for f in frames {
-                prop_assert_eq!((f.step, f.boxlo, f.natoms), (step, lo, ids.len()));
+                prop_assert_eq!((f.step, f.boxlo, f.natoms), (step as i64, lo, tag.len()));
+                prop_assert_eq!(f.get("id"), Some(rows.iter().map(|r| f64::from(r.0)).collect()));
+                prop_assert_eq!(f.get("type"), Some(rows.iter().map(|r| f64::from(r.1)).collect()));
                 let (fx, fv) = (f.vectors(["x", "y", "z"]).unwrap(), f.vectors(["vx", "vy", "vz"]).unwrap());
                 for (a, b) in fx.iter().chain(&fv).flatten().zip(x.iter().chain(&v).flatten()) {
                     prop_assert!(a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
@@ -434,17 +406,8 @@ mod tests {
 
     #[test]
     fn lengths_must_agree() {
-        let s = Snapshot {
-            step: 0,
-            boxlo: [0.0; 3],
-            boxhi: [1.0; 3],
-            periodic: [true; 3],
-            ids: &[1],
-            kinds: &[1],
-            x: &[[0.0; 3]],
-            v: &[],
-        };
-        let e = DumpWriter::new(Vec::new(), Digits::Six).write(&s);
+        let domain = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [true; 3]).unwrap();
+        let e = write_dump(&frame(0, &domain, &[0], &[1], &[[0.0; 3]], &[]), &mut Vec::new());
         assert_eq!(e.unwrap_err().kind(), io::ErrorKind::InvalidInput);
     }
 }

@@ -28,7 +28,6 @@ pub enum FormatError {
 }
 
 impl FormatError {
-    /// Makes the error of `map_err` for reading a file.
     pub fn read(path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
         FormatError::io("read", path)
     }

@@ -1,5 +1,7 @@
 //! Writing files whole or not at all.
 
+use super::FormatError;
+use serde::de::DeserializeOwned;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
@@ -30,9 +32,37 @@ pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Writ
     write(path, bytes).map_err(WriteError::at(path))
 }
 
-/// Removes a file if it exists.
+/// Replaces a file whole, through the file `new` in its folder, without waiting for the disk. A killed run leaves at most
+/// `new`.
+pub fn replace_through(new: &Path, path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    fs::write(new, bytes).and_then(|()| fs::rename(new, path)).map_err(WriteError::at(path))
+}
+
 pub fn remove_if_there(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(unless_missing)
+}
+
+/// Removes those of some files in a folder that exist.
+pub fn remove_all(folder: &Path, names: &[&str]) -> Result<(), WriteError> {
+    names
+        .iter()
+        .map(|name| folder.join(name))
+        .try_for_each(|path| remove_if_there(&path).map_err(WriteError::at(&path)))
+}
+
+/// The text of a file; `None` if the file does not exist.
+pub fn read_if_there(path: &Path) -> Result<Option<String>, FormatError> {
+    match fs::read_to_string(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        read => read.map(Some).map_err(FormatError::read(path)),
+    }
+}
+
+/// The content of a JSON file; `None` if the file does not exist.
+pub fn read_json_if_there<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FormatError> {
+    let parse = |text: String| serde_json::from_str(&text);
+    let found = read_if_there(path)?.map(parse).transpose();
+    found.map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
 }
 
 /// Turns the error of a missing file into success.

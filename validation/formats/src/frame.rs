@@ -6,7 +6,6 @@ pub struct Frame<'a> {
     pub step: u64,
     /// The time since the start of the run, in units of the model.
     pub time: f64,
-    /// The number of dimensions is 2 or 3.
     pub dimensions: usize,
     pub domain: &'a PeriodicBox,
     pub names: &'a [String],

@@ -170,7 +170,6 @@ impl GsdFile {
         Ok(())
     }
 
-    /// Syncs the file to the disk.
     pub fn sync(&self) -> io::Result<()> {
         self.file.sync_data()
     }

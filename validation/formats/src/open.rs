@@ -32,15 +32,7 @@ impl Configuration {
         let mut message = "there is no frame".to_owned();
         if let Some(n) = number {
             message += &format!(" {n}");
-            // All frames before the last complete one are complete.
-            let (mut low, mut high) = (0, n);
-            while high - low > 1 {
-                let middle = low + (high - low) / 2;
-                match Configuration::find(path, Some(middle)) {
-                    Ok(Some(_)) => low = middle,
-                    _ => high = middle,
-                }
-            }
+            let low = last_between(path, 0, n);
             if n > 0 && matches!(Configuration::find(path, Some(low)), Ok(Some(_))) {
                 message += &format!("; the first one is 0, the last one {low}");
             }
@@ -55,15 +47,7 @@ impl Configuration {
         while matches!(Configuration::find(path, Some(above)), Ok(Some(_))) {
             above *= 2;
         }
-        let mut low = above / 2;
-        while above - low > 1 {
-            let middle = low + (above - low) / 2;
-            match Configuration::find(path, Some(middle)) {
-                Ok(Some(_)) => low = middle,
-                _ => above = middle,
-            }
-        }
-        Ok(low + 1)
+        Ok(last_between(path, above / 2, above) + 1)
     }
 
     /// Finds a frame by its number, or the last frame; `None` if the file does not have it.
@@ -85,6 +69,18 @@ impl Configuration {
         };
         Ok(found.filter(|c| !c.x.is_empty()))
     }
+}
+
+/// The number of the last complete frame from `low` on and before `above`. All frames before it are complete.
+fn last_between(path: &Path, mut low: usize, mut above: usize) -> usize {
+    while above - low > 1 {
+        let middle = low + (above - low) / 2;
+        match Configuration::find(path, Some(middle)) {
+            Ok(Some(_)) => low = middle,
+            _ => above = middle,
+        }
+    }
+    low
 }
 
 /// Without a number this is the last complete frame, because a run that is still going may be in the middle of the next.
@@ -110,7 +106,9 @@ fn last_or_nth(
     Ok(found)
 }
 
-fn domain(
+/// A box with its first edge along x and its second in the plane of x and y, as LAMMPS has them: its corners, and the tilt
+/// factors xy, xz, yz.
+pub fn domain(
     lo: [f64; 3],
     hi: [f64; 3],
     tilt: Option<[f64; 3]>,
@@ -187,8 +185,9 @@ fn from_dump(frame: &dump::Frame) -> Result<Configuration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Frame;
     use crate::data::Atom;
-    use crate::dump::{Digits, DumpWriter, Snapshot};
+    use crate::dump::write_dump;
 
     #[test]
     fn the_same_particles_come_out_of_every_format() {
@@ -224,15 +223,11 @@ mod tests {
         data.write(&path("a.data")).unwrap();
         let mut file = std::fs::File::create(path("a.xyz")).unwrap();
         super::super::write_xyz(&direct.frame(), &mut file).unwrap();
-        let mut writer = DumpWriter::new(std::fs::File::create(path("a.dump")).unwrap(), Digits::All);
+        let mut file = std::fs::File::create(path("a.dump")).unwrap();
         for step in [0, 9] {
-            let (boxlo, boxhi) = ([0.0, 0.0, -1.0], [4.0, 5.0, 5.0]);
-            let (ids, kinds) = (&[5, 3][..], &[1, 2][..]);
-            writer
-                .write(&Snapshot { step, boxlo, boxhi, periodic: [true; 3], ids, kinds, x: &x, v: &v })
-                .unwrap();
+            write_dump(&Frame { step, ..direct.frame() }, &mut file).unwrap();
         }
-        drop(writer);
+        drop(file);
         for name in ["a.data", "a.xyz", "a.dump"] {
             let mut read = Configuration::open(&path(name), Which::Last).unwrap();
             read.name_species(&names, 3);

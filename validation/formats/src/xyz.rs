@@ -59,9 +59,6 @@ fn name_of(species: &str) -> String {
 ///
 /// `Lattice` and a column `pos` are required; `species`, `velo`, `id`, `Origin`, `pbc`, `Time`, `Step` are optional.
 /// Species are numbered in the order of their first appearance in the frame.
-///
-/// # Errors
-/// The function fails at a malformed line. Messages name the file by `path`.
 pub fn read_xyz(
     path: &Path,
     input: impl BufRead,

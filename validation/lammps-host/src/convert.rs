@@ -44,7 +44,6 @@ pub struct Converted {
     pub included: Vec<(String, String)>,
     /// Data files of the script whose atoms have the column of `atom_style mdpd`.
     pub data: Vec<DataFile>,
-    /// Remarks about changed lines.
     pub changed: Vec<Note>,
     /// Remarks about lines whose meaning changed.
     pub left: Vec<Note>,

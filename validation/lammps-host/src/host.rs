@@ -62,10 +62,9 @@ pub struct HostVersion {
     pub plugins: bool,
 }
 
-/// A successful run of the LAMMPS program.
+/// What a run of the LAMMPS program has written.
 #[derive(Debug, Clone)]
 pub struct RunOutput {
-    pub status: ExitStatus,
     pub stdout: String,
     pub stderr: String,
     pub elapsed: Duration,
@@ -266,9 +265,9 @@ impl Host {
     ) -> Result<RunOutput, LammpsError> {
         let mut command = self.command(ranks);
         command.arg("-in").arg(script).arg("-nocite").args(args).current_dir(dir);
-        let run = run_limited(&mut command, limit)?;
+        let (status, run) = run_limited(&mut command, limit)?;
         let all = || format!("{}\n{}", run.stdout, run.stderr);
-        match run.status {
+        match status {
             None => Err(LammpsError::Timeout { script: script.to_owned(), limit, tail: tail(&all(), 10) }),
             Some(status) if !status.success() => Err(LammpsError::Run {
                 script: script.to_owned(),
@@ -276,9 +275,7 @@ impl Host {
                 status,
                 errors: error_lines(&all()),
             }),
-            Some(status) => {
-                Ok(RunOutput { status, stdout: run.stdout, stderr: run.stderr, elapsed: run.elapsed })
-            }
+            Some(_) => Ok(run),
         }
     }
 
@@ -290,8 +287,8 @@ impl Host {
         let fail = |reason: String| LammpsError::Version { lmp: self.lmp.clone(), reason };
         let mut command = self.command(1);
         command.arg("-h");
-        let run = run_limited(&mut command, Duration::from_secs(60))?;
-        if run.status.is_none_or(|s| !s.success()) {
+        let (status, run) = run_limited(&mut command, Duration::from_secs(60))?;
+        if status.is_none_or(|s| !s.success()) {
             return Err(fail(format!("`lmp -h` fails: {}", tail(&run.stderr, 5))));
         }
         parse_version(&run.stdout).ok_or_else(|| fail("`lmp -h` names none that is understood".into()))
@@ -327,14 +324,6 @@ fn one_in(folder: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
     entries.filter(|p| p.is_file() && p.file_name().and_then(|n| n.to_str()).is_some_and(&fits)).min()
 }
 
-struct Limited {
-    /// The exit status; `None` if the run exceeded its time limit.
-    status: Option<ExitStatus>,
-    stdout: String,
-    stderr: String,
-    elapsed: Duration,
-}
-
 /// Collects the output of a pipe on a thread, which signals its end through `done`.
 fn collect<R: Read + Send + 'static>(pipe: Option<R>, done: mpsc::Sender<()>) -> Arc<Mutex<Vec<u8>>> {
     let text = Arc::new(Mutex::new(Vec::new()));
@@ -354,7 +343,11 @@ fn collect<R: Read + Send + 'static>(pipe: Option<R>, done: mpsc::Sender<()>) ->
     text
 }
 
-fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, LammpsError> {
+/// Runs a command; the exit status is `None` if it exceeded its time limit.
+fn run_limited(
+    command: &mut Command,
+    limit: Duration,
+) -> Result<(Option<ExitStatus>, RunOutput), LammpsError> {
     let program = PathBuf::from(command.get_program());
     let start = Instant::now();
     let mut child = command
@@ -396,7 +389,7 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     let text = |t: Arc<Mutex<Vec<u8>>>| {
         String::from_utf8_lossy(&t.lock().unwrap_or_else(|e| e.into_inner())).into_owned()
     };
-    Ok(Limited { status, stdout: text(stdout), stderr: text(stderr), elapsed })
+    Ok((status, RunOutput { stdout: text(stdout), stderr: text(stderr), elapsed }))
 }
 
 /// Stops a process and all its descendants: first by SIGTERM, on which an MPI launcher stops its ranks, then by SIGKILL.
@@ -581,8 +574,8 @@ mod tests {
         // The script ignores SIGTERM and starts a child in another session.
         let script = "trap '' TERM; echo begun; setsid sh -c \"trap '' TERM; sleep 60\"; sleep 60";
         command.args(["-c", script]);
-        let run = run_limited(&mut command, Duration::from_millis(300)).unwrap();
-        assert!(run.status.is_none() && run.stdout == "begun\n");
+        let (status, run) = run_limited(&mut command, Duration::from_millis(300)).unwrap();
+        assert!(status.is_none() && run.stdout == "begun\n");
         assert!(start.elapsed() < Duration::from_secs(6));
     }
 

@@ -190,14 +190,20 @@ impl Lammps {
         }
     }
 
+    /// Calls a function of LAMMPS's library that takes a text.
+    fn call_with<T>(
+        &self,
+        f: unsafe extern "C" fn(*mut c_void, *const c_char) -> T,
+        text: &str,
+    ) -> Result<T, LammpsError> {
+        let argument = c_string(text)?;
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made the text.
+        self.call(text, || unsafe { f(self.handle, argument.as_ptr()) })
+    }
+
     pub fn command(&self, command: &str) -> Result<(), LammpsError> {
-        let f = function!(self.library, lammps_command)?;
-        let text = c_string(command)?;
-        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`. The returned
-        // pointer belongs to LAMMPS and is dropped.
-        self.call(command, || unsafe {
-            f(self.handle, text.as_ptr());
-        })
+        // The returned pointer belongs to LAMMPS and is dropped.
+        self.call_with(function!(self.library, lammps_command)?, command).map(|_| ())
     }
 
     /// Executes commands, one per line, up to the first error. `&` at the end of a line continues it, as do
@@ -233,39 +239,28 @@ impl Lammps {
     /// A thermodynamic quantity of the last step: `temp`, `pe`, `press`, `pxy`, `c_ID[2]` …
     pub fn thermo(&self, name: &str) -> Result<f64, LammpsError> {
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "_[]*".contains(c)) {
-            return Err(LammpsError::Request(format!(
-                "'{name}' is not the name of a thermodynamic quantity"
-            )));
+            return refuse(format!("'{name}' is not the name of a thermodynamic quantity"));
         }
         if self.library.lammps_eval.is_ok() {
             // `lammps_get_thermo` returns 0 for unknown names, so compound names are evaluated as expressions.
             return self.eval(name);
         }
-        let f = function!(self.library, lammps_get_thermo)?;
-        let text = c_string(name)?;
-        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
-        self.call(name, || unsafe { f(self.handle, text.as_ptr()) })
+        self.call_with(function!(self.library, lammps_get_thermo)?, name)
     }
 
     /// The value of an expression, as in an equal-style variable.
     pub fn eval(&self, expression: &str) -> Result<f64, LammpsError> {
-        let f = function!(self.library, lammps_eval)?;
-        let text = c_string(expression)?;
-        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
-        self.call(expression, || unsafe { f(self.handle, text.as_ptr()) })
+        self.call_with(function!(self.library, lammps_eval)?, expression)
     }
 
     /// A setting such as `box_exist` or `nlocal`, with the names of `lammps_extract_setting`; −1 if it is unknown.
     pub fn setting(&self, name: &str) -> Result<i32, LammpsError> {
-        let f = function!(self.library, lammps_extract_setting)?;
-        let text = c_string(name)?;
-        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
-        self.call(name, || unsafe { f(self.handle, text.as_ptr()) })
+        self.call_with(function!(self.library, lammps_extract_setting)?, name)
     }
 
     pub fn simulation_box(&self) -> Result<SimulationBox, LammpsError> {
         if self.setting("box_exist")? != 1 {
-            return Err(LammpsError::Request("LAMMPS has no box yet".into()));
+            return refuse("LAMMPS has no box yet".into());
         }
         let f = function!(self.library, lammps_extract_box)?;
         let (mut lo, mut hi, mut tilt) = ([0.0; 3], [0.0; 3], [0.0; 3]);
@@ -281,42 +276,33 @@ impl Lammps {
 
     /// Refuses a request for an atom property with a wrong type or width, which LAMMPS does not check.
     fn check_property(&self, name: &str, width: usize, real: bool) -> Result<(), LammpsError> {
-        let datatype = function!(self.library, lammps_extract_atom_datatype)?;
-        let text = c_string(name)?;
-        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
-        let kind = self.call(name, || unsafe { datatype(self.handle, text.as_ptr()) })?;
+        let kind = self.call_with(function!(self.library, lammps_extract_atom_datatype)?, name)?;
         let (kind_is_real, two) = match kind {
             INT => (false, false),
             INT_2D => (false, true),
             DOUBLE => (true, false),
             DOUBLE_2D => (true, true),
-            -1 => {
-                return Err(LammpsError::Request(format!("atoms have no property '{name}'")));
-            }
-            _ => {
-                return Err(LammpsError::Request(format!(
-                    "'{name}' is neither a 32-bit integer nor a double"
-                )));
-            }
+            -1 => return refuse(format!("atoms have no property '{name}'")),
+            _ => return refuse(format!("'{name}' is neither a 32-bit integer nor a double")),
         };
         if kind_is_real != real {
             let is = if kind_is_real { "a double" } else { "an integer" };
-            return Err(LammpsError::Request(format!("'{name}' is {is}")));
+            return refuse(format!("'{name}' is {is}"));
         }
         let columns = match (two, name) {
-            (false, "image") => {
-                return if width == 3 || width == 1 { Ok(()) } else { Err(wrong_width(name, width, 3)) };
-            }
+            (false, "image") if width == 1 => 1,
+            (false, "image") => 3,
             (false, _) => 1,
             (true, "x" | "v" | "f" | "omega" | "angmom" | "torque" | "vest") => 3,
             (true, "mu") => 4,
             (true, _) => {
                 let size = function!(self.library, lammps_extract_atom_size)?;
+                let text = c_string(name)?;
                 // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
                 self.call(name, || unsafe { size(self.handle, text.as_ptr(), SIZE_COLS) })?.max(0) as usize
             }
         };
-        if width == columns { Ok(()) } else { Err(wrong_width(name, width, columns)) }
+        if width == columns { Ok(()) } else { wrong_width(name, width, columns) }
     }
 
     /// Refuses a request for a per-atom compute or fix with a wrong width.
@@ -332,15 +318,12 @@ impl Lammps {
             self.call(name, || unsafe { f(self.handle, id.as_ptr(), STYLE_ATOM, SIZE_COLS, 0, 0) })?
         };
         if size.is_null() {
-            return Err(LammpsError::Request(format!("no per-atom values '{name}'")));
+            return refuse(format!("no per-atom values '{name}'"));
         }
         // SAFETY: LAMMPS answers this request with a pointer to an int of its own; the check above excludes null.
         let columns = unsafe { *size.cast::<c_int>() }.max(0) as usize;
-        if width == columns.max(1) && !(width == 1 && columns == 1) {
-            Ok(())
-        } else {
-            Err(wrong_width(name, width, columns.max(1)))
-        }
+        let fits = width == columns.max(1) && columns != 1;
+        if fits { Ok(()) } else { wrong_width(name, width, columns.max(1)) }
     }
 
     /// Values of all atoms, sorted by atom id: a property (`x`, `v`, `f`, `rho` …), a compute (`c_ID`), a fix
@@ -350,20 +333,12 @@ impl Lammps {
     /// need an output of that step that requests them, for example `compute reduce sum` in `thermo_style`.
     pub fn gather(&self, name: &str, width: usize) -> Result<Vec<f64>, LammpsError> {
         let unset = f64::from_bits(0x7ff8_7073_6964_7064);
-        let all = self.gather_any(name, width, true, unset)?;
-        if all.iter().all(|x| x.to_bits() == unset.to_bits()) && !all.is_empty() {
-            return Err(not_gathered(name));
-        }
-        Ok(all)
+        self.gather_any(name, width, true, unset, |x| x.to_bits() == unset.to_bits())
     }
 
     /// Integers of all atoms, sorted by atom id: `id`, `type`, `image` (one word with `width` 1, three with 3), `i_NAME` …
     pub fn gather_ints(&self, name: &str, width: usize) -> Result<Vec<i32>, LammpsError> {
-        let all = self.gather_any(name, width, false, i32::MIN)?;
-        if all.iter().all(|x| *x == i32::MIN) && !all.is_empty() {
-            return Err(not_gathered(name));
-        }
-        Ok(all)
+        self.gather_any(name, width, false, i32::MIN, |x| *x == i32::MIN)
     }
 
     /// The type `T` must be f64 if `real` is set, else i32.
@@ -373,28 +348,19 @@ impl Lammps {
         width: usize,
         real: bool,
         unset: T,
+        is_unset: impl Fn(&T) -> bool,
     ) -> Result<Vec<T>, LammpsError> {
         let text = c_string(name)?;
         let general = match name.as_bytes() {
-            [b'c' | b'f', b'_', ..] if !real => {
-                return Err(LammpsError::Request(format!("'{name}' is a double")));
+            [b'c' | b'f', b'_', ..] if !real => return refuse(format!("'{name}' is a double")),
+            [b'c' | b'f', b'_', ..] => self.check_columns(name, width).map(|()| true)?,
+            [kind @ (b'd' | b'i'), b'_', ..] if (*kind == b'd') != real || width != 1 => {
+                return refuse(format!(
+                    "'{name}' has another type or width than requested: d_ is one double, i_ one integer"
+                ));
             }
-            [b'c' | b'f', b'_', ..] => {
-                self.check_columns(name, width)?;
-                true
-            }
-            [b'd' | b'i', b'_', ..] => {
-                if (name.as_bytes()[0] == b'd') != real || width != 1 {
-                    return Err(LammpsError::Request(format!(
-                        "'{name}' has another type or width than requested: d_ is one double, i_ one integer"
-                    )));
-                }
-                true
-            }
-            _ => {
-                self.check_property(name, width, real)?;
-                false
-            }
+            [b'd' | b'i', b'_', ..] => true,
+            _ => self.check_property(name, width, real).map(|()| false)?,
         };
         let f = if general {
             function!(self.library, lammps_gather)?
@@ -409,6 +375,12 @@ impl Lammps {
         self.call(&format!("gathering {name}"), || unsafe {
             f(self.handle, text.as_ptr(), kind, width as c_int, all.as_mut_ptr().cast())
         })?;
+        if all.iter().all(is_unset) && !all.is_empty() {
+            return Err(LammpsError::Lammps {
+                message: "nothing was gathered: atom ids must run from 1 to the number of atoms".into(),
+                doing: format!("gathering {name}"),
+            });
+        }
         Ok(all)
     }
 
@@ -418,10 +390,8 @@ impl Lammps {
         self.check_property(name, width, true)?;
         let natoms = self.natoms()?;
         if values.len() != natoms * width {
-            return Err(LammpsError::Request(format!(
-                "{} values of {name} for {natoms} atoms with {width} each",
-                values.len()
-            )));
+            let given = values.len();
+            return refuse(format!("{given} values of {name} for {natoms} atoms with {width} each"));
         }
         let text = c_string(name)?;
         // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`. LAMMPS reads
@@ -439,7 +409,7 @@ impl Lammps {
             f(self.handle, text.as_ptr(), STYLE_GLOBAL, what)
         })?;
         if found.is_null() {
-            return Err(LammpsError::Request(format!("there is no compute '{id}' with such a value")));
+            return refuse(format!("there is no compute '{id}' with such a value"));
         }
         Ok(found)
     }
@@ -464,15 +434,12 @@ impl Lammps {
     }
 }
 
-fn wrong_width(name: &str, asked: usize, has: usize) -> LammpsError {
-    LammpsError::Request(format!("'{name}' has {has} values to an atom, not {asked}"))
+fn refuse<T>(message: String) -> Result<T, LammpsError> {
+    Err(LammpsError::Request(message))
 }
 
-fn not_gathered(name: &str) -> LammpsError {
-    LammpsError::Lammps {
-        message: "nothing was gathered: atom ids must run from 1 to the number of atoms".into(),
-        doing: format!("gathering {name}"),
-    }
+fn wrong_width(name: &str, asked: usize, has: usize) -> Result<(), LammpsError> {
+    refuse(format!("'{name}' has {has} values to an atom, not {asked}"))
 }
 
 /// Splits a text into commands: joins continued lines, and drops empty lines and comments.

@@ -23,7 +23,6 @@ pub struct Line {
     pub f: [f64; 3],
 }
 
-/// The carrier of the momentum of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Carrier {
     Particle,
@@ -45,7 +44,6 @@ pub struct Flux {
 pub struct Acted {
     /// The fraction of the step for which these forces acted.
     pub share: f64,
-    /// The virial of these forces.
     pub virial: [f64; 6],
     /// The positions of the particles, if they differ from those at the end of the step.
     pub at: Option<Place>,

@@ -16,7 +16,6 @@ pub struct View<'a> {
     pub time: f64,
     pub kt: f64,
     pub model: &'a Model,
-    /// The number of dimensions is 2 or 3.
     pub dimensions: usize,
     pub domain: &'a PeriodicBox,
     pub masses: &'a [f64],

@@ -30,7 +30,6 @@ pub struct Abscissa {
     pub values: Vec<f64>,
 }
 
-/// One quantity of an observation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Column {
     pub name: String,
@@ -57,7 +56,6 @@ pub struct Observation {
     pub stage: String,
     #[serde(default)]
     pub kind: Kind,
-    /// The abscissa of the columns, if they have one.
     pub x: Option<Abscissa>,
     #[serde(default)]
     pub columns: Vec<Column>,
@@ -90,7 +88,6 @@ impl Observation {
         self
     }
 
-    /// Adds a column of exact values.
     pub fn exact(self, name: &str, unit: &str, values: impl IntoIterator<Item = f64>) -> Observation {
         self.column(name, unit, values.into_iter().map(|value| Measured { value, error: 0.0 }))
     }
@@ -154,7 +151,6 @@ impl Observation {
     }
 }
 
-/// Writes observations as a JSON array.
 pub fn write_json(path: &Path, observations: &[Observation]) -> std::io::Result<()> {
     let text = serde_json::to_string_pretty(observations)?;
     std::fs::write(path, text + "\n")

@@ -92,7 +92,6 @@ impl Observers {
         self.stage != stage || self.observers.iter().any(|o| step.is_multiple_of(o.every))
     }
 
-    /// Takes all samples that are due after a step.
     pub fn sample(&mut self, view: View, stage: &str) {
         let step = view.step;
         if self.stage != stage {

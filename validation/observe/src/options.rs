@@ -24,7 +24,6 @@ pub struct Place<'a> {
     pub stages: StageNames<'a>,
     /// The normal of the slab in the initial state.
     pub slab: Option<usize>,
-    /// The body force of two opposite flows.
     pub drive: Option<Drive>,
 }
 
@@ -78,7 +77,6 @@ impl<'a> Options<'a> {
         Ok(Some(within(&value, value.count()?.value, low, high)? as usize))
     }
 
-    /// Two whole numbers from `low` to `high`.
     pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let items = value.array()?;
@@ -111,7 +109,6 @@ impl<'a> Options<'a> {
         if self.get(key).is_some_and(|value| value.as_str().is_some()) { self.species(key) } else { Ok(None) }
     }
 
-    /// One of the given names.
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
         self.get(key).map(|value| Ok(value.one_of("choice", choices)?.value)).transpose()
     }
@@ -154,7 +151,6 @@ impl<'a> Options<'a> {
         }
     }
 
-    /// Refuses a box with walls.
     pub fn require_periodic(&self) -> Result<(), FileError> {
         match self.place.domain.periodic()[..self.place.fluid.dimensions].contains(&false) {
             true => Err(self.error("", "the box must be periodic in every direction")),

@@ -78,7 +78,6 @@ impl ProfileAccumulator {
         bin as f64 * self.height() - 0.5 * self.length
     }
 
-    /// The mean profile.
     pub fn finish(&self) -> DensityProfile {
         let volume = self.area * self.height() * self.frames.len() as f64;
         let density = |bin: usize| self.frames.iter().map(|counts| counts[bin]).sum::<f64>() / volume;

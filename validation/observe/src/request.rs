@@ -74,12 +74,10 @@ pub fn read(
     Ok(observe)
 }
 
-/// The tables of all observables.
 pub fn tables() -> Vec<&'static Table> {
     KINDS.iter().map(|kind| kind.table).collect()
 }
 
-/// The keys that every observable has.
 #[derive(Debug, Clone)]
 struct Common {
     every: u64,

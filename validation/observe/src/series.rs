@@ -17,7 +17,6 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// An unknown value.
     pub const NONE: Measured = Measured { value: f64::NAN, error: f64::NAN };
 
     /// The mean of a correlated series with the error of [`estimate`], or of fewer samples than that accepts as if they were
@@ -37,7 +36,6 @@ impl Measured {
         Measured { value, error: (squares / (count * (count - 1.0))).sqrt() }
     }
 
-    /// Multiplies value and error by a factor.
     pub fn times(self, factor: f64) -> Measured {
         Measured { value: self.value * factor, error: self.error * factor.abs() }
     }
@@ -59,22 +57,15 @@ pub struct Series {
     rows: Vec<f64>,
 }
 
-/// The stored form of a [`Series`] before validation.
-#[derive(Deserialize)]
-struct Unchecked {
-    width: usize,
-    most: usize,
-    block: u64,
-    pending: Vec<f64>,
-    pending_samples: u64,
-    rows: Vec<f64>,
-}
+/// The fields of a [`Series`] before validation; in checkpoints fields have no names.
+type Unchecked = (usize, usize, u64, Vec<f64>, u64, Vec<f64>);
 
 impl TryFrom<Unchecked> for Series {
     type Error = &'static str;
 
-    fn try_from(read: Unchecked) -> Result<Series, &'static str> {
-        let Unchecked { width, most, block, pending, pending_samples, rows } = read;
+    fn try_from(
+        (width, most, block, pending, pending_samples, rows): Unchecked,
+    ) -> Result<Series, &'static str> {
         let whole_rows = if width == 0 { rows.is_empty() } else { rows.len().is_multiple_of(width) };
         let series = Series { width, most, block, pending, pending_samples, rows };
         let even = most >= 2 && most.is_multiple_of(2);
@@ -91,7 +82,6 @@ impl TryFrom<Unchecked> for Series {
 }
 
 impl Series {
-    /// A series of vectors of `width` numbers.
     pub fn new(width: usize) -> Series {
         Series::with_rows(width, MOST_ROWS)
     }
@@ -142,7 +132,6 @@ impl Series {
         self.block *= 2;
     }
 
-    /// The number of stored rows.
     pub fn len(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
@@ -156,7 +145,6 @@ impl Series {
         self.len() as u64 * self.block
     }
 
-    /// The number of components of a sample.
     pub fn width(&self) -> usize {
         self.width
     }
@@ -166,7 +154,6 @@ impl Series {
         self.rows.chunks_exact(self.width.max(1))
     }
 
-    /// One component of every row.
     pub fn channel(&self, k: usize) -> Vec<f64> {
         self.rows().map(|row| row[k]).collect()
     }
@@ -297,8 +284,8 @@ mod tests {
             whole.push(&[*x]);
             parts.push(&[*x]);
             if k % 701 == 0 {
-                let text = serde_json::to_string(&parts).unwrap();
-                parts = serde_json::from_str(&text).unwrap();
+                let bytes = postcard::to_allocvec(&parts).unwrap();
+                parts = postcard::from_bytes(&bytes).unwrap();
             }
         }
         assert_eq!(whole, parts);

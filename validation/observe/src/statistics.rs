@@ -26,7 +26,6 @@ pub struct Estimate {
     pub mean: f64,
     /// One standard deviation of the mean, s √(2τ/N), in the units of the series, with s² = Σ (xᵢ − x̄)² / (N − 1).
     pub error: f64,
-    /// The number N of samples.
     pub samples: usize,
     /// The integrated autocorrelation time τ = ½ + Σ_{t≥1} ρ(t) in samples that corresponds to `error`. It is ½ for
     /// independent samples and less for anticorrelated ones.

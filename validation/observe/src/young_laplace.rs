@@ -68,7 +68,6 @@ pub struct Fit {
     pub bond: f64,
     /// The radius of curvature R₀ at the apex.
     pub radius: f64,
-    /// The height of the apex.
     pub apex: f64,
     /// The root mean square distance of the points from the contour.
     pub residual: f64,

@@ -32,11 +32,6 @@ pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
         .map_err(|e| FormatError::Picture { path: folder.join(SNAPSHOTS), message: e.to_string() })
 }
 
-/// An animation as a data address, with the image in the page itself.
-pub fn animation_url(png: &[u8]) -> String {
-    super::data_url(png)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -24,6 +24,15 @@ impl FieldOptions {
         FieldOptions { view: View::Y, offset: 0.0, kernel, species: None, size: [0, 0] }
     }
 
+    /// The direction along which the plane of a frame is seen.
+    pub fn view_of(&self, dimensions: usize) -> View {
+        match (dimensions, self.view) {
+            (2, _) => View::Z,
+            (_, View::Oblique) => View::Y,
+            (_, view) => view,
+        }
+    }
+
     /// The density for models without one: the quadratic kernel of range 1.
     pub fn coarse(dimensions: usize) -> FieldOptions {
         FieldOptions::new(Kernel::new(KernelKind::Quadratic, 1.0, dimensions))
@@ -34,8 +43,6 @@ impl FieldOptions {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     pub projection: Projection,
-    /// The number of pixels in a row, and the number of rows.
-    pub size: [usize; 2],
     /// Number densities, row after row from the top; NaN outside the box.
     pub values: Vec<f64>,
 }
@@ -44,17 +51,12 @@ impl Field {
     /// The density of a frame in the plane through the middle of the box. Every particle counts, also at its own
     /// position, so this is the density that a further particle there would feel.
     pub fn of(frame: &Frame, options: &FieldOptions) -> Field {
-        let view = match (frame.dimensions, options.view) {
-            (2, _) => View::Z,
-            (_, View::Oblique) => View::Y,
-            (_, view) => view,
-        };
-        let size = if options.size == [0, 0] { [720, 640] } else { options.size };
-        let projection = Projection::fit(frame.domain, frame.dimensions, view, size, 0.0);
-        let [width, height] = projection.size();
+        let view = options.view_of(frame.dimensions);
+        let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size, 0.0);
+        let [width, height] = projection.size;
         let mut values = vec![0.0; width * height];
         let range = options.kernel.range();
-        let reach = range * projection.scale();
+        let reach = range * projection.scale;
         // In two dimensions all particles are in the plane, for any z.
         let plane = if frame.dimensions == 2 { None } else { Some(projection.middle() + options.offset) };
         for (x, species) in frame.x.iter().zip(frame.species) {
@@ -73,8 +75,8 @@ impl Field {
                 };
                 for row in span(down, height) {
                     for column in span(across, width) {
-                        let dx = (column as f64 + 0.5 - across) / projection.scale();
-                        let dy = (row as f64 + 0.5 - down) / projection.scale();
+                        let dx = (column as f64 + 0.5 - across) / projection.scale;
+                        let dy = (row as f64 + 0.5 - down) / projection.scale;
                         let r = (dx * dx + dy * dy + off * off).sqrt();
                         values[row * width + column] += options.kernel.value(r);
                     }
@@ -90,7 +92,7 @@ impl Field {
                 }
             }
         }
-        Field { projection, size: [width, height], values }
+        Field { projection, values }
     }
 
     /// The largest value; 0 if the field has no value.
@@ -127,7 +129,8 @@ fn images(frame: &Frame, x: [f64; 3], range: f64) -> Vec<[f64; 3]> {
 pub fn paint_field(field: &Field, low: f64, high: f64) -> Image {
     let span = if high > low { high - low } else { 1.0 };
     let pixels: Vec<Rgb> = field.values.iter().map(|v| of_value((v - low) / span)).collect();
-    Image { width: field.size[0], height: field.size[1], pixels }
+    let [width, height] = field.projection.size;
+    Image { width, height, pixels }
 }
 
 #[cfg(test)]
@@ -160,8 +163,8 @@ mod tests {
             for only in [None, Some(1)] {
                 let options = FieldOptions { size: [60, 60], species: only, ..FieldOptions::new(kernel) };
                 let field = Field::of(&frame, &options);
-                for row in 0..field.size[1] {
-                    for column in 0..field.size[0] {
+                for row in 0..field.projection.size[1] {
+                    for column in 0..field.projection.size[0] {
                         let point = field.projection.back([column as f64 + 0.5, row as f64 + 0.5]);
                         let mut sum = 0.0;
                         for (x, s) in x.iter().zip(species) {
@@ -182,13 +185,13 @@ mod tests {
                             }
                         }
                         assert!(
-                            (field.values[row * field.size[0] + column] - sum).abs() < 1e-12,
+                            (field.values[row * field.projection.size[0] + column] - sum).abs() < 1e-12,
                             "{column} {row}"
                         );
                     }
                 }
                 if dimensions == 2 && !walls {
-                    let cell = field.projection.scale().powi(-2);
+                    let cell = field.projection.scale.powi(-2);
                     let integral = field.values.iter().sum::<f64>() * cell;
                     let count = if only.is_some() { 2.0 } else { 4.0 };
                     assert!((integral - count).abs() < 0.02, "{integral}");

@@ -2,7 +2,7 @@
 
 use super::FieldOptions;
 use psidpd_core::model::kernel::Kernel;
-use psidpd_formats::files::WriteError;
+use psidpd_formats::files::{WriteError, replace_through};
 use psidpd_formats::{FormatError, Frame, Grid, write_vti, write_vtp};
 use std::path::Path;
 
@@ -83,24 +83,16 @@ pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
 /// created if it does not exist. A box with edges that are not along the axes gets no density.
 pub fn write_vtk(folder: &Path, frame: &Frame, kernel: Option<Kernel>) -> Result<(), FormatError> {
     let folder = folder.join(VTK);
-    std::fs::create_dir_all(&folder).map_err(|cause| WriteError { path: folder.clone(), cause })?;
+    std::fs::create_dir_all(&folder).map_err(WriteError::at(&folder))?;
+    // The resumed run makes the same step.
+    let new = folder.join("unfinished.new");
     let mut bytes = Vec::new();
-    let write = |name: &str, bytes: &mut Vec<u8>| {
-        let path = folder.join(name);
-        // A killed run leaves at most this file. The resumed run makes the same step and replaces it.
-        let new = folder.join("unfinished.new");
-        std::fs::write(&new, &bytes)
-            .and_then(|()| std::fs::rename(&new, &path))
-            .map_err(|cause| WriteError { path, cause })?;
-        bytes.clear();
-        Ok::<(), WriteError>(())
-    };
-    let write_error = |source| FormatError::Io { action: "write", path: folder.clone(), source };
-    write_vtp(frame, &mut bytes).map_err(write_error)?;
-    write(&format!("particles-{:010}.vtp", frame.step), &mut bytes)?;
+    write_vtp(frame, &mut bytes).map_err(FormatError::io("write", &folder))?;
+    replace_through(&new, &folder.join(format!("particles-{:010}.vtp", frame.step)), &bytes)?;
     if let Some(grid) = density_grid(frame, kernel) {
-        write_vti(&grid, frame, &mut bytes).map_err(write_error)?;
-        write(&format!("density-{:010}.vti", frame.step), &mut bytes)?;
+        bytes.clear();
+        write_vti(&grid, frame, &mut bytes).map_err(FormatError::io("write", &folder))?;
+        replace_through(&new, &folder.join(format!("density-{:010}.vti", frame.step)), &bytes)?;
     }
     Ok(())
 }
@@ -112,7 +104,7 @@ pub fn remove_vtk(folder: &Path) -> Result<(), FormatError> {
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
         let own = [("particles-", ".vtp"), ("density-", ".vti"), ("unfinished", ".new")];
         if own.iter().any(|(start, end)| name.starts_with(start) && name.ends_with(end)) {
-            std::fs::remove_file(&path).map_err(|cause| WriteError { path: path.clone(), cause })?;
+            std::fs::remove_file(&path).map_err(WriteError::at(&path))?;
         }
     }
     Ok(())

@@ -4,7 +4,6 @@ use base64::Engine as _;
 /// Pixels are stored row after row from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
-    /// The number of pixels in a row.
     pub width: usize,
     pub height: usize,
     /// The slice has `width · height` colours.
@@ -57,19 +56,20 @@ impl Image {
         Image::to_apng(std::slice::from_ref(self), 1)
     }
 
+    /// The first image of an animation, whose images must have one size.
+    fn first_of(images: &[Image]) -> Result<&Image, &'static str> {
+        let first = images.first().ok_or("an animation without images")?;
+        match images.iter().all(|i| (i.width, i.height) == (first.width, first.height)) {
+            true => Ok(first),
+            false => Err("the images of an animation differ in size"),
+        }
+    }
+
     /// Encodes an animated PNG file that repeats forever, with `per_second` frames in a second; one image gives a plain
     /// PNG. Programs that support only plain PNG show the first image.
     pub fn to_apng(images: &[Image], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
-        let wrong = |what: &str| {
-            png::EncodingError::IoError(std::io::Error::new(
-                std::io::ErrorKind::InvalidInput,
-                what.to_owned(),
-            ))
-        };
-        let Some(first) = images.first() else { return Err(wrong("an animation without images")) };
-        if images.iter().any(|i| (i.width, i.height) != (first.width, first.height)) {
-            return Err(wrong("the images of an animation differ in size"));
-        }
+        let wrong = |what| std::io::Error::new(std::io::ErrorKind::InvalidInput, what);
+        let first = Image::first_of(images).map_err(wrong)?;
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, first.width as u32, first.height as u32);
         encoder.set_color(png::ColorType::Rgb);
@@ -88,14 +88,8 @@ impl Image {
     }
 
     /// Encodes an animated GIF file that repeats forever and shows each frame for `centiseconds`.
-    ///
-    /// # Errors
-    /// The function fails for no images, for images of different sizes and for images wider than 65535 pixels.
     pub fn to_gif(images: &[Image], centiseconds: u16) -> Result<Vec<u8>, String> {
-        let Some(first) = images.first() else { return Err("an animation without images".into()) };
-        if images.iter().any(|i| (i.width, i.height) != (first.width, first.height)) {
-            return Err("the images of an animation differ in size".into());
-        }
+        let first = Image::first_of(images)?;
         let side = |n: usize| u16::try_from(n).map_err(|_| "the images are too large for a GIF".to_owned());
         let (width, height) = (side(first.width)?, side(first.height)?);
         let mut bytes = Vec::new();
@@ -131,7 +125,6 @@ impl Image {
     }
 }
 
-/// A PNG file as a data address.
 pub fn data_url(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }

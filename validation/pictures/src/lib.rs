@@ -13,7 +13,7 @@ mod particles;
 pub mod projection;
 pub mod snapshot;
 
-pub use animation::{animate, animation_url};
+pub use animation::animate;
 pub use field::{Field, FieldOptions, paint_field};
 pub use grid::{VTK, density_grid, remove_vtk, write_vtk};
 pub use image::{Image, data_url};

@@ -17,10 +17,6 @@ pub struct ParticleOptions {
 }
 
 impl ParticleOptions {
-    fn size(&self) -> [usize; 2] {
-        if self.size == [0, 0] { [720, 640] } else { self.size }
-    }
-
     /// The radius for a frame is 0.4 of the mean spacing, at most 0.3 lengths of the model. In a box that is mostly
     /// empty the mean spacing is larger than the distance of neighbours.
     fn radius(&self, frame: &Frame) -> f64 {
@@ -48,16 +44,16 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
     let radius = options.radius(frame).max(1e-9);
     // Along an axis the picture ends with the box. In the oblique view particles at corners extend beyond the box.
     let margin = if view == View::Oblique { radius } else { 0.0 };
-    let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size(), margin);
-    let size = projection.size().map(|s| s * FINER);
+    let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size, margin);
+    let size = projection.size.map(|s| s * FINER);
     let mut canvas = Canvas {
         image: Image::filled(size[0], size[1], WHITE),
         depth: vec![f64::NEG_INFINITY; size[0] * size[1]],
     };
     let fine = FINER as f64;
     // A particle smaller than a pixel would flicker as it moves.
-    let pixels = (radius * projection.scale() * fine).max(0.75 * fine);
-    let reach = pixels / fine / projection.scale();
+    let pixels = (radius * projection.scale * fine).max(0.75 * fine);
+    let reach = pixels / fine / projection.scale;
     let fades = frame.dimensions == 3 && options.slice.is_none();
     for (x, colour) in frame.x.iter().zip(colours) {
         let toward = projection.toward(*x);
@@ -183,7 +179,7 @@ mod tests {
         }
         // One radius from the middle is background; half a radius from the middle is not.
         let [across, down] = projection.place(x[0]).0;
-        let radius = 0.3 * projection.scale();
+        let radius = 0.3 * projection.scale;
         assert_eq!(at(&image, [across + 1.1 * radius, down]), WHITE);
         assert_ne!(at(&image, [across + 0.5 * radius, down]), WHITE);
         assert_eq!((image.width, image.height), (640, 640));

@@ -53,15 +53,16 @@ pub struct Projection {
     axes: [[f64; 3]; 3],
     /// The left and lower end of the picture, as lengths along the first two axes.
     low: [f64; 2],
-    scale: f64,
-    width: usize,
-    height: usize,
+    /// The number of pixels in a unit of length.
+    pub scale: f64,
+    /// The number of pixels in a row, and the number of rows.
+    pub size: [usize; 2],
     /// The range of the box along the third axis, from back to front.
     depth: [f64; 2],
 }
 
 impl Projection {
-    /// A picture of the whole box, within `size` pixels in width and height, with `margin` (a length) around it.
+    /// A picture of the whole box, within `size` pixels in width and height (0 means 720 by 640), with `margin` (a length) around it.
     pub fn fit(
         domain: &PeriodicBox,
         dimensions: usize,
@@ -70,6 +71,7 @@ impl Projection {
         margin: f64,
     ) -> Projection {
         let view = if dimensions == 2 { View::Z } else { view };
+        let size = if size == [0, 0] { [720, 640] } else { size };
         let axes = view.axes();
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
         for corner in corners(domain, dimensions) {
@@ -82,17 +84,7 @@ impl Projection {
         let scale = (size[0] as f64 / span[0]).min(size[1] as f64 / span[1]);
         let pixels = span.map(|s| ((s * scale).round() as usize).max(1));
         let low = [0, 1].map(|k| range[k][0] - margin);
-        Projection { axes, low, scale, width: pixels[0], height: pixels[1], depth: range[2] }
-    }
-
-    /// The number of pixels in a row, and the number of rows.
-    pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
-    }
-
-    /// The number of pixels in a unit of length.
-    pub fn scale(&self) -> f64 {
-        self.scale
+        Projection { axes, low, scale, size: pixels, depth: range[2] }
     }
 
     /// The position of a point in pixels from the upper left corner, and its depth: 0 at the back of the box, 1 at its
@@ -102,13 +94,13 @@ impl Projection {
         let span = self.depth[1] - self.depth[0];
         let near = if span > 0.0 { (toward - self.depth[0]) / span } else { 1.0 };
         let across = (right - self.low[0]) * self.scale;
-        ([across, self.height as f64 - (up - self.low[1]) * self.scale], near)
+        ([across, self.size[1] as f64 - (up - self.low[1]) * self.scale], near)
     }
 
     /// The point of the middle plane at a position in pixels.
     pub(super) fn back(&self, at: [f64; 2]) -> [f64; 3] {
         let right = self.low[0] + at[0] / self.scale;
-        let up = self.low[1] + (self.height as f64 - at[1]) / self.scale;
+        let up = self.low[1] + (self.size[1] as f64 - at[1]) / self.scale;
         let toward = self.middle();
         std::array::from_fn(|k| right * self.axes[0][k] + up * self.axes[1][k] + toward * self.axes[2][k])
     }
@@ -125,7 +117,7 @@ impl Projection {
 
     /// The ends of the visible range along the horizontal and the vertical.
     pub fn ranges(&self) -> [[f64; 2]; 2] {
-        let span = [self.width as f64 / self.scale, self.height as f64 / self.scale];
+        let span = self.size.map(|n| n as f64 / self.scale);
         [0, 1].map(|k| [self.low[k], self.low[k] + span[k]])
     }
 }
@@ -157,7 +149,7 @@ mod tests {
     fn the_box_fills_the_picture_and_places_go_back() {
         let domain = PeriodicBox::orthogonal([-1.0, 0.0, 2.0], [4.0, 2.0, 8.0], [true; 3]).unwrap();
         let p = Projection::fit(&domain, 3, View::Y, [400, 800], 0.0);
-        assert_eq!((p.size(), p.scale()), ([400, 800], 100.0));
+        assert_eq!((p.size, p.scale), ([400, 800], 100.0));
         assert_eq!(p.place([-1.0, 0.0, 2.0]), ([0.0, 800.0], 1.0));
         assert_eq!(p.place([3.0, 2.0, 10.0]), ([400.0, 0.0], 0.0));
         assert_eq!(p.back([100.0, 700.0]), [0.0, 1.0, 3.0]);
@@ -165,7 +157,7 @@ mod tests {
         let oblique = Projection::fit(&domain, 3, View::Oblique, [300, 300], 0.1);
         for corner in corners(&domain, 3) {
             let ([x, y], near) = oblique.place(corner);
-            let [w, h] = oblique.size().map(|s| s as f64);
+            let [w, h] = oblique.size.map(|s| s as f64);
             assert!((0.0..=w).contains(&x) && (0.0..=h).contains(&y) && (-1e-9..=1.0 + 1e-9).contains(&near));
         }
     }

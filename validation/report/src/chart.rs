@@ -114,7 +114,6 @@ pub(super) fn axes(chart: &mut Chart, names: [&str; 2], scales: [&Scale; 2], gri
     Ok(())
 }
 
-/// Text beside a point.
 pub(super) fn note<At>(text: &str, at: At) -> Text<'static, At, String> {
     Text::new(one_line(text), at, font(SMALL, GREY).pos(Pos::new(HPos::Left, VPos::Bottom)))
 }

@@ -45,7 +45,6 @@ const NAMES: f64 = 150.0;
 const CENTRE: Pos = Pos { h_pos: HPos::Center, v_pos: VPos::Center };
 
 impl Figure {
-    /// Draws the particles of a frame.
     pub fn particles(title: &str, frame: &Frame, options: &ParticleOptions) -> Figure {
         let (image, projection) = draw_particles(frame, options);
         let view = if frame.dimensions == 2 { View::Z } else { options.view };
@@ -81,13 +80,8 @@ impl Figure {
     /// Draws a weighted local density of a frame, with colours from 0 to its highest value in the picture.
     pub fn field(title: &str, label: &str, frame: &Frame, options: &FieldOptions) -> Figure {
         let field = Field::of(frame, options);
-        let view = match (frame.dimensions, options.view) {
-            (2, _) => View::Z,
-            (_, View::Oblique) => View::Y,
-            (_, view) => view,
-        };
         let high = if field.max() > 0.0 { field.max() } else { 1.0 };
-        let names = view.names().unwrap_or(["x", "z"]);
+        let names = options.view_of(frame.dimensions).names().unwrap_or(["x", "z"]);
         Figure {
             title: title.into(),
             image: paint_field(&field, 0.0, high),

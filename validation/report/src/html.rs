@@ -53,7 +53,6 @@ impl Item {
         Item::Prose(text.into())
     }
 
-    /// A plot with the text below it.
     pub fn figure(plot: &Plot, caption: impl Into<String>) -> Result<Item, ReportError> {
         Ok(Item::Figure { svg: plot.render()?, caption: caption.into() })
     }

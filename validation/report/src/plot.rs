@@ -267,7 +267,6 @@ impl Sample {
     }
 }
 
-/// A solid or dashed line.
 fn stroke<'a, At: Clone + 'static>(
     path: Vec<At>,
     style: Style,

@@ -160,13 +160,11 @@ impl Bar {
         self.inner.set_position(n);
     }
 
-    /// Ends the bar and removes it from the screen.
     pub fn finish(&self) {
         self.inner.finish_and_clear();
     }
 }
 
-/// A speed in words.
 fn rate(steps_per_second: f64, particles: usize) -> String {
     if !(steps_per_second > 0.0 && steps_per_second.is_finite()) {
         return "-".into();

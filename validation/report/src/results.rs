@@ -18,16 +18,13 @@ pub struct Check {
     pub section: String,
     pub description: String,
     pub value: f64,
-    /// The standard error of `value`, if it has one.
     pub error: Option<f64>,
-    /// The expected `value`, if it is known.
     pub expected: Option<f64>,
     /// The bound on `value`.
     pub limit: f64,
     /// True if `limit` is a lower bound on `value`; else it is an upper bound on the magnitude.
     pub at_least: bool,
     pub passed: bool,
-    /// Remarks for the reader.
     pub note: String,
 }
 

@@ -68,7 +68,6 @@ impl Scale {
         }
     }
 
-    /// The lower and the upper end.
     pub fn ends(&self) -> (f64, f64) {
         (self.range.start, self.range.end)
     }

@@ -23,7 +23,6 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table with these columns.
     pub fn new<S: Into<String>>(header: impl IntoIterator<Item = S>) -> Self {
         Self { header: header.into_iter().map(Into::into).collect(), rows: Vec::new(), align: Vec::new() }
     }
@@ -89,7 +88,6 @@ impl Table {
         self.rows.iter().map(Vec::len).fold(self.header.len(), usize::max)
     }
 
-    /// Returns true if a column is aligned to the right.
     pub(super) fn is_right(&self, column: usize) -> bool {
         match self.align.get(column).copied().unwrap_or_default() {
             Align::Left => false,
@@ -109,7 +107,6 @@ impl Table {
     }
 }
 
-/// The verdict in a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
     Pass,

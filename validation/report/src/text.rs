@@ -56,7 +56,6 @@ pub(super) fn fit(text: &str, size: f64, room: f64) -> String {
     kept
 }
 
-/// An integer as a superscript.
 pub(super) fn superscript(n: i32) -> String {
     n.to_string()
         .chars()

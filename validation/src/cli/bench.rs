@@ -1,13 +1,9 @@
 use super::run::thread_count;
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
+use super::*;
 use psidpd_dynamics::device::Device;
 use psidpd_experiments::bench::{Asked, Options, advice, contender::FEW_ABOVE, memory, page, run as measure};
 use psidpd_experiments::fluids::SIZES;
 use psidpd_experiments::start::SEED;
-use psidpd_report::Progress;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 
 /// Time LAMMPS, the plugin and the native runner side by side. Nothing else should run.
 ///

@@ -1,16 +1,7 @@
-use super::inputs::Files;
 use super::run::threads_at_once;
-use super::say::{self, say};
-use super::settings::temperature;
-use super::{Failure, Verdict, write_json};
-use psidpd_core::model::Model;
-use psidpd_experiments::ExperimentError;
+use super::*;
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
-use psidpd_formats::files::write_atomically;
-use psidpd_report::Table;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 
 /// Find the corrected density with which a model has the pressure it was made for.
 ///
@@ -49,18 +40,31 @@ pub struct Arguments {
     /// Steps before them.
     #[arg(long, value_name = "N", default_value_t = 500)]
     equilibrate: u64,
-    /// Time step.
-    #[arg(long, default_value_t = 0.01)]
-    dt: f64,
-    /// Seed of the starts and of the noise.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Threads that share the work.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
-    threads: NonZeroUsize,
+    #[command(flatten)]
+    runs: Runs,
     /// Where the model file with its correction goes.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+pub struct Runs {
+    /// Time step.
+    #[arg(long, default_value_t = 0.01)]
+    pub dt: f64,
+    /// Seed of the starts and of the noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Threads that share the work.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
+    threads: NonZeroUsize,
+}
+
+impl Runs {
+    pub fn sampling(&self, particles: usize, equilibrate: u64, steps: u64) -> Sampling {
+        let Runs { dt, seed, threads } = *self;
+        Sampling { particles, dt, equilibrate, steps, every: 20, seed, threads }
+    }
 }
 
 impl Arguments {
@@ -82,7 +86,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let a = arguments;
     let bad = |message: String| Failure::from(ExperimentError::Conditions(message));
-    if !(a.tolerance > 0.0 && a.dt > 0.0 && a.tolerance.is_finite() && a.dt.is_finite()) {
+    if !(a.tolerance > 0.0 && a.runs.dt > 0.0 && a.tolerance.is_finite() && a.runs.dt.is_finite()) {
         return Err(bad("tolerance and time step must be positive numbers".into()));
     }
     let species = Model::open(&a.model)?.species().len();
@@ -97,15 +101,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         composition: shares.iter().map(|share| share / sum).collect(),
         name: a.name.clone(),
         tolerance: a.tolerance,
-        sampling: Sampling {
-            particles: a.particles as usize,
-            dt: a.dt,
-            equilibrate: a.equilibrate,
-            steps: a.steps,
-            every: 20,
-            seed: a.seed,
-            threads: a.threads,
-        },
+        sampling: a.runs.sampling(a.particles as usize, a.equilibrate, a.steps),
     };
     let found = calibrate(&a.model, &options, &command(a), &mut |line| say!("{line}"))?;
     write_atomically(&a.out, found.text.as_bytes())?;
@@ -187,8 +183,8 @@ fn command(a: &Arguments) -> String {
         a.particles,
         a.equilibrate,
         a.steps,
-        a.dt,
-        a.seed,
+        a.runs.dt,
+        a.runs.seed,
         name(&a.out)
     ));
     text

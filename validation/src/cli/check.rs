@@ -1,8 +1,4 @@
-use super::inputs::Files;
-use super::say::say;
-use super::settings::temperature;
-use super::{Failure, Settings, Verdict, write_json};
-use psidpd_core::document::Document;
+use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_dynamics::run::bytes_per_particle;
 use psidpd_experiments::check::{
@@ -10,7 +6,6 @@ use psidpd_experiments::check::{
 };
 use psidpd_formats::memory::{self, shown};
 use psidpd_report::quantity::{decimal, number};
-use std::path::{Path, PathBuf};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
 #[derive(Debug, clap::Args)]
@@ -87,16 +82,11 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let other = check(&model, &Conditions { kt: conditions.kt, densities: Some(rho.clone()) })?;
         findings.add_at(model.species(), &rho, other.warnings);
     }
-    if let Some(error) = too_large {
-        findings
-            .warnings
-            .insert(0, Warning { id: "memory", severity: Severity::Error, message: error.to_string() });
-    }
-    if let Some(error) = too_far {
-        findings.warnings.insert(
-            0,
-            Warning { id: "range-beyond-box", severity: Severity::Error, message: error.to_string() },
-        );
+    let memory = too_large.map(|error| ("memory", error.to_string()));
+    for (id, message) in
+        memory.into_iter().chain(too_far.map(|error| ("range-beyond-box", error.to_string())))
+    {
+        findings.warnings.insert(0, Warning { id, severity: Severity::Error, message });
     }
     print(&findings, model.species());
     write_json(json, &findings)?;

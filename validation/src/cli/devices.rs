@@ -1,10 +1,6 @@
-use super::say;
-use super::{Failure, Verdict, write_json};
+use super::*;
 use psidpd_dynamics::device::{self, Found};
 use psidpd_dynamics::run::RunError;
-use psidpd_report::Table;
-use serde::Serialize;
-use std::path::Path;
 
 /// The GPUs that can make the steps of a run, for `psidpd run --device` and the key `device` of a scene.
 ///

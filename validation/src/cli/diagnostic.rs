@@ -1,13 +1,10 @@
 //! Error messages for people: what is wrong, where (with the line of the file), and what to do.
 
-use super::error::CliError;
+use super::{Caller, CliError, ExperimentError, PathBuf, printable};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-use psidpd_core::document::{FileError, printable};
-use psidpd_dynamics::checkpoint::Caller;
+use psidpd_core::document::FileError;
 use psidpd_dynamics::run::RunError;
-use psidpd_experiments::ExperimentError;
 use psidpd_lammps_host::LammpsError;
-use std::path::PathBuf;
 
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;

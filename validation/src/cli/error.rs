@@ -1,6 +1,5 @@
+use super::{PathBuf, WriteError};
 use psidpd_dynamics::run::StateError;
-use psidpd_formats::files::WriteError;
-use std::path::PathBuf;
 
 /// The errors of verbs themselves.
 #[derive(Debug, thiserror::Error)]

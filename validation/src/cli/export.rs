@@ -1,11 +1,6 @@
-use super::inputs::Files;
-use super::say::say;
-use super::settings::temperature;
-use super::{Failure, Settings, Verdict, write_json};
+use super::*;
 use psidpd_lammps_host::export::eam::{self, Grid};
 use psidpd_lammps_host::export::lammps as deck;
-use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// A fluid in the formats of other codes.
 #[derive(Debug, clap::Subcommand)]

@@ -1,14 +1,7 @@
-use super::error::CliError;
-use super::inputs::Files;
-use super::say;
-use super::settings::temperature;
-use super::{Failure, Settings, Verdict, write_json};
+use super::*;
 use psidpd_core::engine::Want;
 use psidpd_dynamics::run::{Simulation, State};
 use psidpd_formats::data::DataFile;
-use psidpd_report::Table;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 /// Conservative energy, virial, densities and forces of one configuration, by atom id.
 #[derive(Debug, clap::Args)]

@@ -1,9 +1,5 @@
-use super::say::{self, say};
-use super::{Failure, write_json};
-use psidpd_core::engine::Fault;
+use super::*;
 use psidpd_experiments::hardcases::{self, Extent};
-use psidpd_report::Progress;
-use std::path::Path;
 
 /// Cases that are hard for a simulation: what must happen in each, and what did, by integrator and precision.
 ///

@@ -1,14 +1,14 @@
 //! No verb overwrites a file that it reads.
 
-use super::error::CliError;
-use psidpd_core::document::{Document, Section, Value};
+use super::{CliError, Document, Path, PathBuf};
+use psidpd_core::document::{Section, Value};
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
 
 /// The input and output files of a verb.
 #[derive(Debug, Default)]
 pub struct Files {
-    given: Vec<PathBuf>,
+    /// The input files as the user named them.
+    pub given: Vec<PathBuf>,
     reads: Vec<PathBuf>,
     writes: Vec<PathBuf>,
 }
@@ -23,11 +23,6 @@ impl Files {
         let mut reads = Vec::new();
         given.iter().for_each(|path| named(path, DEEPEST, &mut reads));
         Files { given, reads, writes: Vec::new() }
-    }
-
-    /// The input files as the user named them.
-    pub fn given(&self) -> &[PathBuf] {
-        &self.given
     }
 
     /// Adds output files.

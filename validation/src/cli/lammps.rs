@@ -1,12 +1,6 @@
-use super::inputs::Files;
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
-use psidpd_core::document::printable;
+use super::*;
 use psidpd_lammps_host::convert::{self, Law};
 use psidpd_lammps_host::{Host, LammpsError, base_dir, install, plugin};
-use psidpd_report::Progress;
-use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// LAMMPS and the plugin.
 #[derive(Debug, clap::Subcommand)]

@@ -34,12 +34,20 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use diagnostic::Failure;
 use error::CliError;
 use inputs::Files;
+use psidpd_core::document::{Document, printable};
+use psidpd_core::engine::Fault;
+use psidpd_core::model::Model;
 use psidpd_dynamics::checkpoint::Caller;
-use psidpd_formats::files::WriteError;
+use psidpd_experiments::ExperimentError;
+use psidpd_formats::files::{WriteError, write_atomically};
+use psidpd_report::{Progress, Table};
+use say::say;
 use serde::Serialize;
-use settings::Settings;
+use serde_json::json;
+use settings::{Settings, temperature};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -159,7 +167,7 @@ fn carry_out(arguments: Arguments) -> u8 {
         .check(json)
         .map_err(Failure::from)
         .and_then(|()| run_verb(&arguments.verb, json))
-        .map_err(|failure| failure.of(files.given()))
+        .map_err(|failure| failure.of(&files.given))
         .and_then(|verdict| say::lost().map_or(Ok(verdict), |cause| Err(CliError::Lost(cause).into())));
     match outcome {
         Ok(Verdict::Good) => 0,

@@ -1,13 +1,6 @@
-use super::run::threads_at_once;
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
-use psidpd_experiments::ExperimentError;
-use psidpd_experiments::bulk::Sampling;
+use super::calibrate::Runs;
+use super::*;
 use psidpd_experiments::from_eos::{Options, Substance, from_eos};
-use psidpd_formats::files::write_atomically;
-use psidpd_report::Table;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 
 /// Make a model file.
 #[derive(Debug, clap::Subcommand)]
@@ -41,15 +34,8 @@ pub struct FromEos {
     /// Steps of each run of the homogeneous liquid; the slab has eight times as many.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(100..))]
     steps: u64,
-    /// Time step.
-    #[arg(long, default_value_t = 0.01)]
-    dt: f64,
-    /// Seed of the starts and of the noise.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Threads that share the work.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
-    threads: NonZeroUsize,
+    #[command(flatten)]
+    runs: Runs,
     /// Where the model file goes.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -57,7 +43,7 @@ pub struct FromEos {
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     let Verb::FromEos(a) = verb;
-    let numbers = [a.temperature, a.molecules, a.density, a.tolerance, a.dt, a.range, 1.0 - a.range];
+    let numbers = [a.temperature, a.molecules, a.density, a.tolerance, a.runs.dt, a.range, 1.0 - a.range];
     if !numbers.into_iter().all(|x| x > 0.0 && x.is_finite()) {
         let message = "numbers must be positive, and the range below 1";
         return Err(ExperimentError::Conditions(message.into()).into());
@@ -68,15 +54,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         density: a.density,
         range: a.range,
         tolerance: a.tolerance,
-        sampling: Sampling {
-            particles: 1000,
-            dt: a.dt,
-            equilibrate: 500,
-            steps: a.steps,
-            every: 20,
-            seed: a.seed,
-            threads: a.threads,
-        },
+        sampling: a.runs.sampling(1000, 500, a.steps),
     };
     let command = format!(
         "psidpd model from-eos {} --T {} --molecules {} --density {} --range {} --tolerance {} --steps {} --dt {} --seed {} --out {}",
@@ -87,8 +65,8 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         a.range,
         a.tolerance,
         a.steps,
-        a.dt,
-        a.seed,
+        a.runs.dt,
+        a.runs.seed,
         a.out.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned()),
     );
     let substance = Substance::find(&a.substance)?;

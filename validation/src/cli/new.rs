@@ -1,8 +1,5 @@
-use super::say::say;
-use super::{Failure, Verdict, write_json};
+use super::*;
 use psidpd_dynamics::scene::{TEMPLATES, Template};
-use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// Write a scene to begin with, and its model.
 #[derive(Debug, clap::Args)]

@@ -1,11 +1,6 @@
-use super::inputs::Files;
 use super::run::thread_count;
-use super::say::{self, say};
-use super::{Failure, Settings, Verdict, write_json};
+use super::*;
 use psidpd_experiments::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
-use psidpd_report::Progress;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 
 /// What a unit of simulated time costs with each setting, and how far off its results are.
 ///

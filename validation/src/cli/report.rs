@@ -1,9 +1,5 @@
-use super::inputs::Files;
-use super::say::say;
-use super::{Failure, Verdict, write_json};
+use super::*;
 use psidpd_report::write_run_report;
-use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// Make report.html of a run again.
 #[derive(Debug, clap::Args)]

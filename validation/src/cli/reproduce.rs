@@ -1,15 +1,7 @@
-use super::error::CliError;
 use super::run::threads_at_once;
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
-use psidpd_core::engine::Fault;
-use psidpd_experiments::ExperimentError;
+use super::*;
 use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, cases};
-use psidpd_formats::files::write_atomically;
-use psidpd_report::Table;
-use serde_json::{Value, json};
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use serde_json::Value;
 
 /// Figures and tables of the papers: measured, and compared with what is published.
 ///

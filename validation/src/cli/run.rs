@@ -1,21 +1,13 @@
-use super::error::CliError;
-use super::inputs::Files;
-use super::say::{self, whoever_listens as say};
-use super::{Failure, Settings, Verdict, write_json};
-use psidpd_core::document::printable;
+use super::say::whoever_listens as say;
+use super::*;
 use psidpd_core::engine::{Pool, Precision, at_once};
 use psidpd_dynamics::device::Device;
-use psidpd_dynamics::run::FILES;
-use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
+use psidpd_dynamics::run::{Advice, Begin, FILES, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::calibration;
-use psidpd_report::{Headline, Progress, headline, write_run_report};
-use serde::Serialize;
+use psidpd_report::{Headline, headline, write_run_report};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::ffi::OsStr;
-use std::io::Write;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 

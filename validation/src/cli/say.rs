@@ -1,9 +1,8 @@
 //! Standard output of the program.
 
-use psidpd_core::document::printable;
-use psidpd_report::Table;
+use super::{ErrorKind, Table, Write, printable};
 use std::fmt::Arguments;
-use std::io::{self, ErrorKind, Write};
+use std::io;
 use std::sync::Mutex;
 
 /// The first error of standard output, most often a full disk.

@@ -1,8 +1,6 @@
-use super::Failure;
-use psidpd_core::document::{Document, FileError, Source};
-use psidpd_core::model::Model;
+use super::{Document, Failure, Model, Path};
+use psidpd_core::document::{FileError, Source};
 use psidpd_dynamics::scene::{Edit, Scene, edit_model};
-use std::path::Path;
 use std::sync::Arc;
 
 #[derive(Debug, Clone, Default, clap::Args)]

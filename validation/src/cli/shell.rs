@@ -1,11 +1,7 @@
 //! Shell completions and manual pages.
 
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
+use super::*;
 use clap_complete::Shell;
-use psidpd_formats::files::WriteError;
-use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// Print a script that completes verbs and options in a shell.
 #[derive(Debug, clap::Args)]

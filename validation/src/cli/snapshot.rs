@@ -1,17 +1,10 @@
-use super::inputs::Files;
-use super::say::say;
-use super::settings::temperature;
-use super::{Failure, Verdict, write_json};
+use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
-use psidpd_core::model::Model;
 use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_formats::files::write_atomically;
 use psidpd_formats::{Configuration, FormatError, Frame, Which};
 use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
 use psidpd_report::Figure;
-use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// A picture of the particles, or of their density, in a data, dump or XYZ file; or a film of all its frames.
 #[derive(Debug, clap::Args)]

@@ -1,10 +1,6 @@
-use super::inputs::Files;
 use super::run::{quoted, thread_count, threads_at_once, watch_signals};
-use super::say::{self, say};
-use super::{Failure, Settings, Verdict, write_json};
+use super::*;
 use psidpd_experiments::sweep::{self, Axis, Options};
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 /// Run a scene at many values of its keys, several runs at a time.

@@ -1,17 +1,12 @@
 use super::check::{number_density, per_species};
-use super::inputs::Files;
-use super::say::{self, say};
-use super::settings::temperature;
-use super::{Failure, Settings, Verdict, write_json};
-use psidpd_core::model::Model;
+use super::*;
 use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point_of_model};
 use psidpd_dynamics::prediction::{Prediction, predict, published};
 use psidpd_experiments::measure::{self, Effort};
 use psidpd_experiments::theory_page::{self, Scope};
+use psidpd_report::Headline;
 use psidpd_report::quantity::{decimal, number, with_error};
-use psidpd_report::{Headline, Table};
-use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use serde_json::Value;
 
 /// Mean field: equation of state, critical point, spinodal, binodal, surface tension; and how far to trust it.
 ///

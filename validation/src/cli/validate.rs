@@ -1,9 +1,5 @@
-use super::say::{self, say};
-use super::{Failure, Verdict, write_json};
-use psidpd_core::engine::Fault;
+use super::*;
 use psidpd_experiments::crosscheck::{Options, check_table, validate};
-use psidpd_report::Progress;
-use std::path::{Path, PathBuf};
 
 /// Compare the codes; a few minutes on two cores.
 #[derive(Debug, clap::Args)]

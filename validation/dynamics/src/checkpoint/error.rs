@@ -43,7 +43,6 @@ pub enum Caller {
 }
 
 impl Caller {
-    /// The option that replaces the files of a folder.
     pub fn start_over(self) -> &'static str {
         match self {
             Caller::Options => "start over with --overwrite",
@@ -52,7 +51,6 @@ impl Caller {
         }
     }
 
-    /// The option that continues a run.
     pub fn go_on(self) -> &'static str {
         match self {
             Caller::Options => "go on with --resume",
@@ -73,7 +71,6 @@ impl CheckpointError {
         CheckpointError::Unreadable { path, source }
     }
 
-    /// The advice that follows the message.
     pub fn help(&self, caller: Caller) -> String {
         let over = caller.start_over();
         match self {
@@ -89,7 +86,6 @@ impl CheckpointError {
     }
 }
 
-/// Joins the first few differences.
 fn list(differences: &[String]) -> String {
     const MOST: usize = 5;
     let shown = differences.iter().take(MOST).cloned().collect::<Vec<_>>().join("; ");

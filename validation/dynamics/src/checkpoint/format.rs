@@ -58,7 +58,6 @@ impl<W: Write> Write for Payload<W> {
     }
 }
 
-/// Reads a checkpoint; fails if the file cannot be read, or as [`parse`] does.
 pub fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
     let bytes = std::fs::read(path).map_err(CheckpointError::unreadable(path))?;
     parse(&bytes, path)

@@ -1,5 +1,6 @@
 //! What tells one run from another: the keys of its scene and of its model.
 
+use super::Written;
 use psidpd_core::engine::Precision;
 use psidpd_core::model::Model;
 use serde::{Deserialize, Serialize};
@@ -104,21 +105,6 @@ fn written(value: &toml::Value) -> String {
 
 /// The length and checksum of a file's content; `None` if the file cannot be read.
 fn content_of(path: &Path) -> Option<String> {
-    let mut file = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
-    let mut digest = Digest(crc32fast::Hasher::new());
-    let length = std::io::copy(&mut file, &mut digest).ok()?;
-    Some(format!("a file of {length} bytes with the CRC-32 {:08x}", digest.0.finalize()))
-}
-
-struct Digest(crc32fast::Hasher);
-
-impl std::io::Write for Digest {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.update(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
+    let Written { length, checksum } = path.is_file().then(|| Written::of(path, u64::MAX).ok())??;
+    Some(format!("a file of {length} bytes with the CRC-32 {checksum:08x}"))
 }

@@ -41,7 +41,6 @@ const NEWEST: &str = "checkpoint";
 /// Particle arrays keep the order of the run: sums of forces depend on it by rounding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// Version of the program that wrote the checkpoint.
     pub program: String,
     /// The instruction set of the pair forces: sums of forces depend on it by rounding.
     pub instructions: String,
@@ -50,7 +49,6 @@ pub struct Checkpoint {
     pub finished: bool,
     /// Number of the present step; it keys the noise.
     pub step: u64,
-    /// The place of the present step in the stages.
     pub position: Position,
     pub state: State,
     /// Forces of the present step, thermostat included: the next step begins with them.

@@ -1,7 +1,7 @@
 //! The checkpoints in the folder of a run.
 
 use super::{Checkpoint, CheckpointError, NEWEST, format};
-use psidpd_formats::files::{WriteError, remove_if_there};
+use psidpd_formats::files::{WriteError, remove_all, remove_if_there};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -69,10 +69,7 @@ impl Store {
     }
 
     /// Finds the newest checkpoint that is whole and that `usable` accepts; `None` if there is no checkpoint.
-    ///
-    /// # Errors
-    /// The fault of the newest checkpoint, if the previous one cannot be used either; a checkpoint of another
-    /// run.
+    /// The error is the fault of the newest checkpoint if the previous one cannot be used either.
     pub fn find(
         &self,
         usable: impl Fn(&Checkpoint) -> Result<(), CheckpointError>,
@@ -103,21 +100,12 @@ impl Store {
             .map_err(WriteError::at(&newest))
     }
 
-    /// Removes all checkpoint files but the newest.
     pub fn keep_newest(&self) -> Result<(), WriteError> {
-        self.remove(&[UNFINISHED, BEFORE])
+        remove_all(&self.folder, &[UNFINISHED, BEFORE])
     }
 
     pub fn clear(&self) -> Result<(), WriteError> {
-        self.remove(&Store::FILES)
-    }
-
-    fn remove(&self, names: &[&str]) -> Result<(), WriteError> {
-        for name in names {
-            let path = self.folder.join(name);
-            remove_if_there(&path).map_err(WriteError::at(&path))?;
-        }
-        Ok(())
+        remove_all(&self.folder, &Store::FILES)
     }
 
     /// Syncs the folder, so that its file names survive a power failure.

@@ -10,17 +10,15 @@ pub struct Thermo {
     pub temperature: f64,
     /// The energy `U` of the conservative forces.
     pub potential: f64,
-    /// The kinetic energy `½ Σ m v²`.
     pub kinetic: f64,
     /// The pressure: a third (in two dimensions half) of the trace of `tensor`.
     pub pressure: f64,
     /// The pressure tensor in the order xx, yy, zz, xy, xz, yz, thermostat forces included.
     pub tensor: [f64; 6],
-    /// The pressure of the conservative forces alone.
     pub conservative_pressure: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Means {
     pub rows: u64,
     pub temperature: f64,
@@ -31,32 +29,26 @@ pub struct Means {
 
 /// Sums over thermo rows; a checkpoint holds them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Sums {
-    rows: u64,
-    temperature: f64,
-    potential: f64,
-    pressure: f64,
-    conservative_pressure: f64,
-}
+pub struct Sums(Means);
 
 impl Sums {
     pub fn add(&mut self, t: &Thermo) {
-        self.rows += 1;
-        self.temperature += t.temperature;
-        self.potential += t.potential;
-        self.pressure += t.pressure;
-        self.conservative_pressure += t.conservative_pressure;
+        self.0.rows += 1;
+        self.0.temperature += t.temperature;
+        self.0.potential += t.potential;
+        self.0.pressure += t.pressure;
+        self.0.conservative_pressure += t.conservative_pressure;
     }
 
-    /// The means; `None` without rows.
     pub fn means(&self) -> Option<Means> {
-        let count = self.rows as f64;
-        (self.rows > 0).then(|| Means {
-            rows: self.rows,
-            temperature: self.temperature / count,
-            potential: self.potential / count,
-            pressure: self.pressure / count,
-            conservative_pressure: self.conservative_pressure / count,
+        let Means { rows, temperature, potential, pressure, conservative_pressure } = self.0;
+        let mean = |sum: f64| sum / rows as f64;
+        (rows > 0).then(|| Means {
+            rows,
+            temperature: mean(temperature),
+            potential: mean(potential),
+            pressure: mean(pressure),
+            conservative_pressure: mean(conservative_pressure),
         })
     }
 }

@@ -30,7 +30,6 @@ impl Written {
         }
     }
 
-    /// Appends `bytes` to the record.
     pub fn add(&mut self, bytes: &[u8]) {
         let mut hasher = Hasher::new_with_initial_len(self.checksum, self.length);
         hasher.update(bytes);

@@ -32,7 +32,6 @@ impl BodyForce {
         all.then_some(Drive { across, along, acceleration: self.acceleration[along] })
     }
 
-    /// The acceleration at the point `x` in the box.
     pub fn at(&self, domain: &PeriodicBox, x: [f64; 3]) -> [f64; 3] {
         match self.reversed_along {
             Some(k) if domain.fraction(x)[k] >= 0.5 => self.acceleration.map(|a| -a),
@@ -68,7 +67,7 @@ where
 mod tests {
     use crate::run::{Integrator, Simulation, State};
     use crate::scene::Scene;
-    use crate::test_support::{self, IDEAL_MIXTURE};
+    use crate::tests::support::{self, IDEAL_MIXTURE};
     use psidpd_core::engine::Want;
 
     /// A scene of two species without pair forces, and its initial state.
@@ -76,7 +75,7 @@ mod tests {
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nbox = [6, 6, 8]\ndensity = 3\nsteps = 1\n{rest}\n[masses]\nB = 3.0\n"
         );
-        let scene = test_support::scene(IDEAL_MIXTURE, &text).unwrap();
+        let scene = support::scene(IDEAL_MIXTURE, &text).unwrap();
         let state = scene.initial_state();
         (scene, state)
     }

@@ -2,14 +2,11 @@
 
 use super::state::State;
 use super::tags::order_of_tags;
-use nalgebra::{Matrix3, Vector3};
-use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use psidpd_formats::FormatError;
 use psidpd_formats::data::{Atom, DataFile};
 use std::path::Path;
 
-/// The error of particles that are no valid state of a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the initial state is not usable: {message}")]
 pub struct StateError {
@@ -76,28 +73,14 @@ impl State {
     /// wrapped along these. Types are species from 1. Missing masses are 1, missing velocities are 0.
     pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, StateError> {
         let species = model.species().len();
-        let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);
-        let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| data.boxhi[k] - data.boxlo[k]);
-        let edges = Matrix3::from_columns(&[
-            Vector3::new(lx, 0.0, 0.0),
-            Vector3::new(xy, ly, 0.0),
-            Vector3::new(xz, yz, lz),
-        ]);
         let walls = periodic[..model.dimensions()].iter().any(|p| !p);
         if walls && data.tilt.is_some_and(|tilt| tilt != [0.0; 3]) {
             return Err(StateError::new("a box with tilt has no reflecting walls"));
         }
         let domain =
-            PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| StateError::new(e.to_string()))?;
-        let mut state = State {
-            domain,
-            mass: vec![1.0; species],
-            x: Vec::new(),
-            v: data.velocities.clone().unwrap_or_else(|| vec![[0.0; 3]; data.atoms.len()]),
-            species: Vec::new(),
-            tag: Vec::new(),
-            image: Vec::new(),
-        };
+            psidpd_formats::domain(data.boxlo, data.boxhi, data.tilt, periodic).map_err(StateError::new)?;
+        let mut state = State::at_rest(domain, vec![1.0; species], Vec::new());
+        state.v = data.velocities.clone().unwrap_or_else(|| vec![[0.0; 3]; data.atoms.len()]);
         for (mass, given) in state.mass.iter_mut().zip(&data.masses) {
             *mass = *given;
         }
@@ -134,7 +117,7 @@ pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::IDEAL;
+    use crate::tests::support::IDEAL;
 
     /// LAMMPS's edges are (lx, 0, 0), (xy, ly, 0) and (xz, yz, lz).
     #[test]

@@ -13,4 +13,4 @@ pub use data_file::{StateError, write_data};
 pub use state::State;
 pub use tags::Tags;
 pub use tags::order_of_tags;
-pub use thermal::{maxwell, thermal_velocities};
+pub use thermal::maxwell;

@@ -36,7 +36,7 @@ impl Tags {
 mod tests {
     use super::Tags;
     use crate::run::{Integrator, Simulation};
-    use crate::test_support::{SOFT, scene};
+    use crate::tests::support::{SOFT, scene};
     use psidpd_core::engine::Want;
 
     /// A frozen floor below a fluid, and a reflecting lid.

@@ -1,18 +1,8 @@
 use chacha20::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Draws velocities of particles of masses `mass` from Maxwell's distribution, with zero total momentum. The
-/// velocities are not scaled: their temperature fluctuates as that of a canonical ensemble.
-pub fn thermal_velocities(
-    mass: impl Iterator<Item = f64>,
-    kt: f64,
-    dimensions: usize,
-    random: &mut ChaCha8Rng,
-) -> Vec<[f64; 3]> {
-    maxwell(mass, kt, dimensions, [true; 3], random)
-}
-
-/// As [`thermal_velocities`], with zero total momentum in the `conserved` directions only.
+/// Draws velocities of particles of masses `mass` from Maxwell's distribution, with zero total momentum in the `conserved`
+/// directions. The velocities are not scaled: their temperature fluctuates as that of a canonical ensemble.
 pub fn maxwell(
     mass: impl Iterator<Item = f64>,
     kt: f64,

@@ -1,7 +1,7 @@
 //! Advice about an integrator with larger steps than velocity Verlet.
 
-use super::simulation::Simulation;
-use crate::integrator::{Coupling, Integrator};
+use super::{Integrator, Simulation};
+use crate::integrator::Coupling;
 use crate::scene::Stage;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::configurational;
@@ -29,11 +29,9 @@ const WORTH: f64 = 0.01;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Advice {
     pub stage: String,
-    /// The time step Δt of the stage.
     pub dt: f64,
     /// The errors of the stage: of the configurational temperature, and of the carried pressure in ρkT.
     pub errors: [f64; 2],
-    /// The time step Δt of the better step.
     pub better_dt: f64,
     /// The errors of the better step, in the order of `errors`.
     pub better_errors: [f64; 2],
@@ -106,7 +104,6 @@ impl fmt::Display for Advice {
     }
 }
 
-/// Rounds a positive number to two digits.
 fn two_digits(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
@@ -114,14 +111,14 @@ fn two_digits(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::{self, SET6};
+    use crate::tests::support::{self, SET6};
     use psidpd_core::engine::Want;
 
     fn advice(stage: &str) -> Option<Advice> {
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nseed = 7\nbox = 4.0\ndensity = 6.05\n[[stage]]\nname = \"run\"\nsteps = 1\n{stage}"
         );
-        let scene = test_support::scene(SET6, &text).unwrap();
+        let scene = support::scene(SET6, &text).unwrap();
         let mut run = scene.simulation(scene.initial_state()).unwrap();
         run.prepare(0.005, Want::FORCES).unwrap();
         run.advance(400, 0.005, Integrator::VelocityVerlet).unwrap();

@@ -1,4 +1,4 @@
-use super::error::RunError;
+use super::RunError;
 use crate::checkpoint::{Checkpoint, Store};
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,6 @@ pub(super) struct Checkpoints {
     pub good: Checkpoint,
     /// The step of the checkpoint on disk.
     pub stored: Option<u64>,
-    /// The time of the last checkpoint.
     written: Instant,
     /// Wall time between checkpoints, if the scene gives no steps between them.
     pub interval: Duration,
@@ -22,7 +21,6 @@ impl Checkpoints {
         Checkpoints { store, good, stored, written: Instant::now(), interval: INTERVAL }
     }
 
-    /// Whether one is due by the clock.
     pub fn is_due(&self) -> bool {
         self.written.elapsed() >= self.interval
     }

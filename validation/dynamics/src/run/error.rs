@@ -1,6 +1,6 @@
+use super::StateError;
 use crate::checkpoint::{Caller, CheckpointError};
 use crate::device::DeviceError;
-use crate::particles::StateError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
 use psidpd_core::model::expression::TooLarge;

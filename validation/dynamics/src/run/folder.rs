@@ -1,10 +1,10 @@
-use super::error::RunError;
+use super::RunError;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// The folder of a run, locked against other runs. The lock ends with the process, even if that is killed.
 pub(super) struct Folder {
-    path: PathBuf,
+    pub path: PathBuf,
     _lock: File,
 }
 
@@ -18,9 +18,5 @@ impl Folder {
             // Some file systems have no locks; a run there has none.
             _ => Ok(Folder { path: path.to_owned(), _lock: lock }),
         }
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 }

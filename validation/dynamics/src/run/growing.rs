@@ -1,4 +1,4 @@
-use super::error::RunError;
+use super::RunError;
 use crate::checkpoint::Written;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 /// A file that grows during a run. It records what was written to it, buffered bytes included, so that a
 /// checkpoint can state which part belongs to the completed steps.
 pub(super) struct GrowingFile {
-    name: &'static str,
+    pub name: &'static str,
     path: PathBuf,
     out: BufWriter<File>,
-    written: Written,
+    pub written: Written,
 }
 
 impl GrowingFile {
@@ -33,21 +33,16 @@ impl GrowingFile {
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written })
     }
 
-    /// The file's name in the folder of the run.
-    pub fn name(&self) -> &'static str {
-        self.name
-    }
-
-    pub fn written(&self) -> Written {
-        self.written
-    }
-
     /// Calls `write`; an error names the file.
     pub fn attempt(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> Result<(), RunError> {
         write(self).map_err(|source| RunError::Output { path: self.path.clone(), source })
     }
 
-    /// Writes the buffer and syncs the file to the disk.
+    /// Writes a line and flushes it, so that other programs can follow the file.
+    pub fn line(&mut self, text: &str) -> Result<(), RunError> {
+        self.attempt(|file| writeln!(file, "{text}").and_then(|()| file.flush()))
+    }
+
     pub fn sync(&mut self) -> Result<(), RunError> {
         self.attempt(|file| {
             file.out.flush()?;

@@ -1,7 +1,6 @@
-use super::error::RunError;
-use super::simulation::Simulation;
+use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
-use psidpd_core::engine::{Settings, Want};
+use psidpd_core::engine::Want;
 use psidpd_formats::memory;
 use std::num::NonZeroUsize;
 
@@ -19,15 +18,10 @@ pub struct Live {
 }
 
 impl Live {
-    /// Prepares the first step of a scene.
     pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
         memory::check(particles, memory::PARTICLE)?;
-        let mut simulation = scene.simulation(scene.initial_state())?;
-        let precision = scene.precision();
-        simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;
-        simulation.set_reordering(true);
-        scene.put_on_device(&mut simulation)?;
+        let simulation = scene.simulation_of_run(scene.initial_state(), threads)?;
         let mut live = Live { scene, simulation, stage: 0, done: 0, begin: 0.0 };
         live.enter()?;
         Ok(live)
@@ -56,7 +50,6 @@ impl Live {
         self.begin + self.done as f64 * self.stage().dt
     }
 
-    /// The steps of the scene that are left.
     pub fn left(&self) -> u64 {
         let all: u64 = self.scene.stages.iter().map(|stage| stage.steps).sum();
         all.saturating_sub(self.simulation.step_number())
@@ -82,10 +75,7 @@ impl Live {
                 self.simulation.refresh(want)?;
             }
             if last {
-                self.simulation.fetch()?;
-            }
-            if last {
-                break;
+                return self.simulation.fetch();
             }
         }
         Ok(())

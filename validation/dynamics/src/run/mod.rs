@@ -7,9 +7,7 @@
 mod about;
 mod advice;
 mod bounds;
-mod by_tag;
 mod checkpoints;
-mod dump;
 mod error;
 mod folder;
 mod growing;
@@ -21,27 +19,23 @@ mod reorder;
 mod runner;
 mod scene;
 mod simulation;
-mod summary;
 mod thermo;
 mod timing;
 mod underway;
 mod view;
-mod walls;
 mod watch;
 
 pub use crate::checkpoint::{self, Means, Sums, Thermo};
 pub use crate::integrator::Integrator;
 pub use crate::particles::{BodyForce, State, StateError, Tags, write_data};
 pub use advice::Advice;
-pub use dump::write_frame;
 pub use error::RunError;
 pub use live::Live;
-pub use outcome::{Outcome, Progress};
+pub use outcome::{Outcome, Progress, Summary};
 pub use output::FILES;
 pub use reorder::INTERVAL as REORDERING;
 pub use runner::{Begin, Runner, Start, run_scene};
 pub use simulation::Simulation;
-pub use summary::Summary;
 pub use timing::{Iterations, Session, Timing};
 pub use watch::{Deviation, Thermometer, bytes_per_particle};
 

@@ -1,10 +1,9 @@
-//! Reports to the caller of a run: its progress, and its outcome.
+//! Reports to the caller of a run: its progress, its outcome and its summary.
 
-use super::advice::Advice;
-use super::summary::Summary;
-use super::timing::Timing;
-use super::watch::Deviation;
-use crate::checkpoint::Thermo;
+use super::{Advice, Deviation, Means, RunError, Thermo, Timing};
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
@@ -32,4 +31,47 @@ pub enum Outcome {
         step: u64,
         steps: u64,
     },
+}
+
+/// Summary of the results of a run, also written to `summary.json`. It does not depend on interruptions:
+/// times are in [`Timing`](super::Timing).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    pub title: String,
+    pub particles: usize,
+    pub steps: u64,
+    /// Number of evaluations of ψ at a density below and above its bounds.
+    pub out_of_bounds: [u64; 2],
+    pub last: Thermo,
+    /// Plain means over the thermo rows of the last stage, without error bars; `None` without rows.
+    pub means: Option<Means>,
+}
+
+impl Summary {
+    pub(super) fn write(&self, path: &Path) -> Result<(), RunError> {
+        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
+        let write = |text: String| {
+            let mut file = std::fs::File::create(path)?;
+            file.write_all((text + "\n").as_bytes())?;
+            file.sync_all()
+        };
+        text.and_then(write).map_err(RunError::output(path))
+    }
+}
+
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {} particles, {} steps", self.title, self.particles, self.steps)?;
+        let [below, above] = self.out_of_bounds;
+        if below + above > 0 {
+            let share = (below + above) as f64 / (self.particles as f64 * self.steps as f64);
+            write!(
+                f,
+                "\nout of bounds: psi was evaluated {below} times below and {above} times above the bounds of a density \
+                 ({:.2} % of particle-steps); it went on with a linear slope there",
+                100.0 * share
+            )?;
+        }
+        Ok(())
+    }
 }

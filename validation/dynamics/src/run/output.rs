@@ -1,12 +1,12 @@
 //! The files of a run in its folder, except checkpoints and `timing.json`.
 
-use super::dump::write_frame;
-use super::error::RunError;
 use super::growing::GrowingFile;
-use super::thermo::ThermoFile;
-use crate::checkpoint::{Checkpoint, Store, Thermo, Written};
+use super::thermo::HEADER;
+use super::{RunError, Thermo};
+use crate::checkpoint::{Checkpoint, Store, Written};
 use crate::scene::{Scene, every};
-use psidpd_formats::files::remove_if_there;
+use psidpd_formats::dump::write_dump;
+use psidpd_formats::files::{remove_all, remove_if_there};
 use psidpd_formats::{Frame, GsdFile, write_xyz};
 use psidpd_observe::{Observation, write_csv, write_json};
 use psidpd_pictures::{remove_snapshots, remove_vtk, write_snapshot, write_vtk};
@@ -15,14 +15,13 @@ use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
+const THERMO: &str = "thermo.csv";
 const DUMP: &str = "dump.lammpstrj";
-
 const XYZ: &str = "trajectory.xyz";
-
 const GSD: &str = "trajectory.gsd";
 
 /// Files of a run that a scene or a user may use as input.
-pub const FILES: [&str; 6] = [ThermoFile::NAME, DUMP, XYZ, GSD, "final.data", "last-good.data"];
+pub const FILES: [&str; 6] = [THERMO, DUMP, XYZ, GSD, "final.data", "last-good.data"];
 
 /// Files that are written when a run ends or stops.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
@@ -36,11 +35,10 @@ pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
 }
 
 const OBSERVABLES: &str = "observables.json";
-
 const TABLES: &str = "observables";
 
 pub(super) struct Output {
-    thermo: Option<ThermoFile>,
+    thermo: Option<GrowingFile>,
     dump: Option<GrowingFile>,
     xyz: Option<GrowingFile>,
     gsd: Option<(PathBuf, GsdFile)>,
@@ -49,50 +47,50 @@ pub(super) struct Output {
 impl Output {
     /// Creates empty files, and a description of the run.
     pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
-        remove(folder, &[ThermoFile::NAME, DUMP, XYZ, GSD])?;
+        remove_all(folder, &[THERMO, DUMP, XYZ, GSD])?;
         remove_tables(folder)?;
-        remove(folder, &LAST)?;
+        remove_all(folder, &LAST)?;
         remove_snapshots(folder)?;
         remove_vtk(folder)?;
         super::about::about(scene).write(folder)?;
-        let thermo = (scene.output.thermo > 0).then(|| ThermoFile::create(folder));
-        let dump = (scene.output.dump > 0).then(|| GrowingFile::create(folder, DUMP));
-        let xyz = (scene.output.xyz > 0).then(|| GrowingFile::create(folder, XYZ));
+        let create = |every: u64, name| (every > 0).then(|| GrowingFile::create(folder, name)).transpose();
+        let mut thermo = create(scene.output.thermo, THERMO)?;
+        thermo.iter_mut().try_for_each(|file| file.line(HEADER))?;
+        let (dump, xyz) = (create(scene.output.dump, DUMP)?, create(scene.output.xyz, XYZ)?);
         let steps: u64 = scene.stages.iter().map(|stage| stage.steps).sum();
-        let gsd = open_gsd(scene, folder, |path, every| GsdFile::create(path, 1 + steps / every));
-        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()?, gsd: gsd? })
+        let gsd = open_gsd(scene, folder, |path, every| GsdFile::create(path, 1 + steps / every))?;
+        Ok(Output { thermo, dump, xyz, gsd })
     }
 
     /// Opens the files of a resumed run and truncates them to what was written at its checkpoint.
     pub fn reopen(scene: &Scene, folder: &Path, checkpoint: &Checkpoint) -> Result<Output, RunError> {
         remove_tables(folder)?;
-        remove(folder, &LAST)?;
-        let written = |name: &str| checkpoint.files.get(name).copied();
-        let thermo = written(ThermoFile::NAME).map(|written| ThermoFile::reopen(folder, written));
-        let dump = written(DUMP).map(|written| GrowingFile::reopen(folder, DUMP, written));
-        let xyz = written(XYZ).map(|written| GrowingFile::reopen(folder, XYZ, written));
+        remove_all(folder, &LAST)?;
+        let reopen = |name| {
+            let written = checkpoint.files.get(name);
+            written.map(|written| GrowingFile::reopen(folder, name, *written)).transpose()
+        };
+        let (thermo, dump, xyz) = (reopen(THERMO)?, reopen(DUMP)?, reopen(XYZ)?);
         let Checkpoint { step, position, .. } = *checkpoint;
         // Frames begin with the initial state, once its forces are known.
         let begun = step > 0 || position.entered;
         let gsd = open_gsd(scene, folder, |path, every| {
             GsdFile::reopen(path, if begun { 1 + step / every } else { 0 })
-        });
-        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()?, gsd: gsd? })
+        })?;
+        Ok(Output { thermo, dump, xyz, gsd })
     }
 
     /// Writes a row of totals if one is due, and returns whether it was.
     pub fn row(&mut self, thermo: &Thermo) -> Result<bool, RunError> {
-        match &mut self.thermo {
-            None => Ok(false),
-            Some(file) => file.row(thermo).map(|()| true),
-        }
+        let Some(file) = &mut self.thermo else { return Ok(false) };
+        file.line(&thermo.line()).map(|()| true)
     }
 
     /// Writes the particles to the files that are due after a step.
     pub fn particles(&mut self, scene: &Scene, folder: &Path, frame: &Frame) -> Result<(), RunError> {
         let (step, intervals) = (frame.step, &scene.output);
         if let Some(file) = self.dump.as_mut().filter(|_| every(intervals.dump, step)) {
-            file.attempt(|file| write_frame(frame, file))?;
+            file.attempt(|file| write_dump(frame, file))?;
         }
         if let Some(file) = self.xyz.as_mut().filter(|_| every(intervals.xyz, step)) {
             file.attempt(|file| write_xyz(frame, file))?;
@@ -112,7 +110,7 @@ impl Output {
 
     /// The record of each file that grows at its end alone.
     pub fn written(&mut self) -> BTreeMap<String, Written> {
-        self.files().map(|file| (file.name().to_owned(), file.written())).collect()
+        self.files().map(|file| (file.name.to_owned(), file.written)).collect()
     }
 
     pub fn sync(&mut self) -> Result<(), RunError> {
@@ -123,7 +121,7 @@ impl Output {
     }
 
     fn files(&mut self) -> impl Iterator<Item = &mut GrowingFile> {
-        self.thermo.as_mut().map(ThermoFile::file).into_iter().chain(&mut self.dump).chain(&mut self.xyz)
+        [&mut self.thermo, &mut self.dump, &mut self.xyz].into_iter().flatten()
     }
 }
 
@@ -174,13 +172,4 @@ fn remove_tables(folder: &Path) -> Result<(), RunError> {
         }
         _ => Ok(()),
     }
-}
-
-/// Removes files of an earlier run, or of an earlier stop of this run.
-fn remove(folder: &Path, names: &[&str]) -> Result<(), RunError> {
-    for name in names {
-        let path = folder.join(name);
-        remove_if_there(&path).map_err(RunError::output(&path))?;
-    }
-    Ok(())
 }

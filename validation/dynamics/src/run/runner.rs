@@ -1,16 +1,10 @@
 use super::checkpoints::Checkpoints;
-use super::error::RunError;
 use super::folder::Folder;
-use super::outcome::{Outcome, Progress};
 use super::output::{Output, replaces};
-use super::simulation::Simulation;
-use super::summary::Summary;
-use super::timing::Timing;
 use super::underway::Run;
-use super::watch::bytes_per_particle;
+use super::{Outcome, Progress, RunError, Summary, Sums, Timing, bytes_per_particle};
 
-use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Written};
-use crate::particles::State;
+use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::memory;
@@ -38,7 +32,6 @@ pub enum Begin {
 #[derive(Debug)]
 pub enum Start {
     New,
-    /// The state of a checkpoint.
     Resumed {
         step: u64,
         /// The version of the program that wrote the checkpoint, if it differs from this program: later steps
@@ -49,15 +42,10 @@ pub enum Start {
         /// The fault of the newest checkpoint, if the run continues from the previous one.
         fallback: Option<CheckpointError>,
     },
-    /// The run has finished: no step is left.
     Finished,
 }
 
 /// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see [`Runner`].
-///
-/// # Errors
-/// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
-/// cannot be written.
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
     Runner::begin(scene, out, Begin::Overwrite)?.run_to_end(progress)
 }
@@ -78,12 +66,6 @@ pub struct Runner<'a> {
 
 impl<'a> Runner<'a> {
     /// Prepares a run in the folder `out`, which is created if it is missing.
-    ///
-    /// # Errors
-    /// [`RunError::Unfinished`] for [`Begin::New`] in the folder of an interrupted run;
-    /// [`RunError::Finished`] in that of a finished run; [`RunError::Checkpoint`] for [`Begin::Resume`] if
-    /// its checkpoints cannot be used; [`RunError::Busy`] if another run is writing there; an invalid model
-    /// or initial state; a folder that cannot be written.
     pub fn begin(scene: &'a Scene, out: &Path, begin: Begin) -> Result<Runner<'a>, RunError> {
         let folder = Folder::open(out)?;
         let store = Store::new(out);
@@ -104,7 +86,7 @@ impl<'a> Runner<'a> {
         let particles = scene.initial.parts().iter().map(|part| part.count).sum();
         memory::check(particles, bytes_per_particle(scene))?;
         let state = scene.initial_state();
-        let simulation = simulation(scene, state.clone())?;
+        let simulation = scene.simulation_of_run(state.clone(), NonZeroUsize::MIN)?;
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
@@ -132,7 +114,7 @@ impl<'a> Runner<'a> {
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
-        let mut simulation = simulation(scene, good.state.clone())?;
+        let mut simulation = scene.simulation_of_run(good.state.clone(), NonZeroUsize::MIN)?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
         }
@@ -148,14 +130,14 @@ impl<'a> Runner<'a> {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
             let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
             let start = Start::Resumed { step: good.step, program, instructions, fallback };
-            (start, Some(Output::reopen(scene, folder.path(), &good)?))
+            (start, Some(Output::reopen(scene, &folder.path, &good)?))
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
-        let timing = Timing::read(folder.path());
+        let timing = Timing::read(&folder.path);
         // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
-        if !folder.path().join("about.json").is_file() {
+        if !folder.path.join("about.json").is_file() {
             super::about::about(scene)
-                .write(folder.path())
+                .write(&folder.path)
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
         let stored = Some(good.step);
@@ -185,7 +167,6 @@ impl<'a> Runner<'a> {
         self.run.simulation.falsify(fault)
     }
 
-    /// Describes the evaluation of the forces for people; see [`Simulation::evaluation`].
     pub fn evaluation(&self) -> String {
         self.run.simulation.evaluation()
     }
@@ -195,9 +176,6 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop` is not 0.
-    ///
-    /// # Errors
-    /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] if a file cannot be written.
     pub fn run(
         &mut self,
         stop: &AtomicUsize,
@@ -216,7 +194,6 @@ impl<'a> Runner<'a> {
         run.go_on(stop, progress).map_err(|error| run.stop(error))
     }
 
-    /// Makes the remaining steps without interruption.
     pub fn run_to_end(&mut self, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
         loop {
             if let Outcome::Finished { summary, .. } = self.run(&AtomicUsize::new(0), progress)? {
@@ -224,15 +201,6 @@ impl<'a> Runner<'a> {
             }
         }
     }
-}
-
-/// The simulation of a scene in its precision, with reordering of particles.
-fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
-    let mut simulation = scene.simulation(state)?;
-    simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
-    simulation.set_reordering(true);
-    scene.put_on_device(&mut simulation)?;
-    Ok(simulation)
 }
 
 /// Checks that a run can continue from a checkpoint: it belongs to this scene, and the files hold the bytes that it records.
@@ -274,7 +242,6 @@ fn usable(
     Ok(())
 }
 
-/// Returns an error if a new run would replace another.
 fn refuse_other_runs(store: &Store, identity: &Identity, out: &Path) -> Result<(), RunError> {
     if !store.exists() {
         return Ok(());

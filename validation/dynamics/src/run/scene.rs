@@ -1,28 +1,35 @@
 //! Simulations of scenes.
 
-use super::error::RunError;
-use super::simulation::Simulation;
-use crate::particles::State;
+use super::{RunError, Simulation, State};
 use crate::scene::{Scene, Stage};
+use psidpd_core::engine::Settings;
+use std::num::NonZeroUsize;
 
 impl Scene {
     /// Creates a simulation from `state`, which belongs to this scene, at step 0, with the scene's seed and
-    /// frozen particles. The precision is double, as for every new simulation; see
-    /// [`Simulation::set_settings`].
+    /// frozen particles, in double precision.
     pub fn simulation(&self, state: State) -> Result<Simulation, RunError> {
         let mut simulation = Simulation::new(&self.model, self.kt, state, self.seed)?;
         simulation.set_frozen(&self.frozen);
         Ok(simulation)
     }
 
-    /// Puts a simulation of this scene on the scene's device.
-    pub(super) fn put_on_device(&self, simulation: &mut Simulation) -> Result<(), RunError> {
+    /// The simulation of a run: in the scene's precision and on its device, with reordering of particles.
+    pub(super) fn simulation_of_run(
+        &self,
+        state: State,
+        threads: NonZeroUsize,
+    ) -> Result<Simulation, RunError> {
+        let mut simulation = self.simulation(state)?;
+        let precision = self.precision();
+        simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;
+        simulation.set_reordering(true);
         let refused = match simulation.use_device(self.device) {
             Err(RunError::Device(error)) => Some(self.located(error, |_| None)),
             outcome => outcome.map(|()| self.refused_by_device())?,
         };
         match refused {
-            None => Ok(()),
+            None => Ok(simulation),
             Some((_, Some(located))) => Err(located.into()),
             Some((error, None)) => Err(error.into()),
         }

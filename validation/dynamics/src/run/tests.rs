@@ -1,6 +1,6 @@
 use super::*;
 use crate::scene::Scene;
-use crate::test_support::{self, IDEAL, IDEAL_MIXTURE, SET6};
+use crate::tests::support::{self, IDEAL, IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
@@ -40,7 +40,7 @@ fn scene_of(model: &str, lengths: &str, density: f64, rest: &str) -> Result<Scen
         "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n\
          [initial]\nkind = \"random\"\ndensity = {density}\n{rest}"
     );
-    test_support::scene(model, &text)
+    support::scene(model, &text)
 }
 
 const ONE_STAGE: &str =

@@ -1,9 +1,7 @@
-use super::error::RunError;
-use super::growing::GrowingFile;
-use super::simulation::Simulation;
-use crate::checkpoint::{Thermo, Written};
-use std::io::Write;
-use std::path::Path;
+use super::{Simulation, Thermo};
+
+/// The first line of `thermo.csv`.
+pub(super) const HEADER: &str = "step,time,temperature,potential,kinetic,pressure,pxx,pyy,pzz,pxy,pxz,pyz";
 
 impl Thermo {
     /// The totals of the last step, whose evaluation must have used
@@ -21,36 +19,11 @@ impl Thermo {
             conservative_pressure: simulation.scalar_pressure(simulation.conservative_pressure_tensor()),
         }
     }
-}
 
-pub(super) struct ThermoFile(GrowingFile);
-
-impl ThermoFile {
-    pub const NAME: &str = "thermo.csv";
-
-    pub fn create(folder: &Path) -> Result<ThermoFile, RunError> {
-        let mut this = ThermoFile(GrowingFile::create(folder, Self::NAME)?);
-        this.line("step,time,temperature,potential,kinetic,pressure,pxx,pyy,pzz,pxy,pxz,pyz")?;
-        Ok(this)
-    }
-
-    /// Opens the file of a resumed run and truncates it to the bytes that were `written` at the checkpoint.
-    pub fn reopen(folder: &Path, written: Written) -> Result<ThermoFile, RunError> {
-        GrowingFile::reopen(folder, Self::NAME, written).map(ThermoFile)
-    }
-
-    /// Writes a row and flushes it, so that other programs can follow the file.
-    pub fn row(&mut self, t: &Thermo) -> Result<(), RunError> {
-        let numbers = [t.time, t.temperature, t.potential, t.kinetic, t.pressure];
-        let columns: Vec<String> = numbers.iter().chain(&t.tensor).map(|x| format!("{x:?}")).collect();
-        self.line(&format!("{},{}", t.step, columns.join(",")))
-    }
-
-    pub fn file(&mut self) -> &mut GrowingFile {
-        &mut self.0
-    }
-
-    fn line(&mut self, text: &str) -> Result<(), RunError> {
-        self.0.attempt(|file| writeln!(file, "{text}").and_then(|()| file.flush()))
+    /// A line of `thermo.csv`.
+    pub(super) fn line(&self) -> String {
+        let numbers = [self.time, self.temperature, self.potential, self.kinetic, self.pressure];
+        let columns: Vec<String> = numbers.iter().chain(&self.tensor).map(|x| format!("{x:?}")).collect();
+        format!("{},{}", self.step, columns.join(","))
     }
 }

@@ -1,7 +1,8 @@
 //! Wall times of a run, in a file of their own because they differ from run to run.
 
-use super::error::RunError;
+use super::RunError;
 use psidpd_core::engine::thermostat::Effort;
+use psidpd_formats::files::replace_through;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -17,11 +18,9 @@ pub struct Timing {
 pub struct Session {
     /// The step after which the session began.
     pub from_step: u64,
-    /// The last step of the session.
     pub to_step: u64,
     /// Wall time of the session, output included, in seconds.
     pub wall_seconds: f64,
-    /// Particles times steps over the wall time.
     pub particle_steps_per_second: f64,
     /// The GPU that made the steps, with its driver; left out for the CPU.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -31,7 +30,6 @@ pub struct Session {
     pub thermostat: Option<Iterations>,
 }
 
-/// Iterations of the updates of an implicit thermostat.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iterations {
     pub mean: f64,
@@ -93,9 +91,7 @@ impl Timing {
 
     pub(super) fn write(&self, folder: &Path) -> Result<(), RunError> {
         let (path, new) = (folder.join(Self::NAME), folder.join("timing.json.new"));
-        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
-        text.and_then(|text| std::fs::write(&new, text + "\n"))
-            .and_then(|()| std::fs::rename(&new, &path))
-            .map_err(RunError::output(&path))
+        let text = serde_json::to_string_pretty(self).map_err(|e| RunError::output(&path)(e.into()))? + "\n";
+        Ok(replace_through(&new, &path, text.as_bytes())?)
     }
 }

@@ -1,16 +1,11 @@
-use super::advice::Advice;
-use super::by_tag::ByTag;
 use super::checkpoints::Checkpoints;
-use super::error::RunError;
 use super::folder::Folder;
-use super::outcome::{Outcome, Progress};
 use super::output::{Output, write_observations};
-use super::simulation::Simulation;
-use super::summary::Summary;
-use super::timing::{Clock, Timing};
+use super::timing::Clock;
+use super::view::ByTag;
 use super::watch::Watch;
-use crate::checkpoint::{CheckpointError, Position, Sums, Thermo};
-use crate::particles::write_data;
+use super::{Advice, Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, write_data};
+use crate::checkpoint::{CheckpointError, Position};
 use crate::scene::{Scene, Stage, every};
 use psidpd_core::engine::Want;
 use psidpd_observe::Observers;
@@ -200,7 +195,7 @@ impl<'a> Run<'a> {
                     Some(sorted) => sorted.frame(&self.simulation, self.present.position.time),
                     None => self.simulation.frame(self.present.position.time),
                 };
-                output.particles(self.scene, self.folder.path(), &frame)?;
+                output.particles(self.scene, &self.folder.path, &frame)?;
             }
         }
         // Totals alone do not bring the particles from a device.
@@ -248,7 +243,7 @@ impl<'a> Run<'a> {
         }
         self.checkpoints.write()?;
         let step = self.checkpoints.good.step;
-        self.timing_until(step).write(self.folder.path())
+        self.timing_until(step).write(&self.folder.path)
     }
 
     fn timing_until(&self, step: u64) -> Timing {
@@ -267,7 +262,7 @@ impl<'a> Run<'a> {
         }
         let checkpoint =
             self.checkpoints.stored == Some(self.checkpoints.good.step) || self.store_good().is_ok();
-        let saved = self.folder.path().join("last-good.data");
+        let saved = self.folder.path.join("last-good.data");
         match write_data(
             &saved,
             &self.data_title(self.checkpoints.good.step),
@@ -288,7 +283,7 @@ impl<'a> Run<'a> {
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
-        let path = self.folder.path().join("final.data");
+        let path = self.folder.path.join("final.data");
         write_data(
             &path,
             &self.data_title(self.steps),
@@ -296,9 +291,9 @@ impl<'a> Run<'a> {
             self.scene.model.species(),
         )?;
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
-        write_observations(self.folder.path(), &self.observers.finish())?;
+        write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
-        summary.write(&self.folder.path().join("summary.json"))?;
+        summary.write(&self.folder.path.join("summary.json"))?;
         // From here on the run is finished, even if a later write fails.
         self.checkpoints.good.finished = true;
         self.store_good()?;

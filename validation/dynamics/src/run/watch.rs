@@ -10,16 +10,14 @@
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
 use super::advice::MOST;
-use super::error::RunError;
-use super::simulation::Simulation;
+use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_formats::memory::PARTICLE;
-use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
 use psidpd_observe::statistics::MINIMUM_SAMPLES;
-use psidpd_observe::{Estimate, Measured, difference};
+use psidpd_observe::{Estimate, Measured, configurational, difference};
 use std::fmt;
 
 /// Largest and smallest number of steps between samples.
@@ -337,7 +335,7 @@ fn configurational(simulation: &Simulation) -> Option<Configurational> {
 mod tests {
     use super::*;
     use crate::run::{Begin, Outcome, Runner};
-    use crate::test_support::{SET6, SOFT, scene};
+    use crate::tests::support::{SET6, SOFT, scene};
     use rand::{SeedableRng, rngs::StdRng};
     use rand_distr::{Distribution, StandardNormal};
     use std::sync::atomic::AtomicUsize;

@@ -1,6 +1,6 @@
 //! `lattice` and `min_distance`: the arrangement of particles in a region.
 
-use psidpd_core::document::{FileError, Section};
+use super::{FileError, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrangement {

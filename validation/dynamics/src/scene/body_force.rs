@@ -1,20 +1,12 @@
 //! `[[body_force]]`: accelerations of some of the particles.
 
-use super::composition::unknown_species;
-use super::initial::Initial;
+use super::composition::species_of;
 use super::number::{axis, vector};
-use crate::particles::{BodyForce, Tags};
-use psidpd_core::document::{FileError, FileErrorKind, Section};
-use psidpd_core::model::Model;
+use super::{BodyForce, FileError, FileErrorKind, Initial, Model, Section, Tags};
 
 pub fn read(root: &Section, model: &Model, initial: &Initial) -> Result<Vec<BodyForce>, FileError> {
     let Some(value) = root.get("body_force") else { return Ok(Vec::new()) };
-    let mut forces = Vec::new();
-    for item in value.array()? {
-        let section = item.section()?;
-        forces.push(read_one(&section, model, initial)?);
-    }
-    Ok(forces)
+    value.array()?.iter().map(|item| read_one(&item.section()?, model, initial)).collect()
 }
 
 fn read_one(section: &Section, model: &Model, initial: &Initial) -> Result<BodyForce, FileError> {
@@ -35,16 +27,9 @@ fn read_one(section: &Section, model: &Model, initial: &Initial) -> Result<BodyF
 
 fn read_species(section: &Section, model: &Model) -> Result<Vec<i32>, FileError> {
     let Some(value) = section.get("species") else { return Ok(Vec::new()) };
-    let known = model.species();
     let items = value.array()?;
-    let species = items.iter().map(|item| {
-        let name = item.string()?.value;
-        match known.iter().position(|s| *s == name) {
-            Some(index) => Ok(index as i32),
-            None => Err(item.error(unknown_species(&name, known))),
-        }
-    });
-    let species: Vec<i32> = species.collect::<Result<_, _>>()?;
+    let species = items.iter().map(|item| Ok(species_of(&item.string()?, model.species())? as i32));
+    let species: Vec<i32> = species.collect::<Result<_, FileError>>()?;
     if species.is_empty() {
         return Err(value.error("names no species"));
     }

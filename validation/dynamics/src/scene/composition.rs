@@ -1,8 +1,9 @@
 //! `composition` and `species` of a filled region.
 
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use super::{FileError, FileErrorKind, Section};
+use psidpd_core::document::Located;
 
-/// Number fractions of the species; they add up to 1.
+/// Number fractions of the species, in the order of the model; they add up to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Composition(pub(super) Vec<f64>);
 
@@ -11,10 +12,7 @@ impl Composition {
     pub(super) fn read(initial: &Section, species: &[String]) -> Result<Composition, FileError> {
         let count = species.len();
         if let Some(value) = initial.get("species") {
-            let name = value.string()?.value;
-            let Some(index) = species.iter().position(|s| *s == name) else {
-                return Err(value.error(unknown_species(&name, species)));
-            };
+            let index = species_of(&value.string()?, species)?;
             if let Some(both) = initial.get("composition") {
                 return Err(both.error("species is given too: give one of them"));
             }
@@ -28,9 +26,7 @@ impl Composition {
         let section = value.section()?;
         let mut fractions = vec![0.0; count];
         for (name, value) in section.entries() {
-            let Some(index) = species.iter().position(|s| *s == name.value) else {
-                return Err(name.error(unknown_species(&name.value, species)));
-            };
+            let index = species_of(&name, species)?;
             let fraction = value.number()?.value;
             if !(0.0..=1.0).contains(&fraction) {
                 return Err(value.error(format!("must be from 0 to 1, is {fraction}")));
@@ -46,11 +42,6 @@ impl Composition {
 
     pub(super) fn equal(count: usize) -> Composition {
         Composition(vec![1.0 / count as f64; count])
-    }
-
-    /// The fractions, in the order of the model's species.
-    pub fn fractions(&self) -> &[f64] {
-        &self.0
     }
 
     /// Divides `count` particles among the species: whole numbers that add up to `count`, each less than one
@@ -77,9 +68,12 @@ impl Composition {
     }
 }
 
-/// The error for a name that is not a species of the model.
-pub fn unknown_species(name: &str, species: &[String]) -> FileErrorKind {
-    FileErrorKind::UnknownName { what: "species", name: name.to_owned(), known: species.join(", ") }
+/// The index of a species of the model.
+pub fn species_of(name: &Located<String>, species: &[String]) -> Result<usize, FileError> {
+    species.iter().position(|s| *s == name.value).ok_or_else(|| {
+        let (name_of, known) = (name.value.clone(), species.join(", "));
+        name.error(FileErrorKind::UnknownName { what: "species", name: name_of, known })
+    })
 }
 
 #[cfg(test)]

@@ -1,9 +1,7 @@
 //! The key `device`, and what devices refuse, at its place in the file.
 
-use super::{Scene, stage};
-use crate::device::{Device, DeviceError, refused_step};
-use psidpd_core::document::{Document, FileError, Section, Value};
-use psidpd_core::engine::Precision;
+use super::{Device, Document, FileError, Precision, Scene, Section, Value, stage};
+use crate::device::{DeviceError, refused_step};
 
 pub fn read(value: &Value) -> Result<Device, FileError> {
     let name = value.string()?.value;

@@ -1,7 +1,6 @@
 //! `[box]`, or `box = …`: the lengths and boundaries of the box.
 
-use psidpd_core::document::{FileError, Section, Value};
-use psidpd_core::engine::PeriodicBox;
+use super::{FileError, PeriodicBox, Section, Value};
 
 /// The names of boundaries, and whether they are periodic.
 pub const BOUNDARIES: [(&str, bool); 2] = [("periodic", true), ("reflecting", false)];
@@ -9,9 +8,7 @@ pub const BOUNDARIES: [(&str, bool); 2] = [("periodic", true), ("reflecting", fa
 /// Reads the box. In two dimensions particles lie at z = 0, in the middle of a third edge of length 1.
 pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError> {
     let value = root.require("box")?;
-    let Some(section) = value.as_section() else {
-        return build(&value, dimensions, [true; 3]);
-    };
+    let Some(section) = value.as_section() else { return build(&value, dimensions, [true; 3]) };
     let lengths = section.require("lengths")?;
     let periodic = read_boundary(&section, dimensions)?;
     build(&lengths, dimensions, periodic.unwrap_or([true; 3]))
@@ -25,8 +22,7 @@ pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[
     if let Some(lengths) = section.get("lengths") {
         return Err(lengths.error(message()));
     }
-    let periodic = read_boundary(&section, dimensions)?;
-    Ok(periodic)
+    read_boundary(&section, dimensions)
 }
 
 fn build(value: &Value, dimensions: usize, periodic: [bool; 3]) -> Result<PeriodicBox, FileError> {

@@ -1,11 +1,10 @@
 //! Replacement values for keys of a scene or model, as `--set KEY=VALUE` gives them.
 
 use super::keys::TABLES;
-use psidpd_core::document::{FileError, Source};
+use super::{Arc, FileError, Source};
 use psidpd_core::model::keys as model_keys;
 use std::collections::BTreeSet;
 use std::str::FromStr;
-use std::sync::Arc;
 use toml_edit::{DocumentMut, Item, TableLike, Value, value};
 
 /// A key and its new value.
@@ -92,10 +91,7 @@ pub fn edit_scene(
 }
 
 /// Applies edits to the text of a model. A key without a path may be a parameter; the prefix `model.` is
-/// allowed, as in a scene.
-///
-/// # Errors
-/// The errors of `edit_scene`, and a parameter that the model does not have, which would change nothing.
+/// allowed, as in a scene. A parameter that the model does not have would change nothing and is refused.
 pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
     let mut document = parse(text);
     for edit in edits {
@@ -172,39 +168,26 @@ fn set(document: &mut DocumentMut, edit: &Edit) -> Result<(), FileError> {
 fn set_at(document: &mut DocumentMut, path: &[String], edit: &Edit) -> Result<(), FileError> {
     let (last, tables) = path.split_last().unwrap_or((&path[0], &[]));
     let mut table: &mut dyn TableLike = document.as_table_mut();
-    let mut parts = tables.iter().peekable();
+    let mut parts = tables.iter();
     while let Some(part) = parts.next() {
-        if !table.contains_key(part) {
-            table.insert(part, Item::Table(toml_edit::Table::new()));
-        }
-        let item = table.get_mut(part).unwrap_or_else(|| unreachable!("the table was made"));
-        if item.is_array_of_tables() {
-            let array = item.as_array_of_tables_mut().unwrap_or_else(|| unreachable!("it is one"));
-            let names: Vec<String> = array
-                .iter()
-                .map(|t| t.get("name").and_then(Item::as_str).unwrap_or_default().to_owned())
-                .collect();
-            let which = parts.next().map_or("", String::as_str);
-            let by_number = which.parse::<usize>().ok().filter(|k| (1..=names.len()).contains(k));
-            let Some(k) = names.iter().position(|n| n == which && !n.is_empty()).or(by_number.map(|k| k - 1))
-            else {
-                let named: Vec<String> = names
-                    .iter()
-                    .enumerate()
-                    .map(
-                        |(k, n)| {
-                            if n.is_empty() { format!("{part}.{}", k + 1) } else { format!("{part}.{n}") }
-                        },
-                    )
-                    .collect();
-                return Err(edit.error(format!("there are several [[{part}]]: {}", named.join(", "))));
-            };
-            table = array.get_mut(k).unwrap_or_else(|| unreachable!("it is one of them"));
-        } else if item.as_table_like().is_none() {
-            return Err(edit.error(format!("{part} is no table")));
-        } else {
-            table = item.as_table_like_mut().unwrap_or_else(|| unreachable!("it is a table"));
-        }
+        table = match table.entry(part).or_insert(Item::Table(toml_edit::Table::new())) {
+            Item::ArrayOfTables(array) => {
+                let name = |t: &toml_edit::Table| t.get("name").and_then(Item::as_str).map(str::to_owned);
+                let names: Vec<String> = array.iter().map(|t| name(t).unwrap_or_default()).collect();
+                let which = parts.next().map_or("", String::as_str);
+                let by_name = names.iter().position(|n| n == which && !n.is_empty());
+                let by_number = || which.parse::<usize>().ok()?.checked_sub(1);
+                array.get_mut(by_name.or_else(by_number).unwrap_or(names.len())).ok_or_else(|| {
+                    let named = names.iter().enumerate().map(|(k, n)| match n.as_str() {
+                        "" => format!("{part}.{}", k + 1),
+                        name => format!("{part}.{name}"),
+                    });
+                    let named = named.collect::<Vec<_>>().join(", ");
+                    edit.error(format!("there are several [[{part}]]: {named}"))
+                })?
+            }
+            other => other.as_table_like_mut().ok_or_else(|| edit.error(format!("{part} is no table")))?,
+        };
     }
     table.insert(last, edit.item());
     Ok(())

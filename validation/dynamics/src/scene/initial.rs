@@ -1,15 +1,10 @@
 //! The start of a scene: `[initial]`, `[[part]]`, or the density at the top level.
 
-use super::arrangement::{Arrangement, Lattice};
-use super::domain;
-use super::part::{Common, Part, WHOLE};
-use super::saved;
-use super::velocities::Velocities;
-use crate::particles::{State, Tags};
-use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::model::Model;
-use std::path::{Path, PathBuf};
+use super::part::{Common, WHOLE};
+use super::{
+    Arrangement, FileError, Lattice, Model, Part, Path, PathBuf, PeriodicBox, Section, State, Tags, Value,
+    Velocities, domain, saved,
+};
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
@@ -115,12 +110,7 @@ fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Resu
         "random" | "lattice" => common.shapes.whole(),
         "slab" | "sphere" => common.shapes.read(kind, key, section)?,
         "cylinder" if common.shapes.dimensions == 3 => common.shapes.read(kind, key, section)?,
-        _ => {
-            let known: Vec<&str> =
-                KINDS.iter().copied().filter(|k| common.shapes.dimensions == 3 || *k != "cylinder").collect();
-            let known = known.join(", ");
-            return Err(key.error(FileErrorKind::UnknownName { what: "kind", name: kind.to_owned(), known }));
-        }
+        _ => return Err(key.error(common.shapes.unknown("kind", kind, KINDS))),
     };
     let mut part = common.fill(section, WHOLE.to_owned(), shape)?;
     if kind == "lattice" && section.get("lattice").is_none() {

@@ -1,8 +1,7 @@
 //! `[masses]`: the mass of each species.
 
-use super::Initial;
-use super::composition::unknown_species;
-use psidpd_core::document::{FileError, Section};
+use super::composition::species_of;
+use super::{FileError, Initial, Section};
 
 /// Reads the masses; by default those of the data file, or 1.
 pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec<f64>, FileError> {
@@ -11,13 +10,8 @@ pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec
         Initial::File { state, .. } => state.mass.clone(),
     };
     let Some(value) = root.get("masses") else { return Ok(mass) };
-    let section = value.section()?;
-    for (name, value) in section.entries() {
-        let Some(index) = species.iter().position(|s| *s == name.value) else {
-            let kind = unknown_species(&name.value, species);
-            return Err(name.error(kind));
-        };
-        mass[index] = value.positive()?;
+    for (name, value) in value.section()?.entries() {
+        mass[species_of(&name, species)?] = value.positive()?;
     }
     Ok(mass)
 }

@@ -81,17 +81,16 @@ pub struct Scene {
 impl Scene {
     /// Reads a scene file and the model file it names.
     pub fn open(path: &Path) -> Result<Scene, FileError> {
-        let base = path.parent().unwrap_or(Path::new(""));
-        Scene::read(&Document::open(path)?, base, &[])
+        Scene::open_with(path, &[])
     }
 
     /// Reads a scene file and the model file it names, after edits of their keys.
     pub fn open_with(path: &Path, edits: &[Edit]) -> Result<Scene, FileError> {
-        if edits.is_empty() {
-            return Scene::open(path);
-        }
         let base = path.parent().unwrap_or(Path::new(""));
         let document = Document::open(path)?;
+        if edits.is_empty() {
+            return Scene::read(&document, base, &[]);
+        }
         let model = document.root().get("model").and_then(|v| Document::open(&base.join(v.as_str()?)).ok());
         let parameters = |name: &str| {
             let known = model.as_ref().and_then(|m| m.root().get("parameters")?.as_section()?.get(name));

@@ -1,6 +1,6 @@
 //! Vectors and names of directions.
 
-use psidpd_core::document::{FileError, Value};
+use super::{FileError, Value};
 
 /// Reads one number for each dimension; in two dimensions the third is 0.
 pub fn vector(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {

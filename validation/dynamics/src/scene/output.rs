@@ -1,20 +1,15 @@
 //! `[output]`: the files that a run writes.
 
-use psidpd_core::document::{FileError, Section};
+use super::{FileError, Section};
 
+/// Steps between rows, frames and pictures; 0 writes none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
-    /// Steps between rows of `thermo.csv`; 0 writes none.
     pub thermo: u64,
-    /// Steps between frames of `dump.lammpstrj`; 0 writes none.
     pub dump: u64,
-    /// Steps between frames of `trajectory.xyz`; 0 writes none.
     pub xyz: u64,
-    /// Steps between frames of `trajectory.gsd`; 0 writes none.
     pub gsd: u64,
-    /// Steps between frames in `vtk/`; 0 writes none.
     pub vtk: u64,
-    /// Steps between pictures in `snapshots/`; 0 writes none.
     pub snapshot: u64,
     /// Steps between checkpoints; 0 writes one at the end of a run only, even of a run that stops early. By
     /// default one is written every ten minutes.

@@ -1,13 +1,8 @@
 //! `[[part]]`: regions filled with particles, such as drops, columns, supports and walls.
 
-use super::arrangement::Arrangement;
-use super::composition::Composition;
 use super::number::vector;
-use super::shape::{Shape, Shapes};
-use super::velocities::Velocities;
-use psidpd_core::document::{FileError, Section, Value};
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::model::Model;
+use super::shape::Shapes;
+use super::{Arrangement, Composition, FileError, Model, PeriodicBox, Section, Shape, Value, Velocities};
 
 const MOST_PARTICLES: f64 = 1e8;
 

@@ -3,7 +3,7 @@
 //! Each level is a stage of its own, because ψ may depend on kT: forces are computed again at its start, and a
 //! LAMMPS input has a `run` for it.
 
-use psidpd_core::document::{FileError, Section};
+use super::{FileError, Section};
 
 const DEFAULT_LEVELS: u64 = 20;
 const MOST_LEVELS: u64 = 1000;

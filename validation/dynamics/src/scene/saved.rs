@@ -1,14 +1,9 @@
 //! Starts from files of another run.
 
-use super::velocities::Velocities;
+use super::{FileError, Model, Path, PathBuf, PeriodicBox, Section, State, Tags, Velocities};
 use crate::checkpoint;
-use crate::particles::{State, Tags};
 use nalgebra::{Matrix3, Vector3};
-use psidpd_core::document::{FileError, Section};
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::model::Model;
 use psidpd_formats::data::DataFile;
-use std::path::{Path, PathBuf};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -18,7 +13,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format of a kind of `[initial]`.
     pub fn of(kind: &str) -> Option<Format> {
         match kind {
             "data" => Some(Format::Data),
@@ -65,7 +59,6 @@ pub struct Saved {
     pub frozen: Tags,
 }
 
-/// Reads the keys of a start from a file, and the file.
 pub fn read(
     section: &Section,
     format: Format,

@@ -1,8 +1,7 @@
 //! `[[stage]]`, or `steps` at the top level: the stages of a run.
 
-use super::ramp;
+use super::{FileError, Section, Value, ramp};
 use crate::integrator::{Integrator, Settings, THERMOSTAT_STEPS};
-use psidpd_core::document::{FileError, Section, Value};
 use psidpd_core::engine::noise::Law;
 
 /// A part of a run at constant settings.

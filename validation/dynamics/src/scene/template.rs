@@ -1,6 +1,6 @@
 //! Templates for `psidpd new`: a commented scene file and its model.
 
-use std::path::{Path, PathBuf};
+use super::{Path, PathBuf};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Template {
@@ -45,11 +45,7 @@ pub enum TemplateError {
 
 impl Template {
     /// Writes the scene to `path`, with `.toml` if the path has no extension, and its model beside it, unless
-    /// the same model is there. Returns the paths of the scene and of the model.
-    ///
-    /// # Errors
-    /// One of the files exists with other contents, or cannot be written; see [`TemplateError`]. Nothing is
-    /// overwritten.
+    /// the same model is there. Nothing is overwritten. Returns the paths of the scene and of the model.
     pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], TemplateError> {
         let scene = match path.extension() {
             Some(extension) if extension == "toml" => path.to_owned(),

@@ -60,7 +60,7 @@ fn reads_the_schema() {
     let scene = parse(SCENE).unwrap();
     let [part] = scene.initial.parts() else { panic!("one part") };
     assert_eq!(part.count, 630);
-    assert_eq!(part.composition.fractions(), [0.25, 0.75]);
+    assert_eq!(part.composition.0, [0.25, 0.75]);
     assert_eq!(scene.output, Output { thermo: 100, dump: 7, ..Output::default() });
     assert_eq!(scene.mass, [1.0, 1.0]);
     let [one, two] = scene.stages.as_slice() else { panic!("two stages") };

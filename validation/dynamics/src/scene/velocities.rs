@@ -1,8 +1,8 @@
 //! `velocities` of a filled region or of a start from a file.
 
-use crate::particles::thermal_velocities;
+use super::{FileError, Section};
+use crate::particles::maxwell;
 use chacha20::ChaCha8Rng;
-use psidpd_core::document::{FileError, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {
@@ -13,22 +13,19 @@ pub enum Velocities {
 }
 
 impl Velocities {
-    pub(super) fn read(initial: &Section) -> Result<Velocities, FileError> {
-        let names = [("thermal", Velocities::Thermal), ("zero", Velocities::Zero)];
-        match initial.get("velocities") {
-            Some(value) => Ok(value.one_of("velocities", &names)?.value),
-            None => Ok(Velocities::default()),
-        }
+    const NAMES: [(&str, Option<Velocities>); 3] =
+        [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
+
+    /// Reads the velocities of a filled region.
+    pub(super) fn read(section: &Section) -> Result<Velocities, FileError> {
+        let Some(value) = section.get("velocities") else { return Ok(Velocities::default()) };
+        Ok(value.one_of("velocities", &Self::NAMES[..2])?.value.unwrap_or_default())
     }
 
     /// Reads the velocities of a start from a file: `None` keeps those of the file, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
-        let names =
-            [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
-        match initial.get("velocities") {
-            Some(value) => Ok(value.one_of("velocities", &names)?.value),
-            None => Ok((!keep).then(Velocities::default)),
-        }
+        let Some(value) = initial.get("velocities") else { return Ok((!keep).then(Velocities::default)) };
+        Ok(value.one_of("velocities", &Self::NAMES)?.value)
     }
 
     /// Draws velocities of particles of the masses `mass`.
@@ -40,7 +37,7 @@ impl Velocities {
         random: &mut ChaCha8Rng,
     ) -> Vec<[f64; 3]> {
         match self {
-            Velocities::Thermal => thermal_velocities(mass, kt, dimensions, random),
+            Velocities::Thermal => maxwell(mass, kt, dimensions, [true; 3], random),
             Velocities::Zero => mass.map(|_| [0.0; 3]).collect(),
         }
     }

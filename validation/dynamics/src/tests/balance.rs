@@ -5,7 +5,7 @@
 use super::find;
 use crate::run::{Integrator, Simulation};
 use crate::scene::Scene;
-use crate::test_support::SET6;
+use crate::tests::support::SET6;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::frame::Frame;

@@ -2,7 +2,7 @@
 
 use crate::particles::State;
 use crate::run::Simulation;
-use crate::test_support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
+use crate::tests::support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::Evaluator;
@@ -30,7 +30,7 @@ impl Shown {
             "title = \"t\"\nmodel = \"m.toml\"\nkT = {kt:?}\nseed = 1\nbox = {lengths:?}\ndensity = 1.0\ndt = 0.01\nsteps = 10\n\
              [observe]\n{observe}\n"
         );
-        let scene = test_support::scene(model, &text).unwrap();
+        let scene = support::scene(model, &text).unwrap();
         let domain = scene.initial_state().domain;
         let state = State::at_rest(domain, vec![1.0; scene.model.species().len()], x.to_vec());
         let simulation = Simulation::new(&scene.model, kt, state, 1).unwrap();
@@ -209,7 +209,7 @@ fn the_density_of_a_slab_is_that_of_its_middle() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 5\nbox = [6.0, 6.0, 14.0]\ndt = 0.01\nequilibrate = 500\n\
                 steps = 20000\n[initial]\nkind = \"slab\"\nthickness = 8.0\ndensity = 6.05\n[observe]\nevery = 10\n\
                 interface_width = true\ndensity_profile = true\n";
-    let (_, all) = super::run(&test_support::scene(SET6, text).unwrap());
+    let (_, all) = super::run(&support::scene(SET6, text).unwrap());
     let out = super::find(&all, "interface_width");
     let liquid = out.scalar("liquid").unwrap();
     let profile = super::find(&all, "density_profile");

@@ -2,7 +2,7 @@
 
 use super::{find, run, scene};
 use crate::run::Simulation;
-use crate::test_support::{IDEAL_MIXTURE, SET6};
+use crate::tests::support::{IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;

@@ -2,17 +2,18 @@
 
 use crate::run::Simulation;
 use crate::scene::Scene;
-use crate::test_support::{self, IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::keys::COMMON;
 use psidpd_observe::request::tables;
 use psidpd_observe::*;
+use support::{IDEAL_MIXTURE, SET6};
 
 mod balance;
 mod known;
 mod meters;
+pub mod support;
 
 /// Two species with a density, for tests of keys.
 const MIXTURE: &str = r#"
@@ -40,7 +41,7 @@ pub(super) fn scene(
          [[stage]]\nname = \"settle\"\nsteps = 100\ndt = 0.01\n\
          [[stage]]\nname = \"run\"\nsteps = {steps}\ndt = 0.01\n{observe}"
     );
-    test_support::scene(model, &text)
+    support::scene(model, &text)
 }
 
 fn observers(scene: &Scene) -> Observers {
@@ -164,7 +165,7 @@ fn a_slab_of_liquid() {
     let text = |s: &str| {
         s.replace("\"lattice\"", "\"slab\"\nthickness = 5.0").replace("density = 5.9", "density = 6.0")
     };
-    let scene = test_support::scene(
+    let scene = support::scene(
         SET6,
         &text(&format!(
             "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [4.0, 4.0, 11.0]\n\
@@ -322,7 +323,7 @@ fn a_drop_of_liquid() {
          [initial]\nkind = \"random\"\ncount = 700\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
          [[stage]]\nname = \"run\"\nsteps = 4800\ndt = 0.01\n\
          [observe]\ndrop = true\nclusters = true\nlocal_density = true\nmsd = true\n";
-    let scene = test_support::scene(SET6, text).unwrap();
+    let scene = support::scene(SET6, text).unwrap();
     let mut state = scene.initial_state();
     // The drop lies in a corner of the box, so it crosses all faces.
     let side = (700.0f64 / 6.05).cbrt();

@@ -21,7 +21,6 @@ use std::path::{Component, Path, PathBuf};
 pub const SCRIPT: &str = "in.lammps";
 pub const START: &str = "start.data";
 pub const MODEL: &str = "model.toml";
-/// The name of the model for stages without a thermostat.
 pub const MODEL_WITHOUT_THERMOSTAT: &str = "model-without-thermostat.toml";
 
 pub const FILES: [&str; 4] = [SCRIPT, START, MODEL, MODEL_WITHOUT_THERMOSTAT];
@@ -215,7 +214,6 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, LammpsE
     Ok(true)
 }
 
-/// Writes a state as the initial state of a deck; fails if the file cannot be written.
 fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), LammpsError> {
     let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
@@ -297,7 +295,7 @@ fn write_script(scene: &Scene, script: Script, s: &mut String) -> std::fmt::Resu
             if before.is_some() {
                 writeln!(s, "unfix         move")?;
             }
-            writeln!(s, "fix           move {} {}", physics.mobile(), motion(&stage.integrator))?;
+            writeln!(s, "fix           move {} {}", physics.mobile, motion(&stage.integrator))?;
         }
         match (before.is_some_and(|b| b.body_forces), stage.body_forces) {
             (false, true) => physics.write_body_forces(s)?,

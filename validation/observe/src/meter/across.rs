@@ -1,11 +1,8 @@
 //! The direction of profiles, with its bins.
 
+use super::{Deserialize, FileError, Options, PeriodicBox, Serialize};
 use crate::frame::View;
-use crate::options::Options;
 use crate::profile::centre;
-use psidpd_core::document::FileError;
-use psidpd_core::engine::PeriodicBox;
-use serde::{Deserialize, Serialize};
 
 /// The point that is moved to the middle of the profile in each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,12 +1,5 @@
-use super::Meter;
 use super::linked::{DISTANCE, Distance, Linked};
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use super::*;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Clusters {

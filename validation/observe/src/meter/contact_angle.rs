@@ -1,16 +1,11 @@
-use super::Meter;
 use super::drop::circular_centre;
 use super::linked::{DISTANCE, Distance, Linked};
 use super::pendant::median_density;
-use crate::frame::Frame;
-use crate::keys::{Key, Need, PLAIN, Table, ValueKind, keys};
+use super::*;
+use crate::keys::Key;
 use crate::least_squares::least_squares;
-use crate::observation::{Kind, Observation};
-use crate::options::{FACES, Options};
-use crate::series::{Measured, Series};
+use crate::options::FACES;
 use nalgebra::{Matrix3, Vector3};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// The number of rows of density fields that are kept for error bars.
@@ -21,7 +16,6 @@ const FEWEST: usize = 4;
 /// A wall: its direction, and whether it is at the upper end.
 type Face = (usize, bool);
 
-/// The density around the vertical through a drop on a wall, and the circle that fits its contour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ContactAngle {
     wall: Face,

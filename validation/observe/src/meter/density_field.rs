@@ -1,16 +1,8 @@
-use super::Meter;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// The number of rows of fields that are kept for error bars.
 const ROWS: usize = 64;
 
-/// The mean density on a plane, averaged over the direction normal to it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DensityField {
     axes: [usize; 2],

@@ -1,7 +1,8 @@
 //! Histograms of the distances of particles.
 
+use super::PeriodicBox;
+use psidpd_core::engine::Pool;
 use psidpd_core::engine::vectors::{self, Loop};
-use psidpd_core::engine::{PeriodicBox, Pool};
 use std::ops::Range;
 
 /// Rows of particles per range. Narrower rows give fewer pairs beyond the range.

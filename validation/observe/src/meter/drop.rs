@@ -1,16 +1,8 @@
-use super::Meter;
 use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
+use super::*;
 use crate::flux::Carrier;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
 use crate::profile::flank_interface;
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use psidpd_core::engine::PeriodicBox;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// The numbers in a shell: particles, then normal and tangential pressures of momenta and of forces.
@@ -126,7 +118,6 @@ impl Drop {
         sum / volume
     }
 
-    /// Warnings about the drop.
     fn doubts(&self, no_drop: bool) -> String {
         let mut doubts = Vec::new();
         let percolated = self.size.mean(3).value;

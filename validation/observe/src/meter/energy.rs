@@ -1,11 +1,4 @@
-use super::Meter;
-use crate::frame::Frame;
-use crate::keys::{PLAIN, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use super::*;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Energy {

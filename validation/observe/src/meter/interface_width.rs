@@ -1,15 +1,7 @@
-use super::Meter;
 use super::across::Across;
-use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, PLAIN, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
+use super::*;
 use crate::profile::{DensityProfile, interface, slab_edges};
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
 
-/// The densities of a slab and of its vapour, and the width of the interfaces.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {
     across: Across,

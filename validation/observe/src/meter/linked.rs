@@ -1,12 +1,9 @@
 //! Clusters of particles that are closer than a distance, and the choice of that distance.
 
 use super::rdf::shell_volume;
-use crate::keys::{Key, Need, ValueKind, key};
-use crate::options::Options;
-use psidpd_core::document::FileError;
-use psidpd_core::engine::PeriodicBox;
+use super::{Deserialize, FileError, Need, Options, PeriodicBox, Serialize, ValueKind};
+use crate::keys::{Key, key};
 use psidpd_core::engine::pair_sums::for_each_pair;
-use serde::{Deserialize, Serialize};
 
 /// Sets that are joined pair by pair (union-find). Each member has the vector to its parent.
 struct Union {
@@ -102,7 +99,6 @@ impl Linked {
         self.labels[particle] == Some(cluster)
     }
 
-    /// Returns true if a cluster meets its own image.
     pub fn percolates(&self, cluster: usize) -> bool {
         self.percolates[cluster]
     }
@@ -146,12 +142,10 @@ impl Distance {
         Distance { given: Some(value), chosen: None, longest: value }
     }
 
-    /// The distance; `None` before the first sample.
     pub fn value(&self) -> Option<f64> {
         self.given.or(self.chosen)
     }
 
-    /// Forgets the choice.
     pub fn forget(&mut self) {
         self.chosen = None;
     }

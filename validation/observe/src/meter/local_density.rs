@@ -1,17 +1,9 @@
-use super::Meter;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
+use super::*;
 use psidpd_core::model::kernel::Kernel;
-use serde::{Deserialize, Serialize};
 
 /// The number of shells in the integral `[w g]` over the pair distribution.
 const SHELLS: usize = 200;
 
-/// The distribution of the local density, and the integrals of the kernel over g(r).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalDensity {
     name: String,

@@ -26,12 +26,14 @@ mod temperature;
 mod viscosity;
 mod waves;
 
+// Every observable uses these.
 use super::frame::Frame;
-use super::keys::Table;
-use super::observation::Observation;
+use super::keys::{AXIS, BINS, Need, PLAIN, Table, ValueKind, keys};
+use super::observation::{Kind, Observation};
 use super::options::Options;
+use super::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::engine::Want;
+use psidpd_core::engine::{PeriodicBox, Want};
 use serde::{Deserialize, Serialize};
 
 /// A measurement during a run. It is written to checkpoints, so it must not hold NaN or infinity.
@@ -48,7 +50,6 @@ pub trait Meter: Sized {
     /// True if the observable needs motion in time, which Monte Carlo does not have.
     const OF_MOTION: bool = false;
 
-    /// Reads the settings of the observable.
     fn read(options: &Options) -> Result<Self, FileError>;
 
     /// The quantities that the forces of a sampled step must provide.

@@ -1,19 +1,12 @@
-use super::Meter;
 use super::drop::circular_centre;
 use super::linked::{DISTANCE, Distance, Linked};
-use crate::frame::Frame;
-use crate::keys::{AXIS, Key, Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::{Measured, Series};
+use super::*;
+use crate::keys::Key;
 use crate::young_laplace::fit;
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
 
 /// The number of rows of density fields that are kept for error bars.
 const ROWS: usize = 64;
 
-/// The density isosurface of an axisymmetric drop, and its Bond number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pendant {
     axis: usize,

@@ -1,14 +1,6 @@
-use super::Meter;
 use super::across::Across;
-use crate::frame::Frame;
-use crate::keys::{BINS, Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use super::*;
 
-/// The viscosity from two opposite Poiseuille flows in a periodic box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Poiseuille {
     across: Across,

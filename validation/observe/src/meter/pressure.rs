@@ -1,12 +1,4 @@
-use super::Meter;
-use crate::frame::Frame;
-use crate::keys::{PLAIN, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
-use psidpd_core::engine::Want;
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// The names of the components of a pressure tensor.
 const NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];

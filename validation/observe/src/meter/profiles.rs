@@ -1,14 +1,8 @@
 //! Profiles of densities, composition, temperature and velocity along an axis.
 
-use super::Meter;
 use super::across::Across;
-use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, PLAIN, RECENTRE, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use super::*;
+use crate::keys::RECENTRE;
 use std::marker::PhantomData;
 
 const KEYS: &[crate::keys::Key] = &[AXIS, BINS, RECENTRE];

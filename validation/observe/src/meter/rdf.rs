@@ -1,13 +1,6 @@
-use super::Meter;
 use super::distances::{Shells, count};
 use super::species_pairs::SpeciesPairs;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use super::*;
 use std::f64::consts::PI;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! Indices of pairs of species.
 
-use serde::{Deserialize, Serialize};
+use super::{Deserialize, Serialize};
 
 /// All pairs have index 0; the pairs of two given species follow. With one species there is only index 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -9,7 +9,6 @@ pub struct SpeciesPairs {
 }
 
 impl SpeciesPairs {
-    /// The `species` are names.
     pub fn new(species: &[String]) -> SpeciesPairs {
         SpeciesPairs { species: species.to_vec() }
     }

@@ -1,18 +1,11 @@
-use super::Meter;
 use super::across::Across;
+use super::*;
 use crate::flux::Carrier;
-use crate::frame::Frame;
-use crate::keys::{AXIS, BINS, PLAIN, RECENTRE, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
+use crate::keys::RECENTRE;
 
 /// The numbers in a bin: normal and tangential pressure of momenta, then of forces.
 const WIDTH: usize = 4;
 
-/// The pressure tensor of Irving and Kirkwood along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StressProfile {
     across: Across,

@@ -1,14 +1,6 @@
-use super::Meter;
 use super::species_pairs::SpeciesPairs;
 use super::waves::waves;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
-use psidpd_core::engine::PeriodicBox;
-use serde::{Deserialize, Serialize};
+use super::*;
 use std::f64::consts::TAU;
 
 /// The largest number of candidate wave vectors.

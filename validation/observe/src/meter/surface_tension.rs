@@ -1,16 +1,7 @@
-use super::Meter;
 use super::across::Across;
-use crate::frame::Frame;
-use crate::keys::{AXIS, Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
+use super::*;
 use nalgebra::Matrix3;
-use psidpd_core::document::FileError;
-use psidpd_core::engine::{PeriodicBox, Want};
-use serde::{Deserialize, Serialize};
 
-/// The surface tension of interfaces normal to an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceTension {
     across: Across,

@@ -1,12 +1,5 @@
-use super::Meter;
+use super::*;
 use crate::configurational;
-use crate::frame::Frame;
-use crate::keys::{PLAIN, Table};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::Series;
-use psidpd_core::document::FileError;
-use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Temperature {

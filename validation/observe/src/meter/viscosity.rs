@@ -1,19 +1,10 @@
-use super::Meter;
 use super::msd::Clock;
-use crate::frame::Frame;
-use crate::keys::{Need, PLAIN, Table, ValueKind, keys};
-use crate::observation::{Kind, Observation};
-use crate::options::Options;
-use crate::series::{Measured, Series};
-use psidpd_core::document::FileError;
-use psidpd_core::engine::Want;
-use serde::{Deserialize, Serialize};
+use super::*;
 use std::collections::VecDeque;
 
 /// The number of rows of correlation functions that are kept for error bars.
 const ROWS: usize = 128;
 
-/// The shear viscosity from the fluctuations of the stress.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Viscosity {
     dimensions: usize,

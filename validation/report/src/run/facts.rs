@@ -1,6 +1,5 @@
 use super::state::State;
-use psidpd_formats::About;
-use serde_json::Value;
+use super::{About, Value};
 
 /// Names and values at the top of the page.
 ///

@@ -1,14 +1,12 @@
 //! The main results of a run, with warnings about them.
 
-use super::super::quantity::with_error;
-use super::super::{Item, Section, Table};
+use super::super::Table;
 use super::series::{self, last_stage};
-use psidpd_formats::{About, Expected};
-use psidpd_observe::Observation;
+use super::{About, Item, Observation, Path, Section, Value, read_json_if_there, with_error};
+use psidpd_formats::Expected;
 use psidpd_observe::drift::drift;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::Serialize;
-use std::path::Path;
 
 /// With fewer independent rows the error bars themselves are uncertain by a fifth.
 const FEW: f64 = 12.0;
@@ -36,7 +34,6 @@ pub struct HeadlineValue {
     pub unit: String,
     /// The file or observable that the value comes from.
     pub source: String,
-    /// The mean-field prediction, if there is one.
     pub mean_field: Option<f64>,
     /// The published value for this fluid at this kT, and its error.
     pub published: Option<[f64; 2]>,
@@ -46,8 +43,8 @@ pub struct HeadlineValue {
 pub fn headline(folder: &Path) -> Headline {
     let about = About::read(folder).ok().flatten();
     let table = series::Table::read(&folder.join("thermo.csv")).ok().flatten();
-    let observables = super::observables::read(&folder.join("observables.json")).ok().flatten();
-    let summary = super::json(&folder.join("summary.json")).ok().flatten();
+    let observables = read_json_if_there::<Vec<Observation>>(&folder.join("observables.json")).ok().flatten();
+    let summary = read_json_if_there::<Value>(&folder.join("summary.json")).ok().flatten();
     let particles = summary.and_then(|s| s.get("particles")?.as_f64());
     gather(about.as_ref(), particles, table.as_ref(), observables.as_deref().unwrap_or_default())
 }

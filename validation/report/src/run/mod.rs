@@ -10,8 +10,10 @@ mod series;
 mod state;
 
 use super::{Item, Report, ReportError, Section};
-use psidpd_formats::files::write_atomically;
+use crate::quantity::with_error;
+use psidpd_formats::files::{read_json_if_there, write_atomically};
 use psidpd_formats::{About, FormatError};
+use psidpd_observe::Observation;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -34,11 +36,8 @@ const FILES: [(&str, &str); 12] = [
     ("snapshots", "pictures of the particles along the run"),
 ];
 
-/// Makes `report.html` from the files in the folder of a run, and returns its path.
-///
-/// # Errors
-/// The function fails if the folder has none of the files, and if the page cannot be written. A file with invalid content is
-/// not an error: the page says what is wrong with it.
+/// Makes `report.html` from the files in the folder of a run, and returns its path. A file with invalid content is not an
+/// error: the page says what is wrong with it.
 pub fn write_run_report(folder: &Path) -> Result<PathBuf, ReportError> {
     let page = run_report(folder)?.render();
     let path = folder.join("report.html");
@@ -53,10 +52,11 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
     }
     let mut notes = Vec::new();
     let about = keep(About::read(folder), &mut notes).flatten();
-    let summary = keep(json(&folder.join("summary.json")), &mut notes).flatten();
-    let timing = keep(json(&folder.join("timing.json")), &mut notes).flatten();
+    let summary = keep(read_json_if_there::<Value>(&folder.join("summary.json")), &mut notes).flatten();
+    let timing = keep(read_json_if_there::<Value>(&folder.join("timing.json")), &mut notes).flatten();
     let table = keep(series::Table::read(&folder.join("thermo.csv")), &mut notes).flatten();
-    let observables = keep(observables::read(&folder.join("observables.json")), &mut notes).flatten();
+    let observables =
+        keep(read_json_if_there::<Vec<Observation>>(&folder.join("observables.json")), &mut notes).flatten();
     let state = state::State::find(folder, about.as_ref(), &mut notes);
 
     let title = about
@@ -97,20 +97,6 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
 /// A value; an error is added to the notes instead.
 fn keep<T>(result: Result<T, FormatError>, notes: &mut Vec<String>) -> Option<T> {
     result.map_err(|e| notes.push(e.to_string())).ok()
-}
-
-/// The text of a file; `None` if the file does not exist.
-fn text(path: &Path) -> Result<Option<String>, FormatError> {
-    match std::fs::read_to_string(path) {
-        Ok(text) => Ok(Some(text)),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(FormatError::read(path)(e)),
-    }
-}
-
-fn json(path: &Path) -> Result<Option<Value>, FormatError> {
-    let parse = |text: String| serde_json::from_str(&text);
-    text(path)?.map(parse).transpose().map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
 }
 
 fn files_section(folder: &Path) -> Section {

@@ -1,19 +1,11 @@
 //! The content of `observables.json`: each observable as a number with its error, or as a plot.
 
 use super::super::figure::field_of_values;
-use super::super::quantity::with_error;
 use super::super::text::typeset;
-use super::super::{Item, Plot, Section, Series, Style, Table};
-use psidpd_formats::FormatError;
+use super::super::{Plot, Series, Style, Table};
+use super::{Item, Observation, Section, with_error};
+use psidpd_observe::Kind;
 use psidpd_observe::observation::Column;
-use psidpd_observe::{Kind, Observation};
-use std::path::Path;
-
-/// Reads the list; `None` if the file does not exist.
-pub fn read(path: &Path) -> Result<Option<Vec<Observation>>, FormatError> {
-    let Some(text) = super::text(path)? else { return Ok(None) };
-    serde_json::from_str(&text).map(Some).map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
-}
 
 /// A curve with more points is a line with a band; one with fewer is points with bars.
 const SINGLE_POINTS: usize = 40;

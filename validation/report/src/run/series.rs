@@ -1,11 +1,11 @@
 //! Totals against time, and their means.
 
-use super::super::quantity::with_error;
 use super::super::text::typeset;
-use super::super::{Item, Plot, Section, Series, Style};
-use psidpd_formats::{About, FormatError, THERMO};
+use super::super::{Plot, Series, Style};
+use super::{About, FormatError, Item, Path, Section, with_error};
+use psidpd_formats::THERMO;
+use psidpd_formats::files::read_if_there;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
-use std::path::Path;
 
 /// The numbers of `thermo.csv`.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +19,7 @@ impl Table {
     /// Reads a file of comma-separated numbers with one line of names; `None` if the file does not exist. An incomplete last
     /// line, which a killed run may leave, is ignored.
     pub fn read(path: &Path) -> Result<Option<Table>, FormatError> {
-        let Some(text) = super::text(path)? else { return Ok(None) };
+        let Some(text) = read_if_there(path)? else { return Ok(None) };
         let mut lines = text.lines().filter(|l| !l.trim().is_empty());
         let header: Vec<String> =
             lines.next().unwrap_or("").split(',').map(|w| w.trim().to_owned()).collect();
@@ -139,7 +139,6 @@ impl<'a> Curves<'a> {
         )
     }
 
-    /// Means over the last stage.
     fn means(&self, particles: Option<usize>) -> super::super::Table {
         let mut out =
             super::super::Table::new(["quantity", "mean ± error", "independent rows", "unit", "what it is"]);

@@ -2,17 +2,12 @@
 
 use super::super::figure::Figure;
 use super::super::text::escape;
-use super::super::{Item, Section};
+use super::{About, Item, Path, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_formats::memory;
-use psidpd_formats::{About, Configuration, Which};
-use psidpd_pictures::{FieldOptions, ParticleOptions, View};
-use psidpd_pictures::{animate, animation_url};
-use std::path::Path;
+use psidpd_formats::{Configuration, Which, memory};
+use psidpd_pictures::{FieldOptions, ParticleOptions, View, animate, data_url};
 
-/// The last state in a folder.
 pub struct State {
-    /// The name of the file with the state.
     pub file: &'static str,
     pub configuration: Configuration,
 }
@@ -62,7 +57,7 @@ pub fn section(folder: &Path, state: Option<&State>, about: Option<&About>) -> S
             svg: format!(
                 "<img class=\"movie\" alt=\"{}\" src=\"{}\"/>",
                 escape("The particles along the run, repeated"),
-                animation_url(&png)
+                data_url(&png)
             ),
             caption: "The run, from the pictures in snapshots/.".into(),
         }),

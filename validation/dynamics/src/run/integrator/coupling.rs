@@ -19,7 +19,6 @@ impl Coupling {
         }
     }
 
-    /// Acts on velocities, if it is its turn.
     pub(super) fn act(self, system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
         self.heat(system, dt).map_or(Ok(()), |heat| system.heat(heat, want, dt))
     }

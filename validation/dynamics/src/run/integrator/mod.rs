@@ -17,9 +17,8 @@ mod shardlow;
 mod two_stage;
 mod velocity_verlet;
 
-use super::error::RunError;
-use super::simulation::Simulation;
-use crate::integrator::{Coupling, Integrator};
+use super::{Integrator, RunError, Simulation};
+use crate::integrator::Coupling;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::noise::Law;
 

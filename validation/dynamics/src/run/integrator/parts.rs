@@ -263,14 +263,14 @@ fn settle(
     kept: &mut [&mut [[f64; 3]]; 2],
     faults: &mut Faults,
 ) {
-    let walls = &around.bounds.walls;
+    let bounds = around.bounds;
     for (k, ((x, v), image)) in x.iter_mut().zip(v).zip(image).enumerate() {
         if is_too_fast(v, around.limit) {
             faults.fast.get_or_insert(first + from + k);
             continue;
         }
-        if walls.any() {
-            walls.reflect(x, |c| {
+        if bounds.has_walls() {
+            bounds.reflect(x, |c| {
                 v[c] = -v[c];
                 for kept in &mut *kept {
                     if let Some(kept) = kept.get_mut(from + k) {
@@ -278,7 +278,7 @@ fn settle(
                     }
                 }
             });
-            if walls.has_escaped(x) {
+            if bounds.has_escaped(x) {
                 faults.escaped.get_or_insert(first + from + k);
                 continue;
             }

@@ -9,32 +9,16 @@ use psidpd_core::engine::Pool;
 pub(super) struct External {
     frozen_tags: Tags,
     /// Whether each particle is frozen; empty if none is.
-    frozen: Vec<bool>,
+    pub frozen: Vec<bool>,
     /// Sum of the forces on the frozen particles in the last evaluation.
-    support_force: [f64; 3],
-    body_forces: Vec<BodyForce>,
+    pub support_force: [f64; 3],
+    pub body_forces: Vec<BodyForce>,
 }
 
 impl External {
     pub fn none() -> External {
         let frozen_tags = Tags::none();
         External { frozen_tags, frozen: Vec::new(), support_force: [0.0; 3], body_forces: Vec::new() }
-    }
-
-    /// Whether each particle is frozen; empty if none is.
-    pub fn frozen(&self) -> &[bool] {
-        &self.frozen
-    }
-
-    #[cfg(feature = "gpu")]
-    pub fn body_forces(&self) -> &[BodyForce] {
-        &self.body_forces
-    }
-
-    /// Sets the force on the frozen particles, if another processor has computed it.
-    #[cfg(feature = "gpu")]
-    pub fn set_support_force(&mut self, force: [f64; 3]) {
-        self.support_force = force;
     }
 
     /// Finds the frozen particles by their tags, because reordering moves them, and sets their velocities to zero.
@@ -76,9 +60,8 @@ impl External {
 }
 
 impl Simulation {
-    /// Adds body forces, and sets the forces on frozen particles to zero.
     pub(super) fn add_external_forces(&mut self) {
-        self.external.add_forces(&mut self.particles, self.forces.pool());
+        self.external.add_forces(&mut self.particles, self.forces.engine.pool());
     }
 
     /// Freezes exactly the particles of these tags: they stay at rest and act on the others. Temperature and
@@ -88,7 +71,6 @@ impl Simulation {
         self.external.find_frozen(&mut self.particles);
     }
 
-    /// Whether each particle is frozen; empty if none is.
     pub fn frozen(&self) -> &[bool] {
         &self.external.frozen
     }

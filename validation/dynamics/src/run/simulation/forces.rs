@@ -4,27 +4,26 @@ use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Fault, PassCounts, PeriodicBox, Plan, Pool, Precision, Request, Settings, Step,
-    Surroundings, Tally, Want,
+    self, Engine, Fault, PassCounts, PeriodicBox, Plan, Precision, Request, Settings, Step, Surroundings,
+    Tally, Want,
 };
 use psidpd_core::model::Model;
 
 #[derive(Debug)]
 pub(super) struct Forces {
     model: Model,
-    kt: f64,
-    engine: Engine,
-    tally: Tally,
+    pub kt: f64,
+    pub engine: Engine,
+    pub tally: Tally,
     /// The number of the positions of the last evaluation, [`Particles::moves`].
     moves: u64,
     all_densities: bool,
     pair_sums_only: bool,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
-    earlier_out_of_bounds: [u64; 2],
+    pub earlier_out_of_bounds: [u64; 2],
 }
 
 impl Forces {
-    /// Creates the forces; fails if the model is invalid at `kt`.
     pub fn new(model: &Model, kt: f64) -> Result<Forces, RunError> {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         Ok(Forces {
@@ -56,7 +55,7 @@ impl Forces {
             }
             self.check_width(&state.domain)?;
         }
-        let step = step.filter(|_| self.plan().needs_velocities());
+        let step = step.filter(|_| self.engine.plan().needs_velocities());
         let want = Want { densities: want.densities || self.all_densities, ..want };
         let particles =
             engine::Particles { owned: state.len(), x: &state.x, tag: &state.tag, kind: &state.species };
@@ -66,22 +65,11 @@ impl Forces {
         Ok(())
     }
 
-    /// Sets the totals of the present step, if another processor has computed them.
-    #[cfg(feature = "gpu")]
-    pub fn set_tally(&mut self, tally: Tally) {
-        self.tally = tally;
-    }
-
-    /// Sets the totals of the last evaluation to infinity.
-    pub fn set_infinite(&mut self) {
-        self.tally = Tally { excess: f64::INFINITY, virial: [f64::INFINITY; 6], ..Tally::default() };
-    }
-
     /// Refuses boxes so narrow that a particle has two images of one neighbour within the range of the noise.
     pub fn check_width(&self, domain: &PeriodicBox) -> Result<(), RunError> {
-        let Some(range) = self.plan().noise_range() else { return Ok(()) };
+        let Some(range) = self.engine.plan().noise_range() else { return Ok(()) };
         let periodic = domain.periodic();
-        let heights = (0..self.plan().dimensions()).filter(|k| periodic[*k]).map(|k| domain.height(k));
+        let heights = (0..self.engine.plan().dimensions()).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
         // Heights are computed from an inverse matrix; the limit leaves room for its rounding.
         if height < 2.0 * range * (1.0 - 1e-12) {
@@ -96,11 +84,6 @@ impl Forces {
         (0..6).for_each(|c| self.tally.thermostat_virial[c] += virial[c]);
     }
 
-    /// Asks the next evaluation to list the pairs of a thermostat for a time `dt`.
-    pub fn ask_for_pairs(&mut self, pairs: &mut PairThermostat, dt: f64, virial: bool) {
-        pairs.ask(&mut self.engine, dt, virial);
-    }
-
     /// Gives a thermostat the pairs that the last evaluation has listed, if it was at the positions of `particles`.
     pub fn give_pairs(&mut self, pairs: &mut PairThermostat, particles: &Particles) {
         if self.moves == particles.moves() {
@@ -108,32 +91,6 @@ impl Forces {
         }
     }
 
-    pub fn plan(&self) -> &Plan {
-        self.engine.plan()
-    }
-
-    pub fn settings(&self) -> Settings {
-        self.engine.settings()
-    }
-
-    pub fn pool(&self) -> &Pool {
-        self.engine.pool()
-    }
-
-    pub fn kt(&self) -> f64 {
-        self.kt
-    }
-
-    /// The order of the particles in the last sweep; `None` before a sweep.
-    pub fn order(&self) -> Option<&[u32]> {
-        self.engine.results().order
-    }
-
-    pub fn count_out_of_bounds_from(&mut self, earlier: [u64; 2]) {
-        self.earlier_out_of_bounds = earlier;
-    }
-
-    /// Changes the temperature; fails if the model is invalid at `kt`.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         let (settings, pool) = (self.engine.settings(), self.engine.pool().clone());
         self.replace(Engine::with_pool(&self.model.at(kt)?, settings, pool)?);
@@ -173,10 +130,9 @@ impl Simulation {
     }
 
     pub fn settings(&self) -> Settings {
-        self.forces.settings()
+        self.forces.engine.settings()
     }
 
-    /// The engine, for its diagnostics.
     pub fn engine(&self) -> &Engine {
         &self.forces.engine
     }
@@ -200,11 +156,11 @@ impl Simulation {
     }
 
     pub fn plan(&self) -> &Plan {
-        self.forces.plan()
+        self.forces.engine.plan()
     }
 
     pub fn dimensions(&self) -> usize {
-        self.forces.plan().dimensions()
+        self.forces.engine.plan().dimensions()
     }
 
     /// Number of evaluations of ψ at a density below and above its bounds.

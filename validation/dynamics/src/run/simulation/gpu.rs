@@ -77,7 +77,6 @@ fn rule(integrator: Integrator) -> Result<Rule, RunError> {
 }
 
 impl Simulation {
-    /// Makes later steps on a GPU.
     pub(super) fn use_gpu(&mut self, number: usize) -> Result<(), RunError> {
         let device = gpu::Device::open(Some(number)).map_err(failed)?;
         let conditions = self.conditions();
@@ -98,19 +97,17 @@ impl Simulation {
         Ok(())
     }
 
-    /// The machine, for its diagnostics.
     pub fn gpu(&mut self) -> Option<&mut GpuSimulation> {
         self.gpu.as_mut().map(|gpu| &mut gpu.machine)
     }
 
-    /// The GPU in words; `None` on the CPU.
     pub fn gpu_name(&self) -> Option<String> {
         self.gpu.as_ref().map(|gpu| gpu.device.info().to_string())
     }
 
     fn conditions(&self) -> Conditions {
-        let (kt, thermostat) = (self.kt(), self.thermostat.is_on());
-        Conditions { kt, thermostat, body_forces: self.external.body_forces().to_vec() }
+        let (kt, thermostat) = (self.kt(), self.thermostat.on);
+        Conditions { kt, thermostat, body_forces: self.external.body_forces.clone() }
     }
 
     fn gpu_settings(&self, conditions: &Conditions) -> Result<gpu::Settings, RunError> {
@@ -154,7 +151,7 @@ impl Simulation {
         let state = particles.now();
         let bodies = &gpu.conditions.body_forces;
         let mark = |k: usize| {
-            let frozen = if external.frozen().get(k) == Some(&true) { gpu::FROZEN } else { 0 };
+            let frozen = if external.frozen.get(k) == Some(&true) { gpu::FROZEN } else { 0 };
             let acts = bodies.iter().enumerate().filter(|(_, b)| b.acts_on(state.species[k], state.tag[k]));
             acts.fold(frozen, |mark, (index, _)| mark | gpu::body_force_mark(index))
         };
@@ -182,7 +179,7 @@ impl Simulation {
         let rule = rule(integrator)?;
         self.make_collected(false)?;
         self.supply_gpu()?;
-        self.thermostat.set_in_forces(integrator.properties().drag_in_forces);
+        self.thermostat.in_forces = Some(integrator.properties().drag_in_forces);
         let totals = want.energy || want.virial;
         let Some(gpu) = &mut self.gpu else { return Ok(()) };
         gpu.fetched = false;
@@ -224,7 +221,7 @@ impl Simulation {
         let gpu = self.gpu.take();
         let number = self.number;
         let made = self.begin_step(dt, integrator, Want::FORCES).and_then(|()| self.end_step());
-        self.motion.forget_kick();
+        self.motion.deferred = None;
         self.number = number;
         self.gpu = gpu;
         made
@@ -246,9 +243,9 @@ impl Simulation {
         let Some(gpu) = &mut self.gpu else { return Ok(()) };
         let gpu::Totals { excess, pair, virial, thermostat_virial, momentum_flux, support_force, .. } =
             gpu.machine.totals().map_err(failed)?;
-        self.forces.set_tally(Tally { excess, pair, virial, thermostat_virial });
+        self.forces.tally = Tally { excess, pair, virial, thermostat_virial };
         self.particles.set_momentum_flux(momentum_flux);
-        self.external.set_support_force(support_force);
+        self.external.support_force = support_force;
         Ok(())
     }
 

@@ -19,10 +19,7 @@ mod thermostat;
 
 pub(super) use thermostat::Heat;
 
-use super::error::RunError;
-use super::reorder;
-use crate::integrator::Integrator;
-use crate::particles::State;
+use super::{Integrator, RunError, State, reorder};
 use external::External;
 use forces::Forces;
 use monte_carlo::MonteCarlo;
@@ -90,7 +87,7 @@ impl Simulation {
         if kt != self.kt() {
             self.forces.set_temperature(kt)?;
             self.thermostat.follow(&self.forces);
-            self.monte_carlo.forget_energy();
+            self.monte_carlo.energy = None;
         }
         Ok(())
     }
@@ -111,11 +108,11 @@ impl Simulation {
         forces: &[[f64; 3]],
         out_of_bounds: [u64; 2],
     ) {
-        self.particles.replace(state, forces);
+        self.particles.replace_with(|present| present.copy_particles(state), forces);
         self.external.find_frozen(&mut self.particles);
-        self.forces.count_out_of_bounds_from(out_of_bounds);
-        self.thermostat.forget_forces();
-        self.motion.forget_kick();
+        self.forces.earlier_out_of_bounds = out_of_bounds;
+        self.thermostat.in_forces = None;
+        self.motion.deferred = None;
         self.number = number;
         self.stale = false;
         #[cfg(feature = "gpu")]
@@ -131,7 +128,7 @@ impl Simulation {
     /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
     pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
-        self.thermostat.begin_step();
+        self.thermostat.impulse_virial = [0.0; 6];
         self.stale = false;
         #[cfg(feature = "gpu")]
         if self.gpu.is_some() {
@@ -183,12 +180,12 @@ impl Simulation {
             return self.step_on_gpu(dt, integrator, want);
         }
         self.number += 1;
-        self.thermostat.begin_step();
-        self.monte_carlo.begin_step(!integrator.has_time());
+        self.thermostat.impulse_virial = [0.0; 6];
+        self.monte_carlo.at_work = !integrator.has_time();
         self.open_record(dt);
         integrator.step(self, dt, want)?;
         self.close_record(integrator);
-        self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
+        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
         self.stale = !integrator.properties().forces_at_end;
         // The order of trials must not depend on positions.
         if reorder::is_due(self.number) && integrator.has_time() {
@@ -198,10 +195,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing.
-    ///
-    /// # Errors
-    /// A velocity is not finite. On a GPU also the errors of steps before.
+    /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing. On a GPU it returns the errors of
+    /// steps before too.
     pub(super) fn end_step(&mut self) -> Result<(), RunError> {
         #[cfg(feature = "gpu")]
         self.make_collected(false)?;
@@ -214,19 +209,19 @@ impl Simulation {
         if !self.stale {
             return Ok(());
         }
-        match self.monte_carlo.is_at_work() {
+        match self.monte_carlo.at_work {
             true => self.forces_or_infinite(want)?,
             false => self.conservative_forces(want)?,
         }
         self.stale = false;
-        self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
+        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
         Ok(())
     }
 
     /// Sorts all particle arrays into the order of the last sweep, if there was one.
     fn reorder(&mut self) {
-        let Some(order) = self.forces.order() else { return };
-        if self.particles.reorder(self.forces.pool(), order) {
+        let Some(order) = self.forces.engine.results().order else { return };
+        if self.particles.reorder(self.forces.engine.pool(), order) {
             self.external.find_frozen(&mut self.particles);
         }
     }

@@ -4,7 +4,7 @@ use super::super::integrator::parts::has_stopped_counting;
 use super::{RunError, Simulation};
 use crate::particles::maxwell;
 use chacha20::ChaCha8Rng;
-use psidpd_core::engine::{self, EngineError, LocalEnergy, Want};
+use psidpd_core::engine::{self, EngineError, LocalEnergy, Tally, Want};
 use rand::{RngExt, SeedableRng};
 
 /// The acceptance that tuning of the move length aims at.
@@ -16,28 +16,14 @@ const RENEWED: u64 = 100;
 #[derive(Debug, Clone, Default)]
 pub(super) struct MonteCarlo {
     /// The energy at the present temperature.
-    energy: Option<Box<LocalEnergy>>,
+    pub energy: Option<Box<LocalEnergy>>,
     /// The largest displacement along a direction, as tuned so far.
     found: Option<f64>,
     settling: bool,
     /// Whether the present step makes trial moves.
-    at_work: bool,
+    pub at_work: bool,
     /// Numbers of trials and of accepted trials in the last step.
     trials: [u64; 2],
-}
-
-impl MonteCarlo {
-    pub fn is_at_work(&self) -> bool {
-        self.at_work
-    }
-
-    pub fn begin_step(&mut self, at_work: bool) {
-        self.at_work = at_work;
-    }
-
-    pub fn forget_energy(&mut self) {
-        self.energy = None;
-    }
 }
 
 impl Simulation {
@@ -51,7 +37,6 @@ impl Simulation {
         self.monte_carlo.found
     }
 
-    /// Sets the largest displacement, for a resumed run.
     pub fn set_max_move(&mut self, found: Option<f64>) {
         self.monte_carlo.found = found;
     }
@@ -62,7 +47,6 @@ impl Simulation {
         accepted as f64 / trials.max(1) as f64
     }
 
-    /// The random generator of the present step.
     pub(in crate::run) fn random_of_step(&self) -> ChaCha8Rng {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.seed.to_le_bytes());
@@ -90,10 +74,10 @@ impl Simulation {
         let most = max_move.or(self.monte_carlo.found).unwrap_or(start).min(longest);
         let (number, kt) = (self.number, self.kt());
         let failed = |source| RunError::Engine { step: number, source };
-        let walls = self.motion.walls();
+        let bounds = self.motion.bounds;
         let Simulation { particles, external, monte_carlo, .. } = self;
         let (state, _) = particles.motion(true);
-        let frozen = external.frozen();
+        let frozen = &external.frozen;
         let mut trials = [0; 2];
         for sweep in 0..sweeps {
             if sweep % RENEWED == 0 {
@@ -110,7 +94,7 @@ impl Simulation {
                 to[..dimensions].iter_mut().for_each(|x| *x += most * (2.0 * random.random::<f64>() - 1.0));
                 let threshold: f64 = random.random();
                 trials[0] += 1;
-                if walls.any() && walls.has_escaped(&to) {
+                if bounds.has_walls() && bounds.has_escaped(&to) {
                     continue;
                 }
                 let change = energy.change(k, to, state.tag[k]).map_err(failed)?;
@@ -143,7 +127,7 @@ impl Simulation {
         let conserved = self.frozen().is_empty();
         let conserved = self.domain().periodic().map(|periodic| conserved && periodic);
         let Simulation { particles, external, .. } = self;
-        let frozen = external.frozen();
+        let frozen = &external.frozen;
         let state = particles.now();
         let moves = |k: &usize| frozen.get(*k) != Some(&true);
         let mass = (0..state.len()).filter(moves).map(|k| state.mass[state.species[k] as usize]);
@@ -160,7 +144,8 @@ impl Simulation {
         use EngineError::{ExcessFreeEnergy, Force};
         match self.conservative_forces(want) {
             Err(RunError::Engine { source: Force { .. } | ExcessFreeEnergy { .. }, .. }) => {
-                self.forces.set_infinite();
+                self.forces.tally =
+                    Tally { excess: f64::INFINITY, virial: [f64::INFINITY; 6], ..Tally::default() };
                 Ok(())
             }
             other => other,

@@ -5,34 +5,21 @@
 
 use super::super::bounds::Bounds;
 use super::super::integrator::parts::{Faults, Kept, Moving, Surroundings, drift, kick, share};
-use super::super::walls::Walls;
 use super::{RunError, Simulation};
 use psidpd_core::engine::{PeriodicBox, Pool};
 
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
-    bounds: Bounds,
+    pub bounds: Bounds,
     /// Data that Groot and Warren's step keeps during the evaluation of the forces.
     kept: Kept,
     /// The duration of a deferred kick at the end of the present step.
-    deferred: Option<f64>,
+    pub deferred: Option<f64>,
 }
 
 impl Motion {
     pub fn within(domain: &PeriodicBox, dimensions: usize) -> Motion {
         Motion { bounds: Bounds::of(domain, dimensions), kept: Kept::default(), deferred: None }
-    }
-
-    pub fn walls(&self) -> Walls {
-        self.bounds.walls
-    }
-
-    pub fn is_at_end_of_step(&self) -> bool {
-        self.deferred.is_none()
-    }
-
-    pub fn forget_kick(&mut self) {
-        self.deferred = None;
     }
 }
 
@@ -184,7 +171,7 @@ impl Simulation {
             mass: &state.mass,
             kept: &mut motion.kept,
         };
-        work(moving, around, forces.pool())
+        work(moving, around, forces.engine.pool())
     }
 
     /// Refuses velocities that are not finite, or that lead beyond the box within `dt`. If the kick of the

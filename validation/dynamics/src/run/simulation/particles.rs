@@ -35,12 +35,7 @@ impl Particles {
         Ok(Particles { state, force, moves: 0, flux: OnceLock::new(), reordering: None })
     }
 
-    /// Replaces the particles, without wrapping; the box stays.
-    pub fn replace(&mut self, state: &State, forces: &[[f64; 3]]) {
-        self.replace_with(|present| present.copy_particles(state), forces);
-    }
-
-    /// Calls `replace` with the particles to replace them; the box stays.
+    /// Calls `replace` with the particles to replace them, without wrapping; the box stays.
     pub fn replace_with(&mut self, replace: impl FnOnce(&mut State), forces: &[[f64; 3]]) {
         replace(&mut self.state);
         self.force.clear();
@@ -59,7 +54,6 @@ impl Particles {
         &self.force
     }
 
-    /// The particles and mutable forces.
     pub fn forces_mut(&mut self) -> (&State, &mut [[f64; 3]]) {
         (&self.state, &mut self.force)
     }
@@ -81,7 +75,6 @@ impl Particles {
         std::mem::replace(&mut self.state.domain, domain)
     }
 
-    /// A number that changes with the positions.
     pub fn moves(&self) -> u64 {
         self.moves
     }
@@ -157,7 +150,7 @@ impl Simulation {
     }
 
     pub fn velocities(&self) -> &[[f64; 3]] {
-        debug_assert!(self.motion.is_at_end_of_step());
+        debug_assert!(self.motion.deferred.is_none());
         &self.particles.state.v
     }
 
@@ -173,7 +166,6 @@ impl Simulation {
         &self.particles.state.tag
     }
 
-    /// Number of box edges travelled in each direction.
     pub fn image_flags(&self) -> &[[i32; 3]] {
         &self.particles.state.image
     }
@@ -183,13 +175,13 @@ impl Simulation {
     }
 
     pub fn state(&self) -> State {
-        debug_assert!(self.motion.is_at_end_of_step());
+        debug_assert!(self.motion.deferred.is_none());
         self.particles.state.clone()
     }
 
     /// Copies the particles into `state`, which belongs to this simulation, and reuses its memory.
     pub fn copy_state(&self, state: &mut State) {
-        debug_assert!(self.motion.is_at_end_of_step());
+        debug_assert!(self.motion.deferred.is_none());
         state.copy_particles(&self.particles.state);
     }
 }

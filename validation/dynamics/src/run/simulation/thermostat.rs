@@ -10,16 +10,16 @@ use psidpd_core::engine::{Step, Want};
 
 #[derive(Debug, Clone)]
 pub(super) struct Thermostat {
-    on: bool,
+    pub on: bool,
     pairs: Option<PairThermostat>,
     /// Iterations at earlier temperatures and settings.
     effort_before: Effort,
     /// Of which positions the pairs are known, for what time, and whether with distances.
     found: Option<(u64, f64, bool)>,
     /// Virial of the impulses in the present step.
-    impulse_virial: [f64; 6],
+    pub impulse_virial: [f64; 6],
     /// Whether drag and noise are among the present forces, where they act; `None` if nobody has asked for these forces.
-    in_forces: Option<bool>,
+    pub in_forces: Option<bool>,
     kept_forces: Vec<[f64; 3]>,
 }
 
@@ -58,36 +58,11 @@ impl Thermostat {
         !self.on || self.in_forces.is_none_or(|there| there == drag_in_forces)
     }
 
-    #[cfg(feature = "gpu")]
-    pub fn is_on(&self) -> bool {
-        self.on
-    }
-
-    /// Says whether drag and noise are among the present forces.
-    #[cfg(feature = "gpu")]
-    pub fn set_in_forces(&mut self, there: bool) {
-        self.in_forces = Some(there);
-    }
-
-    /// Forgets what is known of forces.
-    pub fn forget_forces(&mut self) {
-        self.in_forces = None;
-    }
-
-    pub fn begin_step(&mut self) {
-        self.impulse_virial = [0.0; 6];
-    }
-
     /// Iterations since the start.
     pub fn effort(&self) -> Effort {
         let mut effort = self.pairs.as_ref().map_or(Effort::default(), PairThermostat::effort);
         effort += self.effort_before;
         effort
-    }
-
-    /// Virial of the impulses in the present step.
-    pub fn impulse_virial(&self) -> [f64; 6] {
-        self.impulse_virial
     }
 
     /// Finds the pairs for a time `dt`, and returns them if the thermostat acts.
@@ -109,10 +84,10 @@ impl Thermostat {
                 tag: &state.tag,
                 species: &state.species,
                 mass: &state.mass,
-                frozen: external.frozen(),
+                frozen: &external.frozen,
             };
             let failed = |source| RunError::Engine { step: number, source };
-            pairs.find_pairs(forces.pool(), &bodies, dt, virial).map_err(failed)?;
+            pairs.find_pairs(forces.engine.pool(), &bodies, dt, virial).map_err(failed)?;
             self.found = found;
         }
         Ok(Some(pairs))
@@ -128,14 +103,14 @@ impl Thermostat {
     ) {
         let Some(pairs) = self.pairs.as_mut().filter(|_| self.on) else { return };
         let (state, force) = particles.forces_mut();
-        let virial = pairs.add_forces(forces.pool(), &state.v, drag, !drag, force);
+        let virial = pairs.add_forces(forces.engine.pool(), &state.v, drag, !drag, force);
         external.clear_frozen(force);
         (0..6).for_each(|c| self.impulse_virial[c] += virial[c]);
     }
 }
 
 fn pairs_of(forces: &Forces) -> Option<PairThermostat> {
-    PairThermostat::new(forces.plan(), forces.kt(), &forces.settings())
+    PairThermostat::new(forces.engine.plan(), forces.kt, &forces.engine.settings())
 }
 
 impl Simulation {
@@ -184,7 +159,7 @@ impl Simulation {
         let want = self.wants(want);
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
         if let Some(pairs) = thermostat.find_pairs(particles, external, forces, (dt, want.virial, *number))? {
-            pairs.draw(forces.pool(), *seed, *number, Stream(0), noise);
+            pairs.draw(forces.engine.pool(), *seed, *number, Stream(0), noise);
             thermostat.add_pair_forces(particles, external, forces, false);
         }
         thermostat.in_forces = Some(true);
@@ -212,7 +187,7 @@ impl Simulation {
         if heat.update == Update::Midpoint
             && let Some(pairs) = thermostat.pairs.as_mut().filter(|_| thermostat.on)
         {
-            forces.ask_for_pairs(pairs, heat.time, want.virial);
+            pairs.ask(&mut forces.engine, heat.time, want.virial);
             thermostat.found = None;
         }
     }
@@ -227,7 +202,7 @@ impl Simulation {
             forces.give_pairs(pairs, particles);
         }
         let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
-        let pool = forces.pool();
+        let pool = forces.engine.pool();
         pairs.draw(pool, *seed, *number, heat.stream, heat.noise);
         let v = particles.velocities_mut();
         let before = recording.then(|| v.to_vec());

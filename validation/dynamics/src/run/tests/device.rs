@@ -9,7 +9,7 @@ const SCENE: &str = "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nst
 
 #[test]
 fn the_key_is_read_and_a_wrong_name_has_its_line() {
-    let read = |line: &str| test_support::scene(SET6, &format!("{SCENE}{line}"));
+    let read = |line: &str| support::scene(SET6, &format!("{SCENE}{line}"));
     assert_eq!(read("").unwrap().device, Device::Cpu);
     assert_eq!(read("device = \"gpu:2\"").unwrap().device, Device::Gpu(2));
     let error = read("device = \"cuda\"").unwrap_err().to_string();
@@ -20,7 +20,7 @@ fn the_key_is_read_and_a_wrong_name_has_its_line() {
 #[cfg(not(feature = "gpu"))]
 #[test]
 fn a_program_without_gpus_says_how_to_build_one_with_them() {
-    let scene = test_support::scene(SET6, &format!("{SCENE}device = \"gpu\"")).unwrap();
+    let scene = support::scene(SET6, &format!("{SCENE}device = \"gpu\"")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let Err(RunError::File(error)) = Runner::begin(&scene, &out, Begin::New) else { panic!() };
@@ -28,17 +28,17 @@ fn a_program_without_gpus_says_how_to_build_one_with_them() {
     assert!(error.help().unwrap().contains("--features gpu"), "{error}");
     assert!(!out.join("thermo.csv").exists() && Live::new(scene, std::num::NonZeroUsize::MIN).is_err());
     // As with the option, where no file has the key.
-    let scene = Scene { device: Device::Gpu(0), ..test_support::scene(SET6, SCENE).unwrap() };
+    let scene = Scene { device: Device::Gpu(0), ..support::scene(SET6, SCENE).unwrap() };
     let Err(error @ RunError::Device(_)) = Runner::begin(&scene, &out, Begin::New) else { panic!() };
     assert!(error.help(Caller::Options).unwrap().contains("--features gpu"));
 }
 
 #[test]
 fn the_device_is_no_part_of_what_tells_runs_apart() {
-    let scene = test_support::scene(SET6, SCENE).unwrap();
+    let scene = support::scene(SET6, SCENE).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     run_scene(&scene, &out, &mut |_| ()).unwrap();
-    let other = test_support::scene(SET6, &format!("{SCENE}device = \"cpu\"")).unwrap();
+    let other = support::scene(SET6, &format!("{SCENE}device = \"cpu\"")).unwrap();
     assert!(matches!(Runner::begin(&other, &out, Begin::Resume).unwrap().start(), Start::Finished));
 }

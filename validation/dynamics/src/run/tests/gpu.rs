@@ -26,7 +26,7 @@ const MUCH: &str = "title = \"much\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\nde
 
 fn much() -> Scene {
     let model = SET6.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 3.0]");
-    test_support::scene(&model, MUCH).unwrap()
+    support::scene(&model, MUCH).unwrap()
 }
 
 fn on(device: Device, scene: &Scene) -> Scene {
@@ -260,7 +260,7 @@ fn temperature_pressure_energy_and_tension_are_those_of_the_cpu() {
             "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n{initial}\
              [[stage]]\nname = \"run\"\nsteps = 1200\n{step}\n"
         );
-        let scene = test_support::scene(model, &text).unwrap();
+        let scene = support::scene(model, &text).unwrap();
         let is_slab = initial.contains("slab");
         // Two seeds are two samples of one ensemble.
         let cpu = means(&scene);
@@ -282,7 +282,7 @@ fn temperature_pressure_energy_and_tension_are_those_of_the_cpu() {
 }
 
 fn refused(text: &str) -> String {
-    let scene = test_support::scene(SET6, text).unwrap();
+    let scene = support::scene(SET6, text).unwrap();
     let folder = tempfile::tempdir().unwrap();
     match Runner::begin(&scene, &folder.path().join("out"), Begin::New) {
         Err(error) => error.to_string(),
@@ -316,7 +316,7 @@ fn what_a_gpu_does_not_do_is_named_with_its_line() {
 fn a_run_that_fails_says_what_the_cpu_says_and_leaves_its_last_good_state() {
     let text =
         "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 60\ndt = 0.2\ndevice = \"gpu\"\n";
-    let scene = test_support::scene(SET6, text).unwrap();
+    let scene = support::scene(SET6, text).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let error = until(&scene, &out, Begin::New, u64::MAX).unwrap_err();

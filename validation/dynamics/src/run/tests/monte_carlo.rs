@@ -181,7 +181,7 @@ fn configurations_have_the_temperature_of_other_fluids() {
 fn the_carried_pressure_is_the_conservative_one() {
     let text = "title = \"s\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = [3.0, 3.0, 6.0]\nsteps = 3\n\
         integrator = \"monte-carlo\"\n[initial]\nkind = \"slab\"\nthickness = 3.0\ndensity = 6.0\n";
-    let scene = test_support::scene(SET6, text).unwrap();
+    let scene = support::scene(SET6, text).unwrap();
     let evaluator = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
     let mut run = scene.simulation(scene.initial_state()).unwrap();
     run.record_flux(true);
@@ -250,7 +250,7 @@ fn keys_without_meaning_are_refused_where_they_stand() {
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nbox = 3.0\ndensity = 6.0\nsteps = 5\nintegrator = \"monte-carlo\"\n{keys}"
         );
-        test_support::scene(SET6, &text)
+        support::scene(SET6, &text)
     };
     assert!(top("dt = 0.01\n").unwrap_err().to_string().contains("monte-carlo has no dt"));
     assert_eq!(top("sweeps = 7\n").unwrap().stages[0].integrator, trials(7, None));

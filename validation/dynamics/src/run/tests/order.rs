@@ -20,7 +20,7 @@ const CROWD: &str = "title = \"crowd\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n
     [output]\nthermo = 3\ndump = 19\n";
 
 fn crowd() -> Scene {
-    test_support::scene(IDEAL_MIXTURE, CROWD).unwrap()
+    support::scene(IDEAL_MIXTURE, CROWD).unwrap()
 }
 
 /// All data of the particles by tag, as bits.

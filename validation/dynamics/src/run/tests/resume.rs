@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::run::checkpoint::{Checkpoint, CheckpointError, Store, read_state};
-use crate::test_support::SOFT;
+use crate::tests::support::SOFT;
 use psidpd_core::engine::Precision;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -59,8 +59,8 @@ const TRIALS: &str = "title = \"trials\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7
 fn scenes() -> [Scene; 5] {
     let solid = scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &format!("{STAGES}checkpoint = 4\n")).unwrap();
     let flat = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, STAGES).unwrap();
-    let all = test_support::scene(SET6, EVERYTHING).unwrap();
-    let trials = test_support::scene(SET6, TRIALS).unwrap();
+    let all = support::scene(SET6, EVERYTHING).unwrap();
+    let trials = support::scene(SET6, TRIALS).unwrap();
     [solid, flat, trials, scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, INTEGRATORS).unwrap(), all]
 }
 
@@ -485,18 +485,18 @@ fn a_data_file_keeps_walls() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\ndensity = 3.0\ndt = 0.01\nsteps = 2\n[box]\nlengths = [4.0, 4.0, 5.0]\n\
                 boundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
     let folder = tempfile::tempdir().unwrap();
-    run_scene(&test_support::scene(SOFT, text).unwrap(), folder.path(), &mut |_| ()).unwrap();
+    run_scene(&support::scene(SOFT, text).unwrap(), folder.path(), &mut |_| ()).unwrap();
     let file = folder.path().join("final.data");
     let again = format!(
         "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\ndt = 0.01\nsteps = 2\n[initial]\nkind = \"data\"\nfile = '{}'\n",
         file.display()
     );
     let walls = [true, true, false];
-    let scene = test_support::scene(SOFT, &again).unwrap();
+    let scene = support::scene(SOFT, &again).unwrap();
     assert_eq!(scene.initial_state().domain.periodic(), walls);
     assert_eq!(Configuration::open(&file, Which::Last).unwrap().domain.periodic(), walls);
     let open = format!("{again}[box]\nboundary = [\"periodic\", \"periodic\", \"periodic\"]\n");
-    assert_eq!(test_support::scene(SOFT, &open).unwrap().initial_state().domain.periodic(), [true; 3]);
+    assert_eq!(support::scene(SOFT, &open).unwrap().initial_state().domain.periodic(), [true; 3]);
     // A box without walls has no entry for them, nor does a plane.
     for (model, lengths) in [(SOFT, "[4.0, 4.0, 5.0]"), (VAN_DER_WAALS, "[6.0, 6.0]")] {
         let data = scene_of(model, lengths, 3.0, ONE_STAGE).unwrap().initial_state().to_data("t");

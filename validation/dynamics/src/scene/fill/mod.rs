@@ -4,8 +4,7 @@ mod lattice;
 mod near;
 mod random;
 
-use super::{Arrangement, Initial, Part, Scene};
-use crate::particles::State;
+use super::{Arrangement, Initial, Part, Scene, State};
 use chacha20::ChaCha8Rng;
 use near::Near;
 use rand::SeedableRng;

@@ -31,24 +31,20 @@ pub const INITIAL: Table = Table {
              shape. `data`: a LAMMPS data file with its box; types are species. `checkpoint`: a checkpoint, or \
              the folder of a run, with its box; time starts again at 0.",
             "[initial]\nkind = \"lattice\"\ndensity = 3.0"),
-        density(FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0"),
-        count(FILLED, "[initial]\nkind = \"random\"\ncount = 500"),
-        composition(
-            FILLED,
-            "[initial]\nkind = \"random\"\ndensity = 3.0\ncomposition = { A = 0.25, B = 0.75 }",
-        ),
-        species(FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0\nspecies = \"A\""),
-        lattice(FILLED, "[initial]\nkind = \"slab\"\nthickness = 3.0\ndensity = 3.0\nlattice = \"fcc\""),
-        min_distance(FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0\nmin_distance = 0.4"),
-        axis(
-            &["slab", "cylinder"],
-            "[initial]\nkind = \"slab\"\naxis = \"x\"\nthickness = 3.0\ndensity = 3.0",
-        ),
-        thickness(&["slab"], "[initial]\nkind = \"slab\"\nthickness = 3.0\ndensity = 3.0"),
-        at("[initial]\nkind = \"slab\"\nthickness = 3.0\nat = 2.0\ndensity = 3.0"),
-        radius("[initial]\nkind = \"sphere\"\nradius = 3.0\ndensity = 3.0"),
-        center("[initial]\nkind = \"sphere\"\nradius = 2.0\ncenter = [2.5, 3.0, 3.0]\ndensity = 3.0"),
-        length("[initial]\nkind = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
+        of(DENSITY, FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0"),
+        of(COUNT, FILLED, "[initial]\nkind = \"random\"\ncount = 500"),
+        of(COMPOSITION, FILLED,
+            "[initial]\nkind = \"random\"\ndensity = 3.0\ncomposition = { A = 0.25, B = 0.75 }"),
+        of(SPECIES, FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0\nspecies = \"A\""),
+        of(LATTICE, FILLED, "[initial]\nkind = \"slab\"\nthickness = 3.0\ndensity = 3.0\nlattice = \"fcc\""),
+        of(MIN_DISTANCE, FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0\nmin_distance = 0.4"),
+        of(AXIS, &["slab", "cylinder"],
+            "[initial]\nkind = \"slab\"\naxis = \"x\"\nthickness = 3.0\ndensity = 3.0"),
+        of(THICKNESS, &["slab"], "[initial]\nkind = \"slab\"\nthickness = 3.0\ndensity = 3.0"),
+        of(AT, &["slab"], "[initial]\nkind = \"slab\"\nthickness = 3.0\nat = 2.0\ndensity = 3.0"),
+        of(RADIUS, ROUND, "[initial]\nkind = \"sphere\"\nradius = 3.0\ndensity = 3.0"),
+        of(CENTER, ROUND, "[initial]\nkind = \"sphere\"\nradius = 2.0\ncenter = [2.5, 3.0, 3.0]\ndensity = 3.0"),
+        of(LENGTH, &["cylinder"], "[initial]\nkind = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
         form_key(SAVED, "file", File, REQUIRED,
             "The file.", "[initial]\nkind = \"data\"\nfile = \"start.data\""),
         form_key(SAVED, "frozen_ids", Ids, OPTIONAL,
@@ -60,10 +56,8 @@ pub const INITIAL: Table = Table {
              `keep`, for a file only: the velocities of the file. If left out, a checkpoint keeps its own \
              velocities, and everything else is thermal.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"keep\""),
-        velocity(
-            FILLED,
-            "[initial]\nkind = \"sphere\"\nradius = 2.0\ndensity = 3.0\nvelocity = [0.0, 0.0, -1.0]",
-        ),
+        of(VELOCITY, FILLED,
+            "[initial]\nkind = \"sphere\"\nradius = 2.0\ndensity = 3.0\nvelocity = [0.0, 0.0, -1.0]"),
     ],
 };
 
@@ -91,115 +85,69 @@ pub const PART: Table = Table {
              noise included; temperature and momentum count only the moving particles. False if left out.",
             "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0\nfrozen = true\n\
              [[part]]\nshape = \"rest\"\ndensity = 3.0"),
-        density(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0"),
-        count(&[], "[[part]]\nshape = \"box\"\ncount = 500"),
-        composition(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0\ncomposition = { A = 0.9, B = 0.1 }"),
-        species(
-            &[],
+        of(DENSITY, &[], "[[part]]\nshape = \"box\"\ndensity = 3.0"),
+        of(COUNT, &[], "[[part]]\nshape = \"box\"\ncount = 500"),
+        of(COMPOSITION, &[], "[[part]]\nshape = \"box\"\ndensity = 3.0\ncomposition = { A = 0.9, B = 0.1 }"),
+        of(SPECIES, &[],
             "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0\nspecies = \"A\"\n\
-             [[part]]\nshape = \"rest\"\ndensity = 3.0\nspecies = \"B\"",
-        ),
-        lattice(&[], "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0\nlattice = \"bcc\""),
-        min_distance(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0\nmin_distance = 0.4"),
+             [[part]]\nshape = \"rest\"\ndensity = 3.0\nspecies = \"B\""),
+        of(LATTICE, &[], "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0\nlattice = \"bcc\""),
+        of(MIN_DISTANCE, &[], "[[part]]\nshape = \"box\"\ndensity = 3.0\nmin_distance = 0.4"),
         form_key(&["box"], "low", Point, OPTIONAL,
             "The lower corner; that of the box if left out.",
             "[[part]]\nshape = \"box\"\nlow = [1.0, 1.0, 1.0]\ndensity = 3.0"),
         form_key(&["box"], "high", Point, OPTIONAL,
             "The upper corner; that of the box if left out.",
             "[[part]]\nshape = \"box\"\nhigh = [6.0, 6.0, 3.0]\ndensity = 3.0"),
-        axis(
-            &["slab", "cylinder"],
-            "[[part]]\nshape = \"cylinder\"\naxis = \"x\"\nradius = 2.0\ndensity = 3.0",
-        ),
-        thickness(
-            &["slab", "layer"],
-            "[[part]]\nshape = \"layer\"\nface = \"xhi\"\nthickness = 2.0\ndensity = 3.0",
-        ),
+        of(AXIS, &["slab", "cylinder"],
+            "[[part]]\nshape = \"cylinder\"\naxis = \"x\"\nradius = 2.0\ndensity = 3.0"),
+        of(THICKNESS, &["slab", "layer"],
+            "[[part]]\nshape = \"layer\"\nface = \"xhi\"\nthickness = 2.0\ndensity = 3.0"),
         form_key(&["layer"], "face", Choice(|| names(&FACES)), REQUIRED,
             "The face of the box at which the layer lies.",
             "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0"),
-        at("[[part]]\nshape = \"slab\"\nthickness = 3.0\nat = 2.0\ndensity = 3.0"),
-        radius("[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0"),
-        center(
-            "[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 2.0\ncenter = [3.0, 3.0, 5.0]\ndensity = 3.0",
-        ),
-        length("[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
+        of(AT, &["slab"], "[[part]]\nshape = \"slab\"\nthickness = 3.0\nat = 2.0\ndensity = 3.0"),
+        of(RADIUS, ROUND, "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0"),
+        of(CENTER, ROUND,
+            "[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 2.0\ncenter = [3.0, 3.0, 5.0]\ndensity = 3.0"),
+        of(LENGTH, &["cylinder"], "[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
         form_key(&[], "velocities", Choice(|| vec!["thermal", "zero"]), OPTIONAL,
             "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: particles at rest. \
              Thermal if left out.",
             "[[part]]\nshape = \"box\"\ndensity = 3.0\nvelocities = \"zero\""),
-        velocity(
-            &[],
+        of(VELOCITY, &[],
             "[[part]]\nshape = \"sphere\"\nradius = 1.4\ncenter = [3.0, 3.0, 1.5]\ndensity = 3.0\nvelocity = [0.0, 0.0, 1.0]\n\
-             [[part]]\nshape = \"sphere\"\nradius = 1.4\ncenter = [3.5, 3.0, 4.5]\ndensity = 3.0\nvelocity = [0.0, 0.0, -1.0]",
-        ),
+             [[part]]\nshape = \"sphere\"\nradius = 1.4\ncenter = [3.5, 3.0, 4.5]\ndensity = 3.0\nvelocity = [0.0, 0.0, -1.0]"),
     ],
 };
 
-type Forms = &'static [&'static str];
-
-const fn density(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "density", Positive, OPTIONAL,
-        "Number density of the region; that of the scene if left out.", example)
+/// A key in a table whose `forms` have it.
+const fn of(key: Key, forms: &'static [&'static str], example: &'static str) -> Key {
+    Key { forms, example, ..key }
 }
 
-const fn count(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "count", Count, OPTIONAL, "Number of particles, instead of `density`.", example)
-}
-
-const fn composition(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "composition", Fractions, OPTIONAL,
-        "Number fractions of the species, which add up to 1 and are mixed at random; equal shares if left out.",
-        example)
-}
-
-const fn species(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "species", Text, OPTIONAL, "The only species of the region, instead of a composition.", example)
-}
-
-const fn lattice(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "lattice", Choice(lattices), OPTIONAL,
-        "The lattice of the initial positions: `sc`, `bcc`, `fcc`, or in two dimensions `square`, `hexagonal`. \
-         In a block the lattice is stretched to fit with whole cells. Surplus sites are vacancies, spread \
-         evenly. Positions are random if left out; `sc` or `square` for `kind = \"lattice\"`.",
-        example)
-}
-
-const fn min_distance(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "min_distance", Positive, OPTIONAL,
-        "The minimum distance of random particles from each other and from earlier parts: closer positions are \
-         redrawn. A scene without room for its particles is refused; distances up to about 0.75 density^(-1/3) \
-         are possible, in two dimensions 0.7 density^(-1/2).",
-        example)
-}
-
-const fn axis(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "axis", Choice(|| names(&AXES)), OPTIONAL,
-        "Direction of the normal of a slab or of the axis of a cylinder; the last direction if left out.", example)
-}
-
-const fn thickness(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "thickness", Positive, REQUIRED, "The thickness.", example)
-}
-
-const fn at(example: &'static str) -> Key {
-    form_key(&["slab"], "at", Number, OPTIONAL,
-        "Position of the middle of the slab along its normal; the middle of the box if left out.", example)
-}
-
-const fn radius(example: &'static str) -> Key {
-    form_key(ROUND, "radius", Positive, REQUIRED, "The radius.", example)
-}
-
-const fn center(example: &'static str) -> Key {
-    form_key(ROUND, "center", Point, OPTIONAL, "The centre; that of the box if left out.", example)
-}
-
-const fn length(example: &'static str) -> Key {
-    form_key(&["cylinder"], "length", Positive, OPTIONAL, "The length; that of the box if left out.", example)
-}
-
-const fn velocity(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "velocity", Point, OPTIONAL,
-        "A velocity that is added to the velocities of all particles of the region.", example)
-}
+const DENSITY: Key = key("density", Positive, OPTIONAL,
+    "Number density of the region; that of the scene if left out.", "");
+const COUNT: Key = key("count", Count, OPTIONAL, "Number of particles, instead of `density`.", "");
+const COMPOSITION: Key = key("composition", Fractions, OPTIONAL,
+    "Number fractions of the species, which add up to 1 and are mixed at random; equal shares if left out.", "");
+const SPECIES: Key = key("species", Text, OPTIONAL,
+    "The only species of the region, instead of a composition.", "");
+const LATTICE: Key = key("lattice", Choice(lattices), OPTIONAL,
+    "The lattice of the initial positions: `sc`, `bcc`, `fcc`, or in two dimensions `square`, `hexagonal`. \
+     In a block the lattice is stretched to fit with whole cells. Surplus sites are vacancies, spread \
+     evenly. Positions are random if left out; `sc` or `square` for `kind = \"lattice\"`.", "");
+const MIN_DISTANCE: Key = key("min_distance", Positive, OPTIONAL,
+    "The minimum distance of random particles from each other and from earlier parts: closer positions are \
+     redrawn. A scene without room for its particles is refused; distances up to about 0.75 density^(-1/3) \
+     are possible, in two dimensions 0.7 density^(-1/2).", "");
+const AXIS: Key = key("axis", Choice(|| names(&AXES)), OPTIONAL,
+    "Direction of the normal of a slab or of the axis of a cylinder; the last direction if left out.", "");
+const THICKNESS: Key = key("thickness", Positive, REQUIRED, "The thickness.", "");
+const AT: Key = key("at", Number, OPTIONAL,
+    "Position of the middle of the slab along its normal; the middle of the box if left out.", "");
+const RADIUS: Key = key("radius", Positive, REQUIRED, "The radius.", "");
+const CENTER: Key = key("center", Point, OPTIONAL, "The centre; that of the box if left out.", "");
+const LENGTH: Key = key("length", Positive, OPTIONAL, "The length; that of the box if left out.", "");
+const VELOCITY: Key = key("velocity", Point, OPTIONAL,
+    "A velocity that is added to the velocities of all particles of the region.", "");

@@ -38,19 +38,17 @@ impl Shapes<'_> {
                 let [low, high] = self.whole().bounds(self.dimensions);
                 return Ok(Shape::Rest { low, high, others: Vec::new() });
             }
-            _ => {
-                let known: Vec<&str> =
-                    SHAPES.iter().copied().filter(|s| self.dimensions == 3 || *s != "cylinder").collect();
-                let kind = FileErrorKind::UnknownName {
-                    what: "shape",
-                    name: kind.to_owned(),
-                    known: known.join(", "),
-                };
-                return Err(key.error(kind));
-            }
+            _ => return Err(key.error(self.unknown("shape", kind, SHAPES))),
         };
         self.check_inside(&shape, key)?;
         Ok(shape)
+    }
+
+    /// The error for a name that is none of `known`; in two dimensions there are no cylinders.
+    pub fn unknown(&self, what: &'static str, name: &str, known: &[&str]) -> FileErrorKind {
+        let known: Vec<&str> =
+            known.iter().copied().filter(|name| self.dimensions == 3 || *name != "cylinder").collect();
+        FileErrorKind::UnknownName { what, name: name.to_owned(), known: known.join(", ") }
     }
 
     /// The normal of a region that spans the box in all directions but one.

@@ -13,7 +13,7 @@ pub struct Physics<'a> {
     /// Whether each direction has walls.
     walls: [bool; 3],
     /// The group of mobile particles: `all` if none is frozen.
-    mobile: &'static str,
+    pub mobile: &'static str,
 }
 
 impl<'a> Physics<'a> {
@@ -26,10 +26,6 @@ impl<'a> Physics<'a> {
 
     pub fn boundary(&self) -> String {
         self.walls.map(|wall| if wall { "f" } else { "p" }).join(" ")
-    }
-
-    pub fn mobile(&self) -> &'static str {
-        self.mobile
     }
 
     /// Writes the groups, the walls, and the fix of two dimensions.
@@ -102,7 +98,6 @@ impl<'a> Physics<'a> {
         move |a| format!("mass*({a:?}){}", half.as_deref().unwrap_or_default())
     }
 
-    /// Writes the group that a body force acts on.
     fn write_group(
         &self,
         s: &mut impl Write,
@@ -123,7 +118,6 @@ impl<'a> Physics<'a> {
         Ok(group)
     }
 
-    /// Writes the commands that remove the body forces.
     pub fn write_end_of_body_forces(&self, s: &mut impl Write) -> Result {
         for k in 1..=self.scene.body_forces.len() {
             writeln!(s, "unfix         body{k}")?;

@@ -4,7 +4,7 @@ use psidpd_core::document::FileError;
 use psidpd_dynamics::scene::Scene;
 
 /// Warren's liquid, set 6.
-pub const SET6: &str = include_str!("../../models/warren2003-set6.toml");
+pub const SET6: &str = include_str!("../../../models/warren2003-set6.toml");
 
 /// A model with a thermostat and no other forces.
 pub const IDEAL: &str =
