@@ -124,6 +124,14 @@ impl Observed {
         self.get(name).and_then(|o| o.scalar(column)).unwrap_or(Measured::NONE)
     }
 
+    /// A column of an observation against its abscissa; nothing where it was not observed.
+    pub fn profile(&self, name: &str, column: &str) -> Vec<(f64, Measured)> {
+        let Some(observation) = self.get(name) else { return Vec::new() };
+        let (Some(x), Some(y)) = (&observation.x, observation.get(column)) else { return Vec::new() };
+        let values = y.values.iter().zip(&y.errors).map(|(value, error)| [*value, *error].into());
+        x.values.iter().copied().zip(values).collect()
+    }
+
     pub fn temperature(&self) -> Measured {
         self.scalar("temperature", "kinetic")
     }

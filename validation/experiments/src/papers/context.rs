@@ -1,10 +1,12 @@
 use crate::ExperimentError;
 use crate::bulk::{self, Bulk, Observed, Sampling};
+use crate::papers::case::{Reproduction, curve};
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::Scene;
+use psidpd_observe::Measured;
 use psidpd_report::run::SeriesTable;
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -43,6 +45,13 @@ pub struct Fluid<'a> {
     pub edge: f64,
     /// Observables beside temperature and pressure.
     pub observe: &'a str,
+}
+
+impl Fluid<'_> {
+    /// At kT = 1, with the step and the box of most papers.
+    pub fn of(model: &str) -> Fluid<'_> {
+        Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" }
+    }
 }
 
 impl Context {
@@ -86,6 +95,17 @@ impl Context {
         Ok(bulk::run_with(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
+    /// Pressures of a fluid of one species at several densities, which end the names of the runs.
+    pub fn pressures(
+        &self,
+        name: &str,
+        fluid: &Fluid,
+        densities: &[f64],
+    ) -> Result<Vec<(f64, Measured)>, ExperimentError> {
+        let at = |rho: &f64| Ok((*rho, self.bulk(&format!("{name}{rho}"), fluid, &[*rho])?.pressure()));
+        densities.iter().map(at).collect()
+    }
+
     /// Runs a scene, the text of which does not name its model.
     pub fn scene(&self, name: &str, model: &str, scene: &str) -> Result<Observed, ExperimentError> {
         let path = self.write(name, model)?;
@@ -113,17 +133,25 @@ impl Context {
         Context { folder, ..self.clone() }
     }
 
-    /// Columns of `thermo.csv` of a run, by their names.
-    pub fn thermo<const N: usize>(
+    /// Plots temperature and pressure of a run in two dimensions against time, from its `thermo.csv`.
+    pub fn plot_thermo(
         &self,
-        name: &str,
-        columns: [&str; N],
-    ) -> Result<Vec<[f64; N]>, ExperimentError> {
-        let path = self.folder.join(name).join("thermo.csv");
+        run: &str,
+        title: &str,
+        outcome: &mut Reproduction,
+    ) -> Result<(), ExperimentError> {
+        let path = self.folder.join(run).join("thermo.csv");
         let missing = || ExperimentError::Output { path: path.clone(), problem: "it is missing".into() };
         let table = SeriesTable::read(&path)?.ok_or_else(missing)?;
-        let row = |k: usize| columns.map(|name| table.get(name).map_or(f64::NAN, |column| column[k]));
-        Ok((0..table.rows()).map(row).collect())
+        let column = |name| table.get(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);
+        for (file, axis, name, of) in [
+            ("temperature", "kT", "kinetic", column("temperature")),
+            ("pressure", "pressure", "mean of xx and yy", column("pressure")),
+        ] {
+            let points = column("time").into_iter().zip(of).collect();
+            outcome.plot(file, title, ["time", axis], vec![curve(name, points)]);
+        }
+        Ok(())
     }
 }
 
