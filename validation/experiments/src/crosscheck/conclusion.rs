@@ -78,18 +78,9 @@ pub fn what_is_compared() -> Section {
     let mut sets =
         Table::new(["set", "A", "B", "r_c", "r_d", "γ", "kT", "Warren: density", "tension", "width"]);
     for set in [SET5, SET6] {
-        sets.push([
-            set.name.to_owned(),
-            A.to_string(),
-            set.b.to_string(),
-            RC.to_string(),
-            RD.to_string(),
-            GAMMA.to_string(),
-            "1".into(),
-            format!("{} ± {}", set.fluid.density, set.liquid_error),
-            format!("{} ± {}", set.tension.0, set.tension.1),
-            format!("{} ± {}", set.width.0, set.width.1),
-        ]);
+        let parameters = [A, set.b, RC, RD, GAMMA, 1.0].map(|x| x.to_string());
+        let published = set.published().map(|(value, error)| format!("{value} ± {error}"));
+        sets.push([set.name.to_owned()].into_iter().chain(parameters).chain(published));
     }
     let mut words = Table::new(["word", "what it means"]);
     for (word, meaning) in [
