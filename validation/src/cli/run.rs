@@ -7,7 +7,7 @@ use psidpd_core::engine::{Pool, Precision, at_once};
 use psidpd_dynamics::device::Device;
 use psidpd_dynamics::run::FILES;
 use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
-use psidpd_experiments::check::calibration;
+use psidpd_experiments::check::uncalibrated;
 use psidpd_report::{Headline, Progress, headline, write_run_report};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let mut scene = settings.scene(path)?;
     scene.precision = precision.or(scene.precision);
     scene.device = device.unwrap_or(scene.device);
-    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt)?) {
+    if let Some(warning) = uncalibrated(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
     }
     let begin = match (resume, overwrite) {
