@@ -3,8 +3,6 @@
 use super::case::{Case, Inputs, Must};
 use crate::models::{HUGGINS, VAN_DER_WAALS};
 
-const GROUP: &str = "singular formulas";
-
 /// A fluid with a logarithm of its density and a quotient; `bounds` as in a model file.
 fn logarithm(bounds: &str) -> String {
     format!(
@@ -14,7 +12,6 @@ fn logarithm(bounds: &str) -> String {
 }
 
 pub fn cases() -> Vec<Case> {
-    let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
     // b n is 1.3 on average.
     let flat = |model: String| Inputs::new(model, 2.5, "box = 3.0\ndensity = 80.0\n", 0.002, [50, 150]);
     let unbounded: String = VAN_DER_WAALS
@@ -29,17 +26,21 @@ pub fn cases() -> Vec<Case> {
         Inputs::new(HUGGINS, 1.0, scene, 0.01, [1000, 2000])
     };
     vec![
-        case("bn beyond 1 where psi has a pole, no bounds", flat(unbounded), Must::Stops),
-        case("bn beyond 1, bounds", flat(VAN_DER_WAALS.into()), Must::Counted),
-        case("n = 0 with ln n and 1/n, no bounds", thin(""), Must::Stops),
-        case("n = 0 with ln n and 1/n, bounds", thin("bounds = [0.5, 20.0]"), Must::Counted),
-        case(
+        Case::new("bn beyond 1 where psi has a pole, no bounds", flat(unbounded), Must::Stops),
+        Case::new("bn beyond 1, bounds", flat(VAN_DER_WAALS.into()), Must::Counted),
+        Case::new("n = 0 with ln n and 1/n, no bounds", thin(""), Must::Stops),
+        Case::new("n = 0 with ln n and 1/n, bounds", thin("bounds = [0.5, 20.0]"), Must::Counted),
+        Case::new(
             "n = 0 with ln n and 1/n, constant slope below the bound",
             thin("bounds = [0.5, 20.0]\nbelow = \"constant\""),
             Must::Counted,
         ),
-        case("an evaporated Huggins particle", huggins("count = 2", "box = 20.0\n"), Must::RightOrSaid(0.06)),
-        case(
+        Case::new(
+            "an evaporated Huggins particle",
+            huggins("count = 2", "box = 20.0\n"),
+            Must::RightOrSaid(0.06),
+        ),
+        Case::new(
             "a species absent from every neighbourhood",
             huggins("density = 3.0\nspecies = \"A\"", "box = 4.0\n"),
             Must::RightOrSaid(0.06),

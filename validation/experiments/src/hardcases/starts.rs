@@ -1,14 +1,10 @@
 //! Starts that are unusual, and boxes.
 
-use super::case::{Case, Inputs, Must};
-use super::data_file::data;
+use super::case::{Case, Inputs, Must, data};
 use crate::models::{SET6, STANDARD};
-
-const GROUP: &str = "starts and boxes";
 
 pub fn cases() -> Vec<Case> {
     let set6 = |scene: &str| Inputs::new(SET6, 1.0, scene, 0.005, [200, 400]);
-    let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
     // Temperatures of few particles need many samples.
     let dpd = |scene: &str| Inputs::new(STANDARD, 1.0, scene, 0.02, [200, 2000]);
     let from_data = |x: &[[f64; 3]]| Inputs {
@@ -30,24 +26,28 @@ pub fn cases() -> Vec<Case> {
         faces.push([at(a), at(b), at(c)]);
     }
     vec![
-        case("coincident particles: every place taken twice", from_data(&twice), Must::Right(0.06)),
-        case("particles exactly on faces, edges and corners", from_data(&faces), Must::Right(0.06)),
-        case(
+        Case::new("coincident particles: every place taken twice", from_data(&twice), Must::Right(0.06)),
+        Case::new("particles exactly on faces, edges and corners", from_data(&faces), Must::Right(0.06)),
+        Case::new(
             "random overlapping start at three times the density of the liquid",
             set6("box = 3.0\ndensity = 18.0\n"),
             Must::RightOrSaid(0.1),
         ),
-        case(
+        Case::new(
             "a box barely two cut-offs wide",
             Inputs { steps: [200, 12_000], ..dpd("box = 2.02\ndensity = 3.0\n") },
             Must::Right(0.06),
         ),
-        case("a box less than two cut-offs wide", dpd("box = 1.9\ndensity = 3.0\n"), Must::Refused),
-        case(
+        Case::new("a box less than two cut-offs wide", dpd("box = 1.9\ndensity = 3.0\n"), Must::Refused),
+        Case::new(
             "a lone particle",
             set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 1\n"),
             Must::Right(0.06),
         ),
-        case("an empty box", set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 0\n"), Must::Refused),
+        Case::new(
+            "an empty box",
+            set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 0\n"),
+            Must::Refused,
+        ),
     ]
 }
