@@ -104,7 +104,7 @@ fn speed(options: &Options, subject: &Subject, size: usize) -> Result<Speed, Exp
         fluid: subject.name,
         particles: state.len(),
         steps,
-        particle_steps_per_second: Spread::of(&rates).unwrap_or(Spread { min: 0.0, median: 0.0, max: 0.0 }),
+        particle_steps_per_second: Spread::of(&rates).unwrap_or_default(),
         bytes_per_particle: gpu.memory_bytes() as f64 / count,
         kernels,
         portable_cpu: cpu.map(|cpu| count * cpu.steps as f64 / cpu.seconds),
