@@ -127,15 +127,8 @@ fn repeated(small: &State, times: usize) -> Result<State, ExperimentError> {
 
 impl Outcome {
     pub fn table(&self) -> Table {
-        let header = [
-            "fluid",
-            "particles",
-            "particle-steps/s",
-            "(lowest–highest)",
-            "bytes/particle",
-            "one CPU thread, portable",
-        ];
-        let mut table = Table::new(header);
+        let speed = ["particle-steps/s", "(lowest–highest)", "bytes/particle", "one CPU thread, portable"];
+        let mut table = Table::new(["fluid", "particles"].into_iter().chain(speed));
         for s in &self.speeds {
             let Spread { min, median, max } = s.particle_steps_per_second;
             table.push([
