@@ -75,17 +75,12 @@ impl Bulk<'_> {
 
     /// Runs the fluid in `folder`.
     pub fn run(&self, model_file: &Path, folder: &Path) -> Result<Observed, RunError> {
-        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads)
+        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads, None)
     }
 }
 
-/// Runs a scene in `folder` and reads what it observed.
-pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) -> Result<Observed, RunError> {
-    run_with(scene, folder, begin, threads, None)
-}
-
-/// The same by an engine that is wrong on purpose, if there is a `fault`.
-pub fn run_with(
+/// Runs a scene in `folder` and reads what it observed; by an engine that is wrong on purpose, if there is a `fault`.
+pub fn run(
     scene: &Scene,
     folder: &Path,
     begin: Begin,

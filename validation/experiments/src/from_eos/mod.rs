@@ -167,7 +167,7 @@ fn slab(path: &Path, options: &Options, folder: &Path) -> Result<[Measured; 2], 
         options.density,
     );
     let scene = Scene::parse("slab", &text, path.parent().unwrap_or(Path::new("")))?;
-    let observed = bulk::run(&scene, &folder.join("slab"), Begin::Overwrite, options.sampling.threads)?;
+    let observed = bulk::run(&scene, &folder.join("slab"), Begin::Overwrite, options.sampling.threads, None)?;
     Ok([observed.scalar("interface_width", "liquid"), observed.scalar("surface_tension", "stress")])
 }
 

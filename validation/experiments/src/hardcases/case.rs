@@ -93,6 +93,11 @@ pub struct Case {
     pub exact: Option<Must>,
 }
 
+/// The lines of a scene for a cube.
+pub fn cube(edge: f64, density: f64) -> String {
+    format!("box = {edge:?}\ndensity = {density:?}\n")
+}
+
 /// A data file of one species in a cube.
 pub fn data(x: &[[f64; 3]], edge: f64) -> String {
     let mut text = format!(

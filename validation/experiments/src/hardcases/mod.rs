@@ -16,7 +16,7 @@ use crate::code::Host;
 use crate::jobs;
 use crate::lammps::host::PluginHost;
 use crate::models::SET6;
-use case::{Case, Inputs, Must};
+use case::{Case, Inputs, Must, cube};
 use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_report::{Progress, Table};
@@ -63,7 +63,7 @@ fn long(full: bool) -> Case {
         true => ("10^6 steps without thermostat", 1_000_000),
         false => ("2000 steps without thermostat", 2_000),
     };
-    let run = Inputs::new(SET6, 1.0, "box = 3.0\ndensity = 6.05\n", 0.002, [500, steps]);
+    let run = Inputs::new(SET6, 1.0, cube(3.0, 6.05), 0.002, [500, steps]);
     Case::new(name, run, Must::Conserves(0.02))
 }
 

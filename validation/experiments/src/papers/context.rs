@@ -34,7 +34,7 @@ pub struct Context {
 }
 
 /// A change of a scene: the path of a key, through tables and by the number of an array's entry, and its value.
-pub type Change<'a> = (&'a [&'a str], toml_edit::Value);
+pub type Change<'a, V = i64> = (&'a str, V);
 
 /// A homogeneous fluid of one species that a case measures.
 pub struct Fluid<'a> {
@@ -92,7 +92,7 @@ impl Context {
         };
         let bulk = Bulk { model: &model, kt: fluid.kt, densities, observe: fluid.observe, sampling };
         let folder = self.folder.join(name);
-        Ok(bulk::run_with(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
+        Ok(bulk::run(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
     /// Pressures of a fluid of one species at several densities, which end the names of the runs.
@@ -113,16 +113,16 @@ impl Context {
         let scene =
             Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
         let folder = self.folder.join(name);
-        Ok(bulk::run_with(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
+        Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
     /// Runs a scene of `scenes/full`, as it is at full size and with `changes` at quick size.
-    pub fn shipped(
+    pub fn shipped<V: Into<toml_edit::Value> + Clone>(
         &self,
         name: &str,
         model: &str,
         scene: &str,
-        changes: &[Change],
+        changes: &[Change<V>],
     ) -> Result<Observed, ExperimentError> {
         self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
     }
@@ -156,19 +156,22 @@ impl Context {
 }
 
 /// A scene without its model and with other values.
-fn edited(scene: &str, changes: &[Change]) -> Result<String, ExperimentError> {
+fn edited<V: Into<toml_edit::Value> + Clone>(
+    scene: &str,
+    changes: &[Change<V>],
+) -> Result<String, ExperimentError> {
     let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
     let mut document: toml_edit::DocumentMut = scene.parse().map_err(|_| missing("scene"))?;
     document.remove("model");
     for (path, value) in changes {
         let mut item = document.as_item_mut();
-        for step in *path {
+        for step in path.split('.') {
             item = match step.parse::<usize>() {
                 Ok(k) => item.get_mut(k).ok_or_else(|| missing(step))?,
                 Err(_) => &mut item[step],
             };
         }
-        *item = toml_edit::Item::Value(value.clone());
+        *item = toml_edit::value(value.clone());
     }
     Ok(document.to_string())
 }
@@ -195,15 +198,14 @@ mod tests {
     #[test]
     fn a_scene_is_changed_where_the_path_leads_and_nowhere_else() {
         let scene = "model = \"m.toml\"\nsteps = 1\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 3\n[output]\nthermo = 4\n";
-        let changes: [Change; 3] = [
-            (&["steps"], 10.into()),
-            (&["stage", "1", "steps"], 30.into()),
-            (&["output", "thermo"], 0.into()),
-        ];
+        let changes: [Change; 3] = [("steps", 10), ("stage.1.steps", 30), ("output.thermo", 0)];
         let text = edited(scene, &changes).unwrap();
         let expected = "steps = 10\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 30\n[output]\nthermo = 0\n";
         assert_eq!(text, expected);
-        assert!(edited(scene, &[(&["stage", "2", "steps"], 1.into())]).is_err());
-        assert_eq!(edited(scene, &[]).unwrap(), scene.trim_start_matches("model = \"m.toml\"\n"));
+        assert!(edited(scene, &[("stage.2.steps", 1i64)]).is_err());
+        assert_eq!(
+            edited(scene, &[] as &[Change]).unwrap(),
+            scene.trim_start_matches("model = \"m.toml\"\n")
+        );
     }
 }

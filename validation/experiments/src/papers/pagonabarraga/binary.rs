@@ -21,13 +21,9 @@ const RHO: f64 = 10.0;
 const BOXES: [f64; 2] = [10.0, 3.0];
 
 fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, ExperimentError> {
-    let changes: &[Change] = &[
-        (&["equilibrate"], 3000.into()),
-        (&["steps"], 40_000.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-    ];
-    context.shared("pagonabarraga-binary").shipped(name, BINARY, scene, changes)
+    let changes: [Change; 4] =
+        [("equilibrate", 3000), ("steps", 40_000), ("output.dump", 0), ("observe.every", 20)];
+    context.shared("pagonabarraga-binary").shipped(name, BINARY, scene, &changes)
 }
 
 fn mixture(context: &Context) -> Result<Observed, ExperimentError> {

@@ -12,14 +12,10 @@ const KT: f64 = 0.75;
 
 fn slab(context: &Context) -> Result<(Context, Observed), ExperimentError> {
     let context = context.shared("pagonabarraga-slab");
-    let changes: &[Change] = &[
-        (&["equilibrate"], 2000.into()),
-        (&["steps"], 10_000.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-    ];
+    let changes: [Change; 4] =
+        [("equilibrate", 2000), ("steps", 10_000), ("output.dump", 0), ("observe.every", 20)];
     let scene = format!("{SCENE}msd = {{ length = {} }}\ninterface_width = true\n", context.pick(250, 2000));
-    let observed = context.shipped(RUN, SLAB, &scene, changes)?;
+    let observed = context.shipped(RUN, SLAB, &scene, &changes)?;
     Ok((context, observed))
 }
 

@@ -20,13 +20,13 @@ fn gathered(
     scene: &str,
     outcome: &mut Reproduction,
 ) -> Result<Measured, ExperimentError> {
-    let changes: &[Change] = &[
-        (&["box"], 10.0.into()),
-        (&["steps"], 2500.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
+    let changes: [Change<toml_edit::Value>; 4] = [
+        ("box", 10.0.into()),
+        ("steps", 2500.into()),
+        ("output.dump", 0.into()),
+        ("observe.every", 20.into()),
     ];
-    let s = context.shipped("demixing", model, scene, changes)?.profile("structure_factor", "s");
+    let s = context.shipped("demixing", model, scene, &changes)?.profile("structure_factor", "s");
     outcome.plot("structure", "Structure factor", ["k", "S"], vec![curve("S", bare(&s))]);
     let particles = 2.0 * context.pick(1e3, 8e3);
     Ok(s.first().map_or(Measured::NONE, |(_, s)| s.times(1.0 / particles)))

@@ -27,13 +27,9 @@ fn drop(context: &Context, which: usize) -> Result<Observed, ExperimentError> {
     let (count, scene) = SCENES[which];
     // Smaller drops come to rest sooner, and need more samples for the same error.
     let steps = (36_000_000 / count) as i64;
-    let changes: &[Change] = &[
-        (&["equilibrate"], 2000.into()),
-        (&["steps"], steps.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-    ];
-    context.shipped(&format!("drop-{count}"), SPLINE, scene, changes)
+    let changes: [Change; 4] =
+        [("equilibrate", 2000), ("steps", steps), ("output.dump", 0), ("observe.every", 20)];
+    context.shipped(&format!("drop-{count}"), SPLINE, scene, &changes)
 }
 
 pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {

@@ -4,7 +4,7 @@ use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
 use crate::papers::case::{Reproduction, bare, curve};
-use crate::papers::context::{Change, Context};
+use crate::papers::context::Context;
 
 /// Name, model, scene, tension from the shape with its error, and from the planar interface.
 type Drop = (&'static str, &'static str, &'static str, [f64; 2], [f64; 2]);
@@ -19,8 +19,7 @@ const DROPS: [Drop; 4] = [
 fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-pendant");
     // As the paper has them, at the small size too: twenty seconds each. With a longer step the drop of set 5 falls.
-    let changes: &[Change] = &[(&["output", "dump"], 0.into())];
-    context.shipped(name, model, scene, changes)
+    context.shipped(name, model, scene, &[("output.dump", 0i64)])
 }
 
 pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
