@@ -73,7 +73,6 @@ impl Bulk<'_> {
         Ok(scene)
     }
 
-    /// Runs the fluid in `folder`.
     pub fn run(&self, model_file: &Path, folder: &Path) -> Result<Observed, RunError> {
         run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads, None)
     }
@@ -102,7 +101,6 @@ pub fn run(
 pub struct Observed(pub Vec<Observation>);
 
 impl Observed {
-    /// Reads what the run in a folder observed.
     pub fn read(folder: &Path) -> Result<Observed, RunError> {
         let path = folder.join("observables.json");
         let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };

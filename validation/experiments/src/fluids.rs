@@ -140,7 +140,6 @@ impl WarrenSet {
         [(self.fluid.density, self.liquid_error), self.tension, self.width]
     }
 
-    /// Its coefficients with friction `gamma`.
     pub fn pair(&self, gamma: f64) -> WarrenPair {
         WarrenPair { a: A, b: self.b, gamma, rc: RC, rd: RD }
     }

@@ -16,7 +16,6 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Longest time that one run may take.
 const LIMIT: Duration = Duration::from_secs(3600);
 
 #[derive(Debug, Clone)]
@@ -87,7 +86,6 @@ pub fn prepare(place: &Place, subject: &Subject, with_tables: bool) -> Result<()
     Ok(())
 }
 
-/// Runs LAMMPS and returns what it says of the timed loop.
 pub fn run(
     place: &Place,
     subject: &Subject,
@@ -100,7 +98,6 @@ pub fn run(
     timed(&contender.id(), &place.lammps.run(contender.ranks, &place.work, &script, "none", LIMIT)?)
 }
 
-/// The names of the pair styles that the host has, by its own list.
 pub fn pair_styles(place: &Place) -> Result<HashSet<String>, ExperimentError> {
     let said = place.lammps.run(1, &place.work, "info styles pair\n", "none", LIMIT)?;
     Ok(said.split_whitespace().map(str::to_owned).collect())

@@ -49,7 +49,6 @@ pub struct Outcome {
     pub speeds: Vec<Speed>,
 }
 
-/// Times a GPU.
 pub fn run(options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let name = options.device.to_string();
     let found = gpus().map_err(RunError::from)?.into_iter().find(|found| found.device == name);

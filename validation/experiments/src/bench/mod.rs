@@ -93,7 +93,6 @@ struct Case {
     pairs: f64,
 }
 
-/// What the runs need.
 struct Bench<'a> {
     asked: &'a Asked,
     place: Place,

@@ -169,7 +169,6 @@ fn plot(outcome: &Benchmark, fluid: &'static str, title: &str) -> Plot {
     Plot { log_x: true, log_y: true, ..Plot::new(title, labels, series.collect()) }
 }
 
-/// `report.html`.
 pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
     let rounds = outcome.options.rounds;
     let mut speed = vec![Item::Prose(format!(

@@ -313,7 +313,6 @@ fn note(round: &Round, converged: bool, options: &Options, command: &str) -> Str
     )
 }
 
-/// Densities from `low` to `high`, evenly spaced.
 pub fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
     if low == high || points < 2 {
         return vec![low];

@@ -56,7 +56,6 @@ pub enum Goal {
 #[derive(Debug, Clone, Serialize)]
 pub struct Round {
     pub degree: usize,
-    /// What they were fitted to.
     pub goal: Goal,
     /// For each (β at α), row-major.
     pub fits: Vec<Fit>,

@@ -24,7 +24,6 @@ pub struct Conditions {
     pub densities: Option<Vec<f64>>,
 }
 
-/// Looks at `model` under `conditions`.
 pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, ExperimentError> {
     let fluid: Fluid = model.at(conditions.kt)?;
     if let Some(densities) = &conditions.densities

@@ -15,7 +15,6 @@ use psidpd_observe::drift;
 use psidpd_report::{Item, Plot, Section, Series, Style, Table};
 use serde_json::json;
 
-/// Seed of the start.
 pub const SEED: u64 = 20_010_703;
 
 /// Drift allowed over the run, in kT per particle.

@@ -81,7 +81,6 @@ pub struct Found {
 
 const TRIALS: usize = 5;
 
-/// Makes a model of `substance`.
 pub fn from_eos(
     substance: &Substance,
     options: &Options,

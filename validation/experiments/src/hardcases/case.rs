@@ -71,7 +71,6 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Inputs without a data file.
     pub fn new(
         model: impl Into<String>,
         kt: f64,

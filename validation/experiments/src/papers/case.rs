@@ -87,7 +87,6 @@ impl Reproduction {
         !self.values.is_empty() && self.values.iter().all(Compared::passes)
     }
 
-    /// Adds a value that is to equal a published one.
     pub fn equal(
         &mut self,
         name: impl Into<String>,
@@ -121,13 +120,11 @@ impl Reproduction {
         self.values.push_mut(Compared { name, measured, published, rule, own: false, allowance: None })
     }
 
-    /// Adds a plot of points with errors and of curves.
     pub fn plot(&mut self, file: &'static str, title: &str, axes: [&str; 2], series: Vec<Series>) {
         self.plots.push((file, Plot::new(title, axes, series)));
     }
 }
 
-/// Measured points in a plot.
 pub fn points(name: &str, points: &[(f64, Measured)]) -> Series {
     let errors = points.iter().map(|(_, y)| y.error).collect();
     Series::new(name, bare(points), Style::Points).with_errors(errors)

@@ -180,7 +180,6 @@ pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
     Ok(MeanField::new(&Model::parse("model.toml", model)?.at(kt)?)?)
 }
 
-/// A model file with other parameters.
 pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, ExperimentError> {
     let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
     let mut document: toml_edit::DocumentMut = model.parse().map_err(|_| missing("parameters"))?;

@@ -16,7 +16,6 @@ use psidpd_observe::{Observers, Series};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Longest time that one run may take.
 const LIMIT: Duration = Duration::from_secs(3600);
 
 #[derive(Debug)]

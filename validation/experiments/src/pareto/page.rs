@@ -194,7 +194,6 @@ pub fn explanation(outcome: &Comparison) -> String {
     )
 }
 
-/// `pareto.html`.
 pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));

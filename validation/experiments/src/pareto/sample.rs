@@ -102,7 +102,6 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
     Ok(found)
 }
 
-/// Makes a run.
 pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ExperimentError> {
     let (dt, every) = (origin.dt(physics), physics.interval());
     let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;
