@@ -73,19 +73,13 @@ impl Bulk<'_> {
         Ok(scene)
     }
 
-    /// Runs the fluid in `folder`.
     pub fn run(&self, model_file: &Path, folder: &Path) -> Result<Observed, RunError> {
-        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads)
+        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads, None)
     }
 }
 
-/// Runs a scene in `folder` and reads what it observed.
-pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) -> Result<Observed, RunError> {
-    run_with(scene, folder, begin, threads, None)
-}
-
-/// The same by an engine that is wrong on purpose, if there is a `fault`.
-pub fn run_with(
+/// Runs a scene in `folder` and reads what it observed; by an engine that is wrong on purpose, if there is a `fault`.
+pub fn run(
     scene: &Scene,
     folder: &Path,
     begin: Begin,
@@ -107,7 +101,6 @@ pub fn run_with(
 pub struct Observed(pub Vec<Observation>);
 
 impl Observed {
-    /// Reads what the run in a folder observed.
     pub fn read(folder: &Path) -> Result<Observed, RunError> {
         let path = folder.join("observables.json");
         let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };
@@ -122,6 +115,14 @@ impl Observed {
     /// A number by the names of its observation and column; nothing known where there is none.
     pub fn scalar(&self, name: &str, column: &str) -> Measured {
         self.get(name).and_then(|o| o.scalar(column)).unwrap_or(Measured::NONE)
+    }
+
+    /// A column of an observation against its abscissa; nothing where it was not observed.
+    pub fn profile(&self, name: &str, column: &str) -> Vec<(f64, Measured)> {
+        let Some(observation) = self.get(name) else { return Vec::new() };
+        let (Some(x), Some(y)) = (&observation.x, observation.get(column)) else { return Vec::new() };
+        let values = y.values.iter().zip(&y.errors).map(|(value, error)| [*value, *error].into());
+        x.values.iter().copied().zip(values).collect()
     }
 
     pub fn temperature(&self) -> Measured {

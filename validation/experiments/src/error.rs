@@ -48,7 +48,6 @@ pub enum ExperimentError {
     TooSmall(usize),
     #[error("measuring memory: {0}")]
     Memory(String),
-    /// No stage has a thermostat, whose temperature could be compared with.
     #[error(
         "no stage of the scene has a thermostat and a fixed temperature, so there is nothing to compare with"
     )]
@@ -57,7 +56,6 @@ pub enum ExperimentError {
     Stopped { what: String, source: Box<RunError> },
     #[error("the reference, {what}, is unstable: {why}; lower the dt of the scene")]
     Reference { what: String, why: String },
-    /// A tolerance for what the scene does not measure.
     #[error(
         "--tolerance {0}: nothing of this name was measured; a scene measures densities by interface_width or drop, the \
          tension by surface_tension or drop, and viscosities by viscosity or poiseuille, in its [observe]"

@@ -12,7 +12,6 @@ pub fn absolute_folder(path: &Path) -> Result<PathBuf, ExperimentError> {
     path.canonicalize().map_err(ExperimentError::io(path))
 }
 
-/// Writes results for other programs.
 pub fn write_json(path: &Path, results: &impl Serialize) -> Result<(), ExperimentError> {
     let text = serde_json::to_string_pretty(results).map_err(|e| ExperimentError::io(path)(e.into()))?;
     Ok(write_atomically(path, (text + "\n").as_bytes())?)

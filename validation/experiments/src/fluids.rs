@@ -135,7 +135,11 @@ pub const A: f64 = -40.0;
 pub const GAMMA: f64 = 18.0;
 
 impl WarrenSet {
-    /// Its coefficients with friction `gamma`.
+    /// Density of the liquid, tension and width, with their errors.
+    pub fn published(&self) -> [(f64, f64); 3] {
+        [(self.fluid.density, self.liquid_error), self.tension, self.width]
+    }
+
     pub fn pair(&self, gamma: f64) -> WarrenPair {
         WarrenPair { a: A, b: self.b, gamma, rc: RC, rd: RD }
     }

@@ -25,15 +25,8 @@ pub fn homogeneous(
     densities: &[f64],
     effort: Effort,
 ) -> Result<Headline, RunError> {
-    let sampling = Sampling {
-        particles: PARTICLES,
-        dt: effort.dt,
-        equilibrate: effort.steps / 3,
-        steps: effort.steps,
-        every: 10,
-        seed: 1,
-        threads: NonZeroUsize::MIN,
-    };
+    let (Effort { steps, dt }, equilibrate, threads) = (effort, effort.steps / 3, NonZeroUsize::MIN);
+    let sampling = Sampling { particles: PARTICLES, dt, equilibrate, steps, every: 10, seed: 1, threads };
     let bulk = Bulk { model, kt, densities, observe: "", sampling };
     in_a_folder(&bulk.scene(file)?)
 }

@@ -51,7 +51,7 @@ fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
     let species = model.species().len();
     let (mut mean_field, mut correlated, mut highest) = (Vec::new(), Vec::new(), None);
     for kt in scope.kts {
-        let Some(theory) = model.at(*kt).ok().and_then(|fluid| MeanField::new(&fluid).ok()) else { continue };
+        let Some(theory) = theory(model, *kt) else { continue };
         let at = |k: usize| 2.0 * scope.density * k as f64 / DENSITIES as f64;
         let pressure = |rho: f64| theory.pressure(&vec![rho / species as f64; species]);
         if let Ok(b) = theory.binodal() {
@@ -97,9 +97,29 @@ fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
     Series::new(name, points, Style::Line)
 }
 
-/// One curve over the critical point, from both of its sides.
-fn joined(low: &[(f64, f64)], critical: (f64, f64), high: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    low.iter().chain(&[critical]).chain(high.iter().rev()).copied().collect()
+fn theory(model: &Model, kt: f64) -> Option<MeanField> {
+    MeanField::new(&model.at(kt).ok()?).ok()
+}
+
+/// Binodal and spinodal, each one curve over the critical point `top` from both of its sides. `interface` sees the theory of
+/// every temperature.
+fn diagram(
+    model: &Model,
+    top: (f64, f64),
+    sides: impl Fn(&MeanField) -> [Option<[f64; 2]>; 2],
+    mut interface: impl FnMut(f64, &MeanField),
+) -> Vec<Series> {
+    let mut curves: [[Vec<(f64, f64)>; 2]; 2] = Default::default();
+    for kt in below(top.1) {
+        let Some(theory) = theory(model, kt) else { continue };
+        for (curves, found) in curves.iter_mut().zip(sides(&theory)) {
+            curves.iter_mut().zip(found.into_iter().flatten()).for_each(|(curve, x)| curve.push((x, kt)));
+        }
+        interface(kt, &theory);
+    }
+    let [binodal, spinodal] =
+        curves.map(|[low, high]| low.into_iter().chain([top]).chain(high.into_iter().rev()).collect());
+    vec![line("binodal", binodal), Series::new("spinodal", spinodal, Style::Dashed)]
 }
 
 fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
@@ -107,33 +127,20 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         Ok(critical) => critical,
         Err(error) => return Ok(vec![Item::Prose(format!("{error}."))]),
     };
-    let mut curves: [Vec<(f64, f64)>; 4] = std::array::from_fn(|_| Vec::new());
     let (mut tension, mut width, mut reasons) = (Vec::new(), Vec::new(), Vec::new());
-    for kt in below(critical.parameter) {
-        let Some(theory) = model.at(kt).ok().and_then(|fluid| MeanField::new(&fluid).ok()) else { continue };
-        if let Ok(b) = theory.binodal() {
-            curves[0].push((b.vapour, kt));
-            curves[1].push((b.liquid, kt));
-        }
-        if let Some([low, high]) = theory.spinodal().ok().and_then(|s| s.first().copied()) {
-            curves[2].push((low, kt));
-            curves[3].push((high, kt));
-        }
-        match theory.interface(101) {
-            Ok(i) => {
-                tension.push((kt, i.tension));
-                width.push((kt, i.width));
-            }
-            Err(error) => reasons.push(format!("kT = {kt:.4}: {error}")),
-        }
-    }
-    let [vapour, liquid, low, high] = curves;
     let top = (critical.density, critical.parameter);
-    let series = vec![
-        line("binodal", joined(&vapour, top, &liquid)),
-        Series::new("spinodal", joined(&low, top, &high), Style::Dashed),
-        Series::new("critical point", vec![top], Style::Points),
-    ];
+    let sides = |theory: &MeanField| {
+        let spinodal = theory.spinodal().ok().and_then(|s| s.first().copied());
+        [theory.binodal().ok().map(|b| [b.vapour, b.liquid]), spinodal]
+    };
+    let mut series = diagram(model, top, sides, |kt, theory| match theory.interface(101) {
+        Ok(i) => {
+            tension.push((kt, i.tension));
+            width.push((kt, i.width));
+        }
+        Err(error) => reasons.push(format!("kT = {kt:.4}: {error}")),
+    });
+    series.push(Series::new("critical point", vec![top], Style::Points));
     let diagram = Plot::new("Phase diagram", [DENSITY, TEMPERATURE], series);
     let mut items = vec![Item::figure(
         &diagram,
@@ -173,32 +180,16 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
         Ok(critical) => critical,
         Err(error) => return Ok(vec![Item::Prose(format!("At density {}: {error}.", scope.density))]),
     };
-    let mut curves: [Vec<(f64, f64)>; 4] = std::array::from_fn(|_| Vec::new());
     let mut tension = Vec::new();
-    for kt in below(critical.parameter) {
-        let Some(theory) = model.at(kt).ok().and_then(|fluid| MeanField::new(&fluid).ok()) else { continue };
-        let c = critical.composition;
-        if let Ok(phases) = theory.coexistence([c * scope.density, (1.0 - c) * scope.density]) {
-            let [low, high] = phases.composition();
-            curves[0].push((low, kt));
-            curves[1].push((high, kt));
-        }
-        if let Some([low, high]) =
-            theory.composition_spinodal(scope.density).ok().and_then(|s| s.first().copied())
-        {
-            curves[2].push((low, kt));
-            curves[3].push((high, kt));
-        }
-        if let Ok(i) = theory.composition_interface(scope.density, 101) {
-            tension.push((kt, i.tension));
-        }
-    }
-    let [poor, rich, low, high] = curves;
-    let top = (critical.composition, critical.parameter);
-    let series = vec![
-        line("binodal", joined(&poor, top, &rich)),
-        Series::new("spinodal", joined(&low, top, &high), Style::Dashed),
-    ];
+    let c = critical.composition;
+    let sides = |theory: &MeanField| {
+        let phases = theory.coexistence([c * scope.density, (1.0 - c) * scope.density]);
+        let spinodal = theory.composition_spinodal(scope.density).ok();
+        [phases.ok().map(|phases| phases.composition()), spinodal.and_then(|s| s.first().copied())]
+    };
+    let series = diagram(model, (c, critical.parameter), sides, |kt, theory| {
+        tension.extend(theory.composition_interface(scope.density, 101).ok().map(|i| (kt, i.tension)));
+    });
     let title = format!("Composition diagram at density {}", scope.density);
     let diagram = Plot::new(title, [of.as_str(), TEMPERATURE], series);
     let caption = format!(

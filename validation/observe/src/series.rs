@@ -39,6 +39,38 @@ impl Measured {
     pub fn times(self, factor: f64) -> Measured {
         Measured { value: self.value * factor, error: self.error * factor.abs() }
     }
+
+    /// The sum of two independent values.
+    pub fn plus(self, other: Measured) -> Measured {
+        Measured { value: self.value + other.value, error: self.error.hypot(other.error) }
+    }
+
+    /// The difference of two independent values.
+    pub fn minus(self, other: impl Into<Measured>) -> Measured {
+        let other = other.into();
+        Measured { value: self.value - other.value, error: self.error.hypot(other.error) }
+    }
+
+    /// The quotient of two independent values.
+    pub fn over(self, other: impl Into<Measured>) -> Measured {
+        let other = other.into();
+        let value = self.value / other.value;
+        Measured { value, error: (self.error / other.value).hypot(value * other.error / other.value) }
+    }
+}
+
+/// A number that is exact, or has only rounding errors.
+impl From<f64> for Measured {
+    fn from(value: f64) -> Measured {
+        Measured { value, error: 0.0 }
+    }
+}
+
+/// A value and its error.
+impl From<[f64; 2]> for Measured {
+    fn from([value, error]: [f64; 2]) -> Measured {
+        Measured { value, error }
+    }
 }
 
 /// A series of vectors of one width, stored as means of consecutive blocks. Up to [`MOST_ROWS`] samples each block is one

@@ -3,7 +3,7 @@ use super::*;
 use psidpd_core::engine::{Pool, Precision, at_once};
 use psidpd_dynamics::device::Device;
 use psidpd_dynamics::run::{Advice, Begin, FILES, Outcome, Runner, Start, Summary, Timing};
-use psidpd_experiments::check::calibration;
+use psidpd_experiments::check::uncalibrated;
 use psidpd_report::{Headline, headline, write_run_report};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let mut scene = settings.scene(path)?;
     scene.precision = precision.or(scene.precision);
     scene.device = device.unwrap_or(scene.device);
-    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt)?) {
+    if let Some(warning) = uncalibrated(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
     }
     let begin = match (resume, overwrite) {

@@ -65,7 +65,6 @@ impl Contender {
         self.settings().map_or(words.unwrap_or(1), |settings| settings.threads.get())
     }
 
-    /// The precision, where one was asked for.
     pub fn precision(&self) -> Option<String> {
         let words = word_after(&self.words, "precision").map(str::to_owned);
         self.settings().map(|settings| settings.precision.to_string()).or(words)

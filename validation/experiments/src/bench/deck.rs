@@ -8,7 +8,7 @@ use crate::fluids::{GAMMA, SET6, Subject};
 use crate::lammps::deck::Deck;
 use crate::lammps::host::PluginHost;
 use crate::lammps::log::{Loop, timed};
-use crate::lammps::style::{GRID, PairStyle};
+use crate::lammps::style::GRID;
 use crate::start::{SEED, Start};
 use psidpd_core::model::ForceLaw;
 use psidpd_lammps_host::export::eam;
@@ -16,25 +16,12 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Longest time that one run may take.
 const LIMIT: Duration = Duration::from_secs(3600);
 
 #[derive(Debug, Clone)]
 pub struct Place {
     pub lammps: PluginHost,
     pub work: PathBuf,
-}
-
-/// The pair style of a contender; the native runner has none.
-fn style(place: &Place, subject: &Subject, contender: &Contender) -> Option<PairStyle> {
-    contender.code.style(Told {
-        model: model(place, subject).display().to_string(),
-        tables: tables(place, subject).display().to_string(),
-        species: subject.species.join(" "),
-        pair: SET6.pair(GAMMA),
-        law: ForceLaw::Conservative,
-        words: contender.words.clone(),
-    })
 }
 
 /// The commands: everything as a user of LAMMPS would have it, with no output within the timed loop but the one
@@ -47,7 +34,16 @@ fn deck(
     skin: f64,
     length: Length,
 ) -> Option<String> {
-    let style = style(place, subject, contender)?;
+    let [model, tables] = files(place, subject).map(|path| path.display().to_string());
+    let told = Told {
+        model,
+        tables,
+        species: subject.species.join(" "),
+        pair: SET6.pair(GAMMA),
+        law: ForceLaw::Conservative,
+        words: contender.words.clone(),
+    };
+    let style = contender.code.style(told)?;
     let data = if contender.code == Code::Mdpd { &start.data_mdpd } else { &start.data };
     // On one rank the styles need no ghosts: none that forces are sent back from, and none that are found in time.
     let alone = contender.needs_no_ghosts();
@@ -74,27 +70,22 @@ fn deck(
     ))
 }
 
-fn tables(place: &Place, subject: &Subject) -> PathBuf {
-    place.work.join(format!("{}.eam.alloy", subject.name))
-}
-
-fn model(place: &Place, subject: &Subject) -> PathBuf {
-    place.work.join(format!("{}.toml", subject.name))
+/// Model file and tables of a fluid.
+fn files(place: &Place, subject: &Subject) -> [PathBuf; 2] {
+    ["toml", "eam.alloy"].map(|end| place.work.join(format!("{}.{end}", subject.name)))
 }
 
 /// Writes what decks of a fluid refer to.
 pub fn prepare(place: &Place, subject: &Subject, with_tables: bool) -> Result<(), ExperimentError> {
     std::fs::create_dir_all(&place.work).map_err(ExperimentError::io(&place.work))?;
-    let path = model(place, subject);
-    std::fs::write(&path, subject.text).map_err(ExperimentError::io(&path))?;
+    let [model, tables] = files(place, subject);
+    std::fs::write(&model, subject.text).map_err(ExperimentError::io(&model))?;
     if with_tables {
-        let fluid = subject.model()?.at(1.0)?;
-        eam::write(&fluid, &[1.0], GRID, &tables(place, subject))?;
+        eam::write(&subject.model()?.at(1.0)?, &[1.0], GRID, &tables)?;
     }
     Ok(())
 }
 
-/// Runs LAMMPS and returns what it says of the timed loop.
 pub fn run(
     place: &Place,
     subject: &Subject,
@@ -107,7 +98,6 @@ pub fn run(
     timed(&contender.id(), &place.lammps.run(contender.ranks, &place.work, &script, "none", LIMIT)?)
 }
 
-/// The names of the pair styles that the host has, by its own list.
 pub fn pair_styles(place: &Place) -> Result<HashSet<String>, ExperimentError> {
     let said = place.lammps.run(1, &place.work, "info styles pair\n", "none", LIMIT)?;
     Ok(said.split_whitespace().map(str::to_owned).collect())

@@ -49,7 +49,6 @@ pub struct Outcome {
     pub speeds: Vec<Speed>,
 }
 
-/// Times a GPU.
 pub fn run(options: &Options, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let name = options.device.to_string();
     let found = gpus().map_err(RunError::from)?.into_iter().find(|found| found.device == name);
@@ -104,7 +103,7 @@ fn speed(options: &Options, subject: &Subject, size: usize) -> Result<Speed, Exp
         fluid: subject.name,
         particles: state.len(),
         steps,
-        particle_steps_per_second: Spread::of(&rates).unwrap_or(Spread { min: 0.0, median: 0.0, max: 0.0 }),
+        particle_steps_per_second: Spread::of(&rates).unwrap_or_default(),
         bytes_per_particle: gpu.memory_bytes() as f64 / count,
         kernels,
         portable_cpu: cpu.map(|cpu| count * cpu.steps as f64 / cpu.seconds),
@@ -127,15 +126,8 @@ fn repeated(small: &State, times: usize) -> Result<State, ExperimentError> {
 
 impl Outcome {
     pub fn table(&self) -> Table {
-        let header = [
-            "fluid",
-            "particles",
-            "particle-steps/s",
-            "(lowest–highest)",
-            "bytes/particle",
-            "one CPU thread, portable",
-        ];
-        let mut table = Table::new(header);
+        let speed = ["particle-steps/s", "(lowest–highest)", "bytes/particle", "one CPU thread, portable"];
+        let mut table = Table::new(["fluid", "particles"].into_iter().chain(speed));
         for s in &self.speeds {
             let Spread { min, median, max } = s.particle_steps_per_second;
             table.push([

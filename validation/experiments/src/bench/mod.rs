@@ -93,7 +93,13 @@ struct Case {
     pairs: f64,
 }
 
-type Cases = BTreeMap<(&'static str, usize), Case>;
+struct Bench<'a> {
+    asked: &'a Asked,
+    place: Place,
+    /// By fluid and size.
+    cases: BTreeMap<(&'static str, usize), Case>,
+    progress: &'a Progress,
+}
 
 /// Runs the benchmark and writes `bench.json` and `report.html`. `program` is psidpd itself, which is
 /// started to measure memory.
@@ -105,21 +111,22 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     spinner.finish();
 
     let (choice, missing) = choice(options, &place)?;
-    let (cases, mut entries) = entries(options, &choice, &place, &out, progress)?;
-    calibrate(options, &cases, &place, &mut entries, progress)?;
-    time(options.asked.rounds, &cases, &place, &mut entries, progress)?;
+    let mut bench = Bench { asked: &options.asked, place, cases: BTreeMap::new(), progress };
+    let mut entries = bench.entries(&choice, &out)?;
+    bench.calibrate(&mut entries)?;
+    bench.time(&mut entries)?;
 
     let spinner = progress.spinner("memory and threads");
     let memory = match &options.memory[..] {
         [] => Vec::new(),
         sizes => memory::measure(program, sizes)?,
     };
-    let equal_bits = equal_bits(options, &cases)?;
+    let equal_bits = bench.equal_bits()?;
     spinner.finish();
 
-    let runs = runs(&entries, &cases);
-    let (fluids, slope_widths) = facts()?;
-    let scaling = scaling(&runs, &entries, slope_widths["mdpd"]);
+    let runs = bench.runs(&entries);
+    let fluids = SUBJECTS.iter().map(facts).collect::<Result<Vec<_>, _>>()?;
+    let scaling = scaling(&runs, &entries, facts(&MDPD)?.slope_width);
     let outcome = Benchmark {
         format: 3,
         version: env!("CARGO_PKG_VERSION"),
@@ -178,45 +185,6 @@ fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), Exp
     Ok((choice, missing))
 }
 
-fn entries(
-    options: &Options,
-    choice: &Choice,
-    place: &Place,
-    out: &Path,
-    progress: &Progress,
-) -> Result<(Cases, Vec<Entry>), ExperimentError> {
-    let smallest = options.asked.sizes.iter().min().copied();
-    let (mut cases, mut entries) = (Cases::new(), Vec::new());
-    for &size in &options.asked.sizes {
-        for subject in SUBJECTS {
-            let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
-            let start = start::kept(&subject, size, &out.join("starts"))?;
-            spinner.finish();
-            let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
-            let pairs = pairs::pairs_per_particle(&start.state, cutoff);
-            cases.insert((subject.name, size), Case { start, pairs });
-            deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
-            let field =
-                Field::of(size, Some(size) == smallest, options.asked.every_code, options.asked.few_above);
-            for contender in contender::contenders(&subject, choice, field) {
-                entries.push(Entry {
-                    subject,
-                    size,
-                    contender,
-                    length: Length { warm_up: 5, steps: options.asked.steps.unwrap_or(FEWEST) },
-                    skin: SKIN,
-                    step: None,
-                    seconds: Vec::new(),
-                    parts: Vec::new(),
-                    ghosts: None,
-                    builds: None,
-                });
-            }
-        }
-    }
-    Ok((cases, entries))
-}
-
 /// Speed and skin of a contender, measured at its smallest size and used for all.
 #[derive(Clone, Copy)]
 struct Pace {
@@ -225,164 +193,197 @@ struct Pace {
     seconds: f64,
 }
 
-/// Finds the pace of each contender and the fastest skin of those in LAMMPS, at the smallest size that has them, and
-/// steps that fill the time of a run: at all sizes, since neither depends much on the size.
-fn calibrate(
-    options: &Options,
-    cases: &Cases,
-    place: &Place,
-    entries: &mut [Entry],
-    progress: &Progress,
-) -> Result<(), ExperimentError> {
-    if options.asked.steps.is_some() {
-        return Ok(());
-    }
-    let mut order: Vec<usize> = (0..entries.len()).collect();
-    order.sort_by_key(|k| entries[*k].size);
-    let key = |entry: &Entry| (entry.subject.name, entry.contender.id());
-    let all: BTreeSet<_> = entries.iter().map(key).collect();
-    let bar = progress.bar("calibration", all.len() as u64);
-    let mut paces = BTreeMap::new();
-    for k in order {
-        let entry = &mut entries[k];
-        let pace: Pace = match paces.get(&key(entry)) {
-            Some(pace) => *pace,
-            None => {
-                let pace = pace(options, cases, place, entry)?;
-                paces.insert(key(entry), pace);
-                bar.advance(1);
-                pace
+impl Bench<'_> {
+    fn entries(&mut self, choice: &Choice, out: &Path) -> Result<Vec<Entry>, ExperimentError> {
+        let smallest = self.asked.sizes.iter().min().copied();
+        let mut entries = Vec::new();
+        for &size in &self.asked.sizes {
+            for subject in SUBJECTS {
+                let spinner = self.progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
+                let start = start::kept(&subject, size, &out.join("starts"))?;
+                spinner.finish();
+                let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
+                let pairs = pairs::pairs_per_particle(&start.state, cutoff);
+                self.cases.insert((subject.name, size), Case { start, pairs });
+                deck::prepare(&self.place, &subject, subject == MDPD && choice.eam)?;
+                let field =
+                    Field::of(size, Some(size) == smallest, self.asked.every_code, self.asked.few_above);
+                for contender in contender::contenders(&subject, choice, field) {
+                    entries.push(Entry {
+                        subject,
+                        size,
+                        contender,
+                        length: Length { warm_up: 5, steps: self.asked.steps.unwrap_or(FEWEST) },
+                        skin: SKIN,
+                        step: None,
+                        seconds: Vec::new(),
+                        parts: Vec::new(),
+                        ghosts: None,
+                        builds: None,
+                    });
+                }
             }
-        };
-        let step = pace.seconds * entry.particles();
-        (entry.skin, entry.step) = (pace.skin, Some(step));
-        entry.length = Length::within(options.asked.seconds, &entry.contender, step);
+        }
+        Ok(entries)
     }
-    bar.finish();
-    Ok(())
-}
 
-fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, ExperimentError> {
-    // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
-    let large = entry.size > options.asked.few_above;
-    entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
-    let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
-    // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
-    let skins = if entry.contender.needs_no_ghosts() { [0.0; SKINS.len()] } else { SKINS };
-    for skin in skins {
-        let seconds =
-            once(entry, cases, place, skin)?.seconds / (entry.length.steps as f64 * entry.particles());
-        if seconds < pace.seconds {
-            pace = Pace { skin, seconds };
+    /// Finds the pace of each contender and the fastest skin of those in LAMMPS, at the smallest size that has them, and
+    /// steps that fill the time of a run: at all sizes, since neither depends much on the size.
+    fn calibrate(&self, entries: &mut [Entry]) -> Result<(), ExperimentError> {
+        if self.asked.steps.is_some() {
+            return Ok(());
+        }
+        let mut order: Vec<usize> = (0..entries.len()).collect();
+        order.sort_by_key(|k| entries[*k].size);
+        let key = |entry: &Entry| (entry.subject.name, entry.contender.id());
+        let all: BTreeSet<_> = entries.iter().map(key).collect();
+        let bar = self.progress.bar("calibration", all.len() as u64);
+        let mut paces = BTreeMap::new();
+        for k in order {
+            let entry = &mut entries[k];
+            let pace: Pace = match paces.get(&key(entry)) {
+                Some(pace) => *pace,
+                None => {
+                    let pace = self.pace(entry)?;
+                    paces.insert(key(entry), pace);
+                    bar.advance(1);
+                    pace
+                }
+            };
+            let step = pace.seconds * entry.particles();
+            (entry.skin, entry.step) = (pace.skin, Some(step));
+            entry.length = Length::within(self.asked.seconds, &entry.contender, step);
+        }
+        bar.finish();
+        Ok(())
+    }
+
+    fn pace(&self, entry: &mut Entry) -> Result<Pace, ExperimentError> {
+        // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
+        let large = entry.size > self.asked.few_above;
+        entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
+        let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
+        // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
+        let skins = if entry.contender.needs_no_ghosts() { [0.0; SKINS.len()] } else { SKINS };
+        for skin in skins {
+            let seconds = self.once(entry, skin)?.seconds / (entry.length.steps as f64 * entry.particles());
+            if seconds < pace.seconds {
+                pace = Pace { skin, seconds };
+            }
+        }
+        Ok(pace)
+    }
+
+    fn time(&self, entries: &mut [Entry]) -> Result<(), ExperimentError> {
+        let rounds = self.asked.rounds;
+        let runs: Vec<_> = entries.iter().map(|e| (e.subject.name, e.size)).collect();
+        let mut order = turns::turns(&runs);
+        // By the time that runs are expected to take: one in a large box takes as long as many in a small one.
+        let all = rounds as f64 * entries.iter().map(Entry::weight).sum::<f64>();
+        let bar = self.progress.bar("rounds", all.ceil() as u64);
+        let mut done = 0.0;
+        for _ in 0..rounds {
+            for &k in &order {
+                self.measure(&mut entries[k])?;
+                done += entries[k].weight();
+                bar.set(done as u64);
+            }
+            // Alternate the order, so that neighbours in time do not matter.
+            order.reverse();
+        }
+        bar.finish();
+        Ok(())
+    }
+
+    fn once(&self, entry: &Entry, skin: f64) -> Result<Loop, ExperimentError> {
+        let start = &self.cases[&(entry.subject.name, entry.size)].start;
+        match entry.contender.in_lammps() {
+            true => deck::run(&self.place, &entry.subject, &entry.contender, start, skin, entry.length),
+            false => native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length),
         }
     }
-    Ok(pace)
-}
 
-fn time(
-    rounds: usize,
-    cases: &Cases,
-    place: &Place,
-    entries: &mut [Entry],
-    progress: &Progress,
-) -> Result<(), ExperimentError> {
-    let runs: Vec<_> = entries.iter().map(|e| (e.subject.name, e.size)).collect();
-    let mut order = turns::turns(&runs);
-    // By the time that runs are expected to take: one in a large box takes as long as many in a small one.
-    let all = rounds as f64 * entries.iter().map(Entry::weight).sum::<f64>();
-    let bar = progress.bar("rounds", all.ceil() as u64);
-    let mut done = 0.0;
-    for _ in 0..rounds {
-        for &k in &order {
-            measure(&mut entries[k], cases, place)?;
-            done += entries[k].weight();
-            bar.set(done as u64);
+    fn measure(&self, entry: &mut Entry) -> Result<(), ExperimentError> {
+        let made = self.once(entry, entry.skin)?;
+        entry.seconds.push(made.seconds);
+        entry.parts.push(made.parts);
+        if entry.contender.in_lammps() {
+            entry.ghosts = Some(made.ghosts);
+            entry.builds = Some(entry.builds.unwrap_or(0) + made.builds);
         }
-        // Alternate the order, so that neighbours in time do not matter.
-        order.reverse();
+        Ok(())
     }
-    bar.finish();
-    Ok(())
-}
 
-fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Loop, ExperimentError> {
-    let start = &cases[&(entry.subject.name, entry.size)].start;
-    match entry.contender.in_lammps() {
-        true => deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length),
-        false => native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length),
+    fn runs(&self, entries: &[Entry]) -> Vec<Timed> {
+        let median = |values: &[f64]| Spread::of(values).map_or(0.0, |s| s.median);
+        let mut runs: Vec<Timed> = entries
+            .iter()
+            .map(|entry| {
+                let case = &self.cases[&(entry.subject.name, entry.size)];
+                let particles = case.start.state.len() * entry.contender.copies();
+                let all = particles as f64 * entry.length.steps as f64;
+                let names = entry.parts.first().into_iter().flat_map(BTreeMap::keys);
+                let part = |name: &String| {
+                    let of = |p: &BTreeMap<String, f64>| 1e9 * p.get(name).copied().unwrap_or(0.0) / all;
+                    (name.clone(), median(&entry.parts.iter().map(of).collect::<Vec<_>>()))
+                };
+                let per_particle = 1e9 * median(&entry.seconds) / all;
+                let settings = entry.contender.settings();
+                let steps = entry.length.steps * entry.seconds.len() as u64;
+                let mut run = Timed {
+                    fluid: entry.subject.name,
+                    size: entry.size,
+                    code: entry.contender.id(),
+                    particles,
+                    pairs_per_particle: case.pairs,
+                    ranks: entry.contender.ranks,
+                    threads: entry.contender.threads(),
+                    precision: entry.contender.precision(),
+                    instructions: settings.map(|s| s.instructions.to_string()),
+                    skin: entry.contender.in_lammps().then_some(entry.skin),
+                    steps: entry.length.steps,
+                    seconds: entry.seconds.clone(),
+                    mega_particle_steps_per_second: Spread::default(),
+                    nanoseconds_per_particle_step: per_particle,
+                    nanoseconds_per_pair: per_particle / case.pairs,
+                    ratio_to_built_in: None,
+                    parts: names.map(part).collect(),
+                    ghosts: entry.ghosts,
+                    steps_between_builds: entry.builds.map(|b| steps as f64 / b.max(1) as f64),
+                };
+                run.mega_particle_steps_per_second = Spread::of(&run.rates()).unwrap_or_default();
+                run
+            })
+            .collect();
+        let ratios: Vec<Option<Spread>> = runs
+            .iter()
+            .zip(entries)
+            .map(|(run, entry)| {
+                let reference = contender::reference(&entry.subject)?.id();
+                let same = |r: &&Timed| r.fluid == run.fluid && r.size == run.size && r.code == reference;
+                Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())
+            })
+            .collect();
+        for (run, ratio) in runs.iter_mut().zip(ratios) {
+            run.ratio_to_built_in = ratio;
+        }
+        runs
     }
-}
 
-fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), ExperimentError> {
-    let made = once(entry, cases, place, entry.skin)?;
-    entry.seconds.push(made.seconds);
-    entry.parts.push(made.parts);
-    if entry.contender.in_lammps() {
-        entry.ghosts = Some(made.ghosts);
-        entry.builds = Some(entry.builds.unwrap_or(0) + made.builds);
-    }
-    Ok(())
-}
-
-fn median(values: &[f64]) -> f64 {
-    Spread::of(values).map_or(0.0, |s| s.median)
-}
-
-fn runs(entries: &[Entry], cases: &Cases) -> Vec<Timed> {
-    let mut runs: Vec<Timed> = entries
-        .iter()
-        .map(|entry| {
-            let case = &cases[&(entry.subject.name, entry.size)];
-            let particles = case.start.state.len() * entry.contender.copies();
-            let all = particles as f64 * entry.length.steps as f64;
-            let names = entry.parts.first().into_iter().flat_map(BTreeMap::keys);
-            let part = |name: &String| {
-                let of = |p: &BTreeMap<String, f64>| 1e9 * p.get(name).copied().unwrap_or(0.0) / all;
-                (name.clone(), median(&entry.parts.iter().map(of).collect::<Vec<_>>()))
-            };
-            let per_particle = 1e9 * median(&entry.seconds) / all;
-            let settings = entry.contender.settings();
-            let steps = entry.length.steps * entry.seconds.len() as u64;
-            let mut run = Timed {
-                fluid: entry.subject.name,
-                size: entry.size,
-                code: entry.contender.id(),
-                particles,
-                pairs_per_particle: case.pairs,
-                ranks: entry.contender.ranks,
-                threads: entry.contender.threads(),
-                precision: entry.contender.precision(),
-                instructions: settings.map(|s| s.instructions.to_string()),
-                skin: entry.contender.in_lammps().then_some(entry.skin),
-                steps: entry.length.steps,
-                seconds: entry.seconds.clone(),
-                mega_particle_steps_per_second: Spread { min: 0.0, median: 0.0, max: 0.0 },
-                nanoseconds_per_particle_step: per_particle,
-                nanoseconds_per_pair: per_particle / case.pairs,
-                ratio_to_built_in: None,
-                parts: names.map(part).collect(),
-                ghosts: entry.ghosts,
-                steps_between_builds: entry.builds.map(|b| steps as f64 / b.max(1) as f64),
-            };
-            if let Some(rate) = Spread::of(&run.rates()) {
-                run.mega_particle_steps_per_second = rate;
+    fn equal_bits(&self) -> Result<BTreeMap<String, bool>, ExperimentError> {
+        let smallest = self.asked.sizes.iter().min().copied().unwrap_or_default();
+        let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
+        let mut equal = BTreeMap::new();
+        for subject in &SUBJECTS {
+            let Some(case) = self.cases.get(&(subject.name, smallest)) else { continue };
+            for (name, precision) in Precision::ALL {
+                let settings = Settings { precision, ..Settings::default() };
+                let same = native::equal_on_threads(subject, &case.start.state, settings, &threads)?;
+                equal.insert(format!("{} {name}", subject.name), same);
             }
-            run
-        })
-        .collect();
-    let ratios: Vec<Option<Spread>> = runs
-        .iter()
-        .zip(entries)
-        .map(|(run, entry)| {
-            let reference = contender::reference(&entry.subject)?.id();
-            let same = |r: &&Timed| r.fluid == run.fluid && r.size == run.size && r.code == reference;
-            Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())
-        })
-        .collect();
-    for (run, ratio) in runs.iter_mut().zip(ratios) {
-        run.ratio_to_built_in = ratio;
+        }
+        Ok(equal)
     }
-    runs
 }
 
 fn scaling(runs: &[Timed], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
@@ -414,37 +415,10 @@ fn bytes_per_ghost(slope_width: usize) -> f64 {
     (6 + slope_width + 3) as f64 * 8.0
 }
 
-fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), ExperimentError> {
-    let mut widths = BTreeMap::new();
-    let mut facts = Vec::new();
-    for subject in &SUBJECTS {
-        let fluid = subject.model()?.at(1.0)?;
-        let plan = Plan::new(&fluid).map_err(|e| ExperimentError::Run(e.into()))?;
-        widths.insert(subject.name, plan.slope_width());
-        facts.push(FluidFacts {
-            name: subject.name,
-            title: subject.title,
-            density: subject.density,
-            dt: subject.dt,
-            slope_width: plan.slope_width(),
-        });
-    }
-    Ok((facts, widths))
-}
-
-fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, ExperimentError> {
-    let smallest = options.asked.sizes.iter().min().copied().unwrap_or_default();
-    let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
-    let mut equal = BTreeMap::new();
-    for subject in &SUBJECTS {
-        let Some(case) = cases.get(&(subject.name, smallest)) else { continue };
-        for (name, precision) in Precision::ALL {
-            let settings = Settings { precision, ..Settings::default() };
-            let same = native::equal_on_threads(subject, &case.start.state, settings, &threads)?;
-            equal.insert(format!("{} {name}", subject.name), same);
-        }
-    }
-    Ok(equal)
+fn facts(subject: &Subject) -> Result<FluidFacts, ExperimentError> {
+    let Subject { name, title, density, dt, .. } = *subject;
+    let plan = Plan::new(&subject.model()?.at(1.0)?).map_err(|e| ExperimentError::Run(e.into()))?;
+    Ok(FluidFacts { name, title, density, dt, slope_width: plan.slope_width() })
 }
 
 /// Instruction sets better than the one that the engine takes, each with what the processor lacks for it.

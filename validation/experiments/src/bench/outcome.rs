@@ -91,7 +91,6 @@ pub struct Timed {
     pub steps: u64,
     /// Wall seconds of each round.
     pub seconds: Vec<f64>,
-    /// Millions of particle-steps per second.
     pub mega_particle_steps_per_second: Spread,
     /// Nanoseconds per particle and step: the median.
     pub nanoseconds_per_particle_step: f64,
@@ -124,7 +123,6 @@ pub struct Scaling {
     pub ranks: usize,
     pub speed_up: Spread,
     pub efficiency: Spread,
-    /// Ghosts of a rank.
     pub ghosts: f64,
     /// Bytes that a rank sends in a step for its ghosts, computed: positions, velocities, slopes, forces.
     pub bytes_per_step: Option<f64>,

@@ -53,14 +53,11 @@ pub fn fastest(outcome: &Benchmark) -> Table {
             let runs = outcome.runs.iter().filter(here).filter(|r| !r.code.ends_with("weak"));
             runs.max_by(|a, b| rate(a).total_cmp(&rate(b))).map(|r| (r, rate(r)))
         };
-        let shown = |run: Option<(&Timed, f64)>| match run {
-            Some((run, rate)) => [run.code.clone(), format!("{rate:.2}")],
-            None => ["–".to_owned(), "–".to_owned()],
-        };
-        let [native, lammps] = [true, false].map(of);
-        let Some(particles) = native.or(lammps).map(|(run, _)| run.particles) else { continue };
-        let [native, lammps] = [shown(native), shown(lammps)];
-        table.push([fluid.to_owned(), particles.to_string()].into_iter().chain(native).chain(lammps));
+        let shown = |(run, rate): (&Timed, f64)| [run.code.clone(), format!("{rate:.2}")];
+        let both = [true, false].map(of);
+        let Some(particles) = both.iter().flatten().next().map(|(run, _)| run.particles) else { continue };
+        let both = both.into_iter().flat_map(|run| run.map_or_else(|| ["–", "–"].map(Into::into), shown));
+        table.push([fluid.to_owned(), particles.to_string()].into_iter().chain(both));
     }
     table
 }
@@ -74,14 +71,12 @@ pub fn instructions(machine: &Machine) -> String {
 
 /// Where the time goes natively, in the fastest precision on one thread.
 pub fn native_parts(outcome: &Benchmark) -> Table {
-    let mixed = format!("native mixed {} 1", Instructions::best());
-    parts(outcome, |r| r.code == mixed, &NATIVE_PARTS)
+    parts(outcome, |r| r.code == format!("native mixed {} 1", Instructions::best()), &NATIVE_PARTS)
 }
 
 /// Where the time goes in LAMMPS with the plugin, on one thread of one rank.
 pub fn plugin_parts(outcome: &Benchmark) -> Table {
-    let mixed = "plugin dpd/psi precision mixed";
-    parts(outcome, |r| r.code == mixed, &LAMMPS_PARTS)
+    parts(outcome, |r| r.code == "plugin dpd/psi precision mixed", &LAMMPS_PARTS)
 }
 
 const NATIVE_PARTS: [&str; 6] = ["sort", "pairs", "psi", "many-body", "forces", "integrate"];
@@ -114,16 +109,8 @@ fn parts(outcome: &Benchmark, wanted: impl Fn(&Timed) -> bool, names: &[&str]) -
 }
 
 fn scaling(outcome: &Benchmark) -> Table {
-    let mut table = Table::new([
-        "code",
-        "kind",
-        "size",
-        "ranks",
-        "speed-up",
-        "ghosts",
-        "kB sent, computed",
-        "µs in comm",
-    ]);
+    let header = ["code", "kind", "size", "ranks", "speed-up", "ghosts", "kB sent, computed", "µs in comm"];
+    let mut table = Table::new(header);
     for s in &outcome.scaling {
         table.push([
             s.code.clone(),
@@ -182,7 +169,6 @@ fn plot(outcome: &Benchmark, fluid: &'static str, title: &str) -> Plot {
     Plot { log_x: true, log_y: true, ..Plot::new(title, labels, series.collect()) }
 }
 
-/// `report.html`.
 pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
     let rounds = outcome.options.rounds;
     let mut speed = vec![Item::Prose(format!(
@@ -196,26 +182,17 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
     }
     speed.push(Item::Table(speeds(outcome)));
     speed.push(Item::Table(fastest(outcome)));
+    let natively = "Nanoseconds per particle and step. Sort: into bins. Pairs: search, conservative, dissipative and random \
+                    forces of pairs, weights. Psi: densities, ψ and its slopes. Many-body: their forces. Forces: back to the \
+                    host's order. Integrate: all else.";
+    let in_lammps = "Nanoseconds per particle and step, as LAMMPS accounts for them.";
+    let under = |text: &str, table: Table| vec![Item::prose(text), Item::Table(table)];
+    let native = under(natively, parts(outcome, |r| r.instructions.is_some(), &NATIVE_PARTS));
+    let lammps = under(in_lammps, parts(outcome, |r| r.skin.is_some(), &LAMMPS_PARTS));
     let sections = vec![
         Section::new("Speed", speed),
-        Section::new(
-            "Where the time goes, natively",
-            vec![
-                Item::prose(
-                    "Nanoseconds per particle and step. Sort: into bins. Pairs: search, conservative, dissipative and \
-                     random forces of pairs, weights. Psi: densities, ψ and its slopes. Many-body: their forces. \
-                     Forces: back to the host's order. Integrate: all else.",
-                ),
-                Item::Table(parts(outcome, |r| r.instructions.is_some(), &NATIVE_PARTS)),
-            ],
-        ),
-        Section::new(
-            "Where the time goes in LAMMPS",
-            vec![
-                Item::prose("Nanoseconds per particle and step, as LAMMPS accounts for them."),
-                Item::Table(parts(outcome, |r| r.skin.is_some(), &LAMMPS_PARTS)),
-            ],
-        ),
+        Section::new("Where the time goes, natively", native),
+        Section::new("Where the time goes in LAMMPS", lammps),
         Section::new("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
         Section::new("Ranks or threads", ranks_or_threads(outcome)),
         Section::new("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
@@ -224,6 +201,7 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
         none if none.is_empty() => "none".to_owned(),
         some => some,
     };
+    let load = outcome.machine.load.map_or_else(|| "unknown".into(), |l| format!("{l:.2}"));
     let report = Report {
         title: "psidpd bench".into(),
         subtitle: "Speed compared with LAMMPS in one run".into(),
@@ -235,10 +213,7 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
             ("instruction sets".into(), outcome.machine.instructions.join(", ")),
             ("instructions".into(), instructions(&outcome.machine)),
             ("cycles".into(), cycles(&outcome.machine)),
-            (
-                "load before".into(),
-                outcome.machine.load.map_or_else(|| "unknown".into(), |l| format!("{l:.2}")),
-            ),
+            ("load before".into(), load),
         ],
         sections,
         ..Report::default()

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The least, the middle and the greatest of measurements of one thing.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Spread {
     pub min: f64,
     /// The middle; between two middle ones their mean.

@@ -110,9 +110,9 @@ pub fn calibrate(
         (None, several) => return Err(ExperimentError::WhichDensity(several.join(", "))),
     };
     let species = model.species();
-    if options.composition.len() != species.len() {
-        let message =
-            format!("a composition of {} shares for {} species", options.composition.len(), species.len());
+    let (shares, count) = (options.composition.len(), species.len());
+    if shares != count {
+        let message = format!("a composition of {shares} shares for {count} species");
         return Err(ExperimentError::Conditions(message));
     }
     let text = model.source().text().to_owned();
@@ -164,13 +164,8 @@ pub fn calibrate(
                     parse(&text::with_slopes(&identity, species, &variables, &slopes)?)?
                 }
             };
-            let bulk = Bulk {
-                model: &model,
-                kt: options.kt,
-                densities: &rho,
-                observe: &observe,
-                sampling: options.sampling,
-            };
+            let Options { kt, sampling, .. } = *options;
+            let bulk = Bulk { model: &model, kt, densities: &rho, observe: &observe, sampling };
             match bulk.run(path, &folder.path().join("run")) {
                 Ok(observed) => {
                     batch.points.push(Point::of(&observed, species, &rho));
@@ -199,10 +194,9 @@ pub fn calibrate(
         slope: (species.len() == 1).then_some(&slope as &dyn Fn(f64) -> f64),
         tolerance: options.tolerance,
     };
-    let rounds = if first.usable(asked) {
-        search(first, &wish, &mut measure, &mut |round| told.borrow_mut()(&line(round)))?
-    } else {
-        Vec::new()
+    let rounds = match first.usable(asked) {
+        true => search(first, &wish, &mut measure, &mut |round| told.borrow_mut()(&line(round)))?,
+        false => Vec::new(),
     };
     // Where most densities run, and then where the pressure is nearest.
     let better = |a: &Round, b: &Round| {
@@ -213,12 +207,9 @@ pub fn calibrate(
             return Err(ExperimentError::Conditions("too few densities for a fit".into()));
         }
         let [low, high] = [options.densities[0], options.densities[asked - 1]];
-        return Err(ExperimentError::NoCorrection {
-            model: path.to_owned(),
-            low,
-            high,
-            failed: sentences(&all_failed),
-        });
+        let each: Vec<String> = all_failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
+        let (model, failed) = (path.to_owned(), each.join("; "));
+        return Err(ExperimentError::NoCorrection { model, low, high, failed });
     };
     let last = rounds.len() - 1;
     let converged = rounds[last].meets(options.tolerance);
@@ -259,11 +250,6 @@ fn cause(error: &RunError) -> &RunError {
         RunError::Stopped { cause: inner, .. } | RunError::Halted { cause: inner, .. } => cause(inner),
         other => other,
     }
-}
-
-fn sentences(failed: &[Failed]) -> String {
-    let each: Vec<String> = failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
-    each.join("; ")
 }
 
 /// Drops digits below the accuracy of a calibration.
@@ -327,7 +313,6 @@ fn note(round: &Round, converged: bool, options: &Options, command: &str) -> Str
     )
 }
 
-/// Densities from `low` to `high`, evenly spaced.
 pub fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
     if low == high || points < 2 {
         return vec![low];

@@ -56,7 +56,6 @@ pub enum Goal {
 #[derive(Debug, Clone, Serialize)]
 pub struct Round {
     pub degree: usize,
-    /// What they were fitted to.
     pub goal: Goal,
     /// For each (β at α), row-major.
     pub fits: Vec<Fit>,
@@ -170,18 +169,9 @@ pub fn search<E>(
 
 fn assess(degree: usize, goal: Goal, fits: Vec<Fit>, batch: Batch, wish: &Wish) -> Round {
     let (points, targets) = (&batch.points, batch.targets(wish));
-    let worst = |values: &mut dyn Iterator<Item = f64>| {
-        // NaN counts as the largest deviation.
-        values.fold(0.0f64, |worst, x| {
-            if x <= worst {
-                worst
-            } else if x.is_nan() {
-                f64::INFINITY
-            } else {
-                x
-            }
-        })
-    };
+    // NaN counts as the largest deviation.
+    let larger = |worst: f64, x: f64| if x.is_nan() { f64::INFINITY } else { worst.max(x) };
+    let worst = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, larger);
     let density_residual = worst(&mut points.iter().flat_map(|p| {
         fits.iter()
             .enumerate()

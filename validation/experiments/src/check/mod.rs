@@ -1,7 +1,6 @@
 //! What can be known of a model before it runs: what will be computed, what mean field says, and what
 //! cannot work.
 
-pub mod calibration;
 mod cost;
 mod findings;
 mod timestep;
@@ -10,6 +9,7 @@ mod warnings;
 pub use cost::{Cost, cost};
 pub use findings::{Findings, Severity, Warning};
 pub use timestep::{StepEstimate, estimates};
+pub use warnings::uncalibrated;
 
 use crate::ExperimentError;
 use psidpd_core::engine::Plan;
@@ -24,7 +24,6 @@ pub struct Conditions {
     pub densities: Option<Vec<f64>>,
 }
 
-/// Looks at `model` under `conditions`.
 pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, ExperimentError> {
     let fluid: Fluid = model.at(conditions.kt)?;
     if let Some(densities) = &conditions.densities

@@ -1,9 +1,9 @@
 //! The checks, one function each.
 
-use super::calibration;
 use super::findings::{Severity, Warning};
 use crate::ExperimentError;
 use psidpd_core::maximum::largest;
+use psidpd_core::model::curve::CurveForm;
 use psidpd_core::model::kernel::KernelKind;
 use psidpd_core::model::pair::PairForm;
 use psidpd_core::model::{ExcessFreeEnergy, Fluid};
@@ -36,7 +36,7 @@ pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, ExperimentError
             found.extend(singular(fluid, state.densities)?);
         }
     }
-    found.extend(calibration::missing(fluid));
+    found.extend(uncalibrated(fluid));
     found.extend(state.pressure.and_then(not_finite));
     found.extend(state.stability.and_then(|stability| unstable(fluid, stability)));
     found.extend(jumps(fluid));
@@ -44,68 +44,68 @@ pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, ExperimentError
     Ok(found)
 }
 
+/// A warning if the model states a pressure, and its density is not corrected for correlations.
+pub fn uncalibrated(fluid: &Fluid) -> Option<Warning> {
+    let target = fluid.excess.iter().find_map(|excess| match excess {
+        ExcessFreeEnergy::Curve(curve) if matches!(curve.form, CurveForm::Pressure(_)) => Some(curve.density),
+        _ => None,
+    })?;
+    let density = &fluid.densities[target];
+    let message = format!(
+        "a run will not have the pressure that the model asks for: density {} has no correction for the correlations of \
+         particles, which often cost a fifth of the pressure; find it with: psidpd calibrate MODEL --kT {} --density LOW:HIGH \
+         --out FILE",
+        density.name, fluid.kt
+    );
+    let missing = density.correction.iter().all(|c| c.is_identity());
+    missing.then_some(Warning { id: "uncalibrated", severity: Severity::Warning, message })
+}
+
 fn no_mean_field(reason: &TheoryError) -> Warning {
-    Warning {
-        id: "no-mean-field",
-        severity: Severity::Warning,
-        message: format!("{reason}; neither stability nor the thermodynamic limit is checked"),
-    }
+    let message = format!("{reason}; neither stability nor the thermodynamic limit is checked");
+    Warning { id: "no-mean-field", severity: Severity::Warning, message }
 }
 
 fn not_finite(pressure: f64) -> Option<Warning> {
-    (!pressure.is_finite()).then(|| Warning {
-        id: "not-finite",
-        severity: Severity::Error,
-        message: format!(
-            "the mean-field pressure at these densities is {pressure}: psi is not defined there; choose other densities, or \
-             set bounds on the density that leave such places out"
-        ),
-    })
+    let message = format!(
+        "the mean-field pressure at these densities is {pressure}: psi is not defined there; choose other densities, or set \
+         bounds on the density that leave such places out"
+    );
+    (!pressure.is_finite()).then_some(Warning { id: "not-finite", severity: Severity::Error, message })
 }
 
 fn not_conservative(fluid: &Fluid) -> Option<Warning> {
     let density = fluid.densities.iter().find(|d| d.force_kernel != d.kernel)?;
-    Some(Warning {
-        id: "not-conservative",
-        severity: Severity::Warning,
-        message: format!(
-            "the force of density {} is not the gradient of its {} kernel (force_kernel = {}): it has no potential, does \
-             work around closed loops and heats the fluid; leave force_kernel out unless that law is what you study",
-            density.name,
-            density.kernel.kind().name(),
-            density.force_kernel.kind().name()
-        ),
-    })
+    let message = format!(
+        "the force of density {} is not the gradient of its {} kernel (force_kernel = {}): it has no potential, does work \
+         around closed loops and heats the fluid; leave force_kernel out unless that law is what you study",
+        density.name,
+        density.kernel.kind().name(),
+        density.force_kernel.kind().name()
+    );
+    Some(Warning { id: "not-conservative", severity: Severity::Warning, message })
 }
 
 fn no_free_energy(species: &str) -> Warning {
-    Warning {
-        id: "no-free-energy",
-        severity: Severity::Warning,
-        message: format!(
-            "the force of species {species} is stated (slopes) and not derived from a psi: unless its slopes are those of \
-             one psi it has no potential and heats the fluid, and there is no mean field to check it by; write psi \
-             as a formula of the partial densities unless that law is what you study"
-        ),
-    }
+    let message = format!(
+        "the force of species {species} is stated (slopes) and not derived from a psi: unless its slopes are those of one \
+         psi it has no potential and heats the fluid, and there is no mean field to check it by; write psi as a formula of \
+         the partial densities unless that law is what you study"
+    );
+    Warning { id: "no-free-energy", severity: Severity::Warning, message }
 }
 
 fn collapse(fluid: &Fluid) -> Result<Option<Warning>, ExperimentError> {
-    let Err(limit) = thermodynamic_limit(fluid)? else {
-        return Ok(None);
-    };
+    let Err(limit) = thermodynamic_limit(fluid)? else { return Ok(None) };
     let (severity, how) = if limit.is_uniform() {
         (Severity::Error, "it collapses at once")
     } else {
         (Severity::Warning, "it may collapse onto a lattice, at densities that a run may never come near")
     };
-    Ok(Some(Warning {
-        id: "no-thermodynamic-limit",
-        severity,
-        message: format!(
-            "{limit}: {how}; make the repulsion stronger or of longer range, or add a psi that grows faster than n"
-        ),
-    }))
+    let message = format!(
+        "{limit}: {how}; make the repulsion stronger or of longer range, or add a psi that grows faster than n"
+    );
+    Ok(Some(Warning { id: "no-thermodynamic-limit", severity, message }))
 }
 
 /// How far beyond the mean density a particle's local density goes in a run, with a random start.
@@ -186,42 +186,32 @@ fn may_cluster(kind: KernelKind) -> bool {
 
 fn unstable(fluid: &Fluid, stability: &Stability) -> Option<Warning> {
     if stability.spinodal {
-        return Some(Warning {
-            id: "spinodal",
-            severity: Severity::Warning,
-            message: "in mean field this state is inside the spinodal: it separates into phases of other densities or \
-                      compositions (fine for a slab, a drop or demixing; not for a bulk equation of state)"
-                .into(),
-        });
+        let message = "in mean field this state is inside the spinodal: it separates into phases of other densities or \
+                       compositions (fine for a slab, a drop or demixing; not for a bulk equation of state)";
+        return Some(Warning { id: "spinodal", severity: Severity::Warning, message: message.into() });
     }
     let k = stability.k_star.filter(|_| !stability.stable)?;
     let kernel = match fluid.densities.iter().any(|density| may_cluster(density.kernel.kind())) {
         true => "a positive definite kernel (quadratic, wendland-c2), ",
         false => "",
     };
-    Some(Warning {
-        id: "clustering",
-        severity: Severity::Warning,
-        message: format!(
-            "in mean field S(k) diverges before this state is reached, at k* = {k:.3}: the fluid clusters or freezes with \
-             wavelength {:.3}; {kernel}a lower density or a higher kT avoids it",
-            TAU / k
-        ),
-    })
+    let message = format!(
+        "in mean field S(k) diverges before this state is reached, at k* = {k:.3}: the fluid clusters or freezes with \
+         wavelength {:.3}; {kernel}a lower density or a higher kT avoids it",
+        TAU / k
+    );
+    Some(Warning { id: "clustering", severity: Severity::Warning, message })
 }
 
 fn jumps(fluid: &Fluid) -> Vec<Warning> {
     let mut found = Vec::new();
     for density in fluid.densities.iter().filter(|d| d.force_kernel.kind() == KernelKind::Linear) {
-        found.push(Warning {
-            id: "force-jump",
-            severity: Severity::Note,
-            message: format!(
-                "the linear kernel of density {} makes the force jump at its range: energy is conserved only to first order \
-                 in the time step",
-                density.name
-            ),
-        });
+        let message = format!(
+            "the linear kernel of density {} makes the force jump at its range: energy is conserved only to first order in \
+             the time step",
+            density.name
+        );
+        found.push(Warning { id: "force-jump", severity: Severity::Note, message });
     }
     for term in &fluid.pairs {
         let range = term.potential.range();
@@ -229,14 +219,11 @@ fn jumps(fluid: &Fluid) -> Vec<Warning> {
         let inside = largest((1..20).map(|k| term.potential.at(range * k as f64 / 20.0).0.abs()));
         if edge > 1e-6 * inside {
             let [a, b] = term.between.map(|s| &fluid.species[s]);
-            found.push(Warning {
-                id: "energy-jump",
-                severity: Severity::Warning,
-                message: format!(
-                    "the pair potential between {a} and {b} is {edge:.3e} at its range and zero beyond: energy jumps when \
-                     particles cross it; let it vanish there"
-                ),
-            });
+            let message = format!(
+                "the pair potential between {a} and {b} is {edge:.3e} at its range and zero beyond: energy jumps when \
+                 particles cross it; let it vanish there"
+            );
+            found.push(Warning { id: "energy-jump", severity: Severity::Warning, message });
         }
     }
     found

@@ -73,61 +73,36 @@ fn number(results: &Results, key: &str, part: &str) -> Option<f64> {
     results.values.get(key)?.get(part).and_then(Value::as_f64)
 }
 
+/// Words of the page, and what they mean.
+const WORDS: &str = "\
+law conservative: Warren's force, the gradient of U: densities and forces of one kernel, w_d = 15/(2π r_d³) (1 − r/r_d)².
+law lucy: the force of LAMMPS's mdpd: densities with Lucy's kernel, 105/(16π r_d³) (1 + 3r/r_d)(1 − r/r_d)³, but forces with \
+the slope of the quadratic one; the two do not belong to one energy. The plugin computes it too, to be compared with mdpd.
+native: the runner of psidpd, psidpd run.
+dpd/psi, mdpd/psi: the pair styles of the plugin in LAMMPS: from a model file, and with mdpd's arguments.
+eam/alloy: LAMMPS's own pair style with tables of psi, w and phi from psidpd export eam.
+dpd: LAMMPS's own pair style for standard DPD, with its own drag and noise.
+newton on, off: LAMMPS's setting: with on, a pair between two ranks is computed once and its force sent; with off, on both \
+ranks. Results must not differ.
+ranks: processes of MPI that share the box; a trajectory must not depend on their number.
+≤, ≥: a bound marked ≤ is the largest size of the value that passes, one marked ≥ the smallest value: there it is an effect \
+that must be seen.
+±: one standard error; a comparison passes if a difference as large as the one found is likely enough by chance.";
+
 /// The fluid, its parameters, and the words of the page.
 pub fn what_is_compared() -> Section {
     let mut sets =
         Table::new(["set", "A", "B", "r_c", "r_d", "γ", "kT", "Warren: density", "tension", "width"]);
     for set in [SET5, SET6] {
-        sets.push([
-            set.name.to_owned(),
-            A.to_string(),
-            set.b.to_string(),
-            RC.to_string(),
-            RD.to_string(),
-            GAMMA.to_string(),
-            "1".into(),
-            format!("{} ± {}", set.fluid.density, set.liquid_error),
-            format!("{} ± {}", set.tension.0, set.tension.1),
-            format!("{} ± {}", set.width.0, set.width.1),
-        ]);
+        let parameters = [A, set.b, RC, RD, GAMMA, 1.0].map(|x| x.to_string());
+        let published = set.published().map(|(value, error)| format!("{value} ± {error}"));
+        sets.push([set.name.to_owned()].into_iter().chain(parameters).chain(published));
     }
     let mut words = Table::new(["word", "what it means"]);
-    for (word, meaning) in [
-        (
-            "law conservative",
-            "Warren's force, the gradient of U: densities and forces of one kernel, w_d = 15/(2π r_d³) (1 − r/r_d)².",
-        ),
-        (
-            "law lucy",
-            "the force of LAMMPS's mdpd: densities with Lucy's kernel, 105/(16π r_d³) (1 + 3r/r_d)(1 − r/r_d)³, but forces \
-             with the slope of the quadratic one; the two do not belong to one energy. The plugin computes it too, to be \
-             compared with mdpd.",
-        ),
-        ("native", "the runner of psidpd, psidpd run."),
-        (
-            "dpd/psi, mdpd/psi",
-            "the pair styles of the plugin in LAMMPS: from a model file, and with mdpd's arguments.",
-        ),
-        ("eam/alloy", "LAMMPS's own pair style with tables of psi, w and phi from psidpd export eam."),
-        ("dpd", "LAMMPS's own pair style for standard DPD, with its own drag and noise."),
-        (
-            "newton on, off",
-            "LAMMPS's setting: with on, a pair between two ranks is computed once and its force sent; with off, on both \
-             ranks. Results must not differ.",
-        ),
-        ("ranks", "processes of MPI that share the box; a trajectory must not depend on their number."),
-        (
-            "≤, ≥",
-            "a bound marked ≤ is the largest size of the value that passes, one marked ≥ the smallest value: there it is an \
-             effect that must be seen.",
-        ),
-        (
-            "±",
-            "one standard error; a comparison passes if a difference as large as the one found is likely enough by chance.",
-        ),
-    ] {
-        words.push([word, meaning]);
-    }
+    WORDS
+        .lines()
+        .filter_map(|line| line.split_once(": "))
+        .for_each(|(word, meaning)| words.push([word, meaning]));
     Section::new(
         "What is compared",
         vec![

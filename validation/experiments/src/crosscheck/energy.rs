@@ -12,10 +12,9 @@ use crate::start::{Filling, equilibrated};
 use psidpd_core::engine::Precision::{Double, Mixed};
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::drift;
-use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
+use psidpd_report::{Item, Plot, Section, Series, Style, Table};
 use serde_json::json;
 
-/// Seed of the start.
 pub const SEED: u64 = 20_010_703;
 
 /// Drift allowed over the run, in kT per particle.
@@ -49,14 +48,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         trace
     });
     let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let mut part = Part::default();
-    let mut table = Table::new([
-        "code",
-        "energy drift, kT per particle",
-        "largest excursion",
-        "temperature, start",
-        "end",
-    ]);
+    let mut part = Part::of("energy");
+    let header = ["code", "energy drift, kT per particle", "largest excursion", "temperature, start", "end"];
+    let mut table = Table::new(header);
     let (mut heat, mut energy) = (Vec::new(), Vec::new());
     for (setup, trace) in setups.iter().zip(&traces) {
         let (label, slug) = (setup.label(), setup.slug());
@@ -65,33 +59,19 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let duration = trace.time.last().copied().unwrap_or(0.0);
         let net = found.slope * duration;
         let ends = ends(&trace.temperature);
-        table.push([
-            label.clone(),
-            format!("{net:.1e}"),
-            format!("{:.1e}", found.largest),
-            format!("{:.3}", ends[0]),
-            format!("{:.3}", ends[1]),
-        ]);
+        let energies = [net, found.largest].map(|x| format!("{x:.1e}"));
+        let temperatures = ends.map(|t| format!("{t:.3}"));
+        table.push([label.clone()].into_iter().chain(energies).chain(temperatures));
         part.values.push((
             format!("nve.{slug}"),
             json!({"drift": net, "largest": found.largest, "temperature_start": ends[0], "temperature_end": ends[1]}),
         ));
         if setup.code == Code::Mdpd {
-            part.checks.push(Check::at_least(
-                "nve.mdpd.heating",
-                "energy",
-                "LAMMPS mdpd heats without thermostat (what the conservative law is there to avoid): rise of T",
-                ends[1] - ends[0],
-                HEATING,
-            ));
+            let what = "LAMMPS mdpd heats without thermostat (what the conservative law is there to avoid): rise of T";
+            part.at_least("nve.mdpd.heating", what, ends[1] - ends[0], HEATING);
         } else {
-            part.checks.push(Check::at_most(
-                format!("nve.{slug}.drift"),
-                "energy",
-                format!("{label}: drift of U + K over {duration} time units, kT per particle"),
-                net,
-                LARGEST_DRIFT,
-            ));
+            let what = format!("{label}: drift of U + K over {duration} time units, kT per particle");
+            part.at_most(format!("nve.{slug}.drift"), what, net, LARGEST_DRIFT);
             let start = per_particle[0];
             let points = trace.time.iter().zip(&per_particle).map(|(t, e)| (*t, e - start)).collect();
             energy.push(Series::new(label.clone(), points, Style::Line));
@@ -101,24 +81,20 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     }
     let heat = Plot::new("Temperature without thermostat", ["time", "kinetic temperature"], heat);
     let energy = Plot::new("Total energy per particle, less its start", ["time", "kT"], energy);
-    part.section = Section::new(
-        "Energy without thermostat",
-        vec![
-            Item::Prose(format!(
-                "{} particles of set 6 at density {}, no drag, no noise, Δt = {}. The built-in's law is its own; its \
-                 energy is not shown in the second figure because what it tallies is not the potential of its forces.",
-                state.len(),
-                SET6.fluid.density,
-                length.dt
-            )),
-            Item::Table(table),
-            Item::figure(
-                &heat,
-                "The built-in heats; the other codes compute the gradient of an energy and keep it.",
-            )?,
-            Item::figure(&energy, "What is left is the error of the integrator.")?,
-        ],
+    let text = format!(
+        "{} particles of set 6 at density {}, no drag, no noise, Δt = {}. The built-in's law is its own; its energy is not \
+         shown in the second figure because what it tallies is not the potential of its forces.",
+        state.len(),
+        SET6.fluid.density,
+        length.dt
     );
+    let heat = Item::figure(
+        &heat,
+        "The built-in heats; the other codes compute the gradient of an energy and keep it.",
+    )?;
+    let energy = Item::figure(&energy, "What is left is the error of the integrator.")?;
+    let items = vec![Item::Prose(text), Item::Table(table), heat, energy];
+    part.section = Section::new("Energy without thermostat", items);
     add_loop(context, &mut part)?;
     Ok(part)
 }
@@ -140,41 +116,21 @@ fn add_loop(context: &Context, part: &mut Part) -> Result<(), ExperimentError> {
     ];
     let mut table = Table::new(["code", "law", "work around the loop", "over the integral of |F|"]);
     for (code, law, w) in rows {
-        table.push([
-            code.to_owned(),
-            law.to_owned(),
-            format!("{:.3e}", w.work),
-            format!("{:.1e}", w.work / w.scale),
-        ]);
+        let (work, share) = (format!("{:.3e}", w.work), format!("{:.1e}", w.work / w.scale));
+        table.push([code, law, &work, &share]);
     }
     let [native, plugin, lucy, built_in] = rows.map(|r| r.2);
     for (id, what, w) in [("native", "native", native), ("psi", "plugin dpd/psi", plugin)] {
-        part.checks.push(Check::at_most(
-            format!("loop.{id}"),
-            "energy",
-            format!("{what}, conservative law: work around a closed loop, over the integral of |F|"),
-            w.work / w.scale,
-            1e-12,
-        ));
+        let what = format!("{what}, conservative law: work around a closed loop, over the integral of |F|");
+        part.at_most(format!("loop.{id}"), what, w.work / w.scale, 1e-12);
     }
-    part.checks.push(Check::at_least(
-        "loop.mdpd",
-        "energy",
-        "LAMMPS mdpd: work around a closed loop, over the integral of |F| (a force with a potential does none)",
-        (built_in.work / built_in.scale).abs(),
-        1e-3,
-    ));
-    part.checks.push(Check::at_most(
-        "loop.lucy",
-        "energy",
-        "the Lucy law in the native engine does the same work as LAMMPS mdpd, relative",
-        (lucy.work - built_in.work) / built_in.work,
-        1e-9,
-    ));
-    part.values.push((
-        "loop".into(),
-        json!({"native": native.work, "plugin": plugin.work, "lucy": lucy.work, "mdpd": built_in.work}),
-    ));
+    let what = "LAMMPS mdpd: work around a closed loop, over the integral of |F| (a force with a potential does none)";
+    part.at_least("loop.mdpd", what, (built_in.work / built_in.scale).abs(), 1e-3);
+    let what = "the Lucy law in the native engine does the same work as LAMMPS mdpd, relative";
+    part.at_most("loop.lucy", what, (lucy.work - built_in.work) / built_in.work, 1e-9);
+    let works =
+        json!({"native": native.work, "plugin": plugin.work, "lucy": lucy.work, "mdpd": built_in.work});
+    part.values.push(("loop".into(), works));
     part.section.items.push(Item::prose(
         "Why: two particles rest and a third goes once around a circle. A force with a potential does no work on \
          the way. The built-in's density has the Lucy kernel and its force falls off linearly; the derivative of \

@@ -102,19 +102,14 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     });
     let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut traces = traces.iter();
-    let mut part = Part {
-        section: Section::new(
-            "A slab of liquid in equilibrium",
-            vec![Item::Prose(format!(
-                "A slab of liquid with its vapour at kT = 1, γ = {GAMMA}, {edge} × {edge} × {height}, {steps} steps of \
-                 {} of which the first fifth is left out; seeds from {SEED}. Error bars are standard errors from the \
-                 autocorrelation of each series. Runs of equal law must agree: over all comparisons the chance of a \
-                 false alarm is {FALSE_ALARM}.",
-                length.dt
-            ))],
-        ),
-        ..Part::default()
-    };
+    let text = format!(
+        "A slab of liquid with its vapour at kT = 1, γ = {GAMMA}, {edge} × {edge} × {height}, {steps} steps of {} of which \
+         the first fifth is left out; seeds from {SEED}. Error bars are standard errors from the autocorrelation of each \
+         series. Runs of equal law must agree: over all comparisons the chance of a false alarm is {FALSE_ALARM}.",
+        length.dt
+    );
+    let section = Section::new("A slab of liquid in equilibrium", vec![Item::Prose(text)]);
+    let mut part = Part { section, ..Part::of("equilibrium") };
     let comparisons = sets
         .iter()
         .flat_map(|set| runs(set, context.full))
@@ -199,15 +194,8 @@ fn report_set(
     comparisons: usize,
 ) -> Result<(), ExperimentError> {
     let slug = set.name.replace(' ', "");
-    let mut table = Table::new([
-        "code",
-        "temperature",
-        "pressure",
-        "energy",
-        "liquid density",
-        "surface tension",
-        "width",
-    ]);
+    let quantities = QUANTITIES.iter().map(|(name, ..)| *name);
+    let mut table = Table::new(std::iter::once("code").chain(quantities).chain(["width"]));
     let levels = vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))];
     let labels = ["z, from the middle of the slab", "number density"];
     let mut plot = Plot { levels, ..Plot::new(format!("Density profile, {}", set.name), labels, Vec::new()) };
@@ -224,29 +212,18 @@ fn report_set(
             part.values.push((id, json!(get(m))));
         }
     }
-    table.push([
-        "Warren, Table 2".to_owned(),
-        String::new(),
-        String::new(),
-        String::new(),
-        format!("{} ± {}", set.fluid.density, set.liquid_error),
-        format!("{} ± {}", set.tension.0, set.tension.1),
-        format!("{} ± {}", set.width.0, set.width.1),
-    ]);
+    let published = set.published().map(|(value, error)| format!("{value} ± {error}"));
+    table.push(["Warren, Table 2", "", "", ""].map(str::to_owned).into_iter().chain(published));
     for ((code, law, other), m) in RUNS.iter().zip(measured) {
         let Some(other) = other else { continue };
         let (reference_code, reference_law, _) = RUNS[*other];
         for (what, get, most) in compared(*code, Some(*other)) {
             let comparison = difference(get(m), get(&measured[*other]));
+            let [ours, theirs] = [name(*code, *law), name(reference_code, reference_law)];
             let mut check = Check::agreement(
                 format!("nvt.{slug}.{}.{}", code_slug(*code), what.replace(' ', "-")),
                 "equilibrium",
-                format!(
-                    "{}: {what} of {} equals that of {}",
-                    set.name,
-                    name(*code, *law),
-                    name(reference_code, reference_law)
-                ),
+                format!("{}: {what} of {ours} equals that of {theirs}", set.name),
                 comparison.delta,
                 comparison.error,
                 psidpd_observe::threshold(comparisons, FALSE_ALARM),
@@ -265,35 +242,21 @@ fn report_set(
     let native = &measured[NATIVE];
     part.checks.extend(against_published(set, native));
     let built_in = &measured[BUILT_IN];
-    part.checks.push(
-        Check::at_least(
-            format!("nvt.{slug}.mdpd.shift"),
-            "equilibrium",
-            format!(
-                "{}: the built-in's law shifts the liquid density (another fluid than Warren's): by",
-                set.name
-            ),
-            built_in.liquid.mean - native.liquid.mean,
-            0.1,
-        )
-        .with_error(difference(&built_in.liquid, &native.liquid).error),
-    );
-    let apart = difference(&built_in.tension, &native.tension);
-    part.checks.push(Check::at_least(
-        format!("nvt.{slug}.mdpd.tension"),
-        "equilibrium",
-        format!("{}: the surface tension tells the two laws apart: difference over its error", set.name),
-        apart.z.abs(),
-        psidpd_observe::threshold(comparisons, FALSE_ALARM),
-    ));
+    let of = set.name;
+    let shift = difference(&built_in.liquid, &native.liquid);
+    let what =
+        format!("{of}: the built-in's law shifts the liquid density (another fluid than Warren's): by");
+    let check = Check::at_least(format!("nvt.{slug}.mdpd.shift"), part.topic, what, shift.delta, 0.1);
+    part.checks.push(check.with_error(shift.error));
+    let apart = difference(&built_in.tension, &native.tension).z.abs();
+    let what = format!("{of}: the surface tension tells the two laws apart: difference over its error");
+    let least = psidpd_observe::threshold(comparisons, FALSE_ALARM);
+    part.at_least(format!("nvt.{slug}.mdpd.tension"), what, apart, least);
     part.section.items.push(Item::Table(table));
-    part.section.items.push(Item::figure(
-        &plot,
-        format!(
-            "{}: full lines are the conservative law, dashed lines the built-in's law, in the plugin and in mdpd.",
-            set.name
-        ),
-    )?);
+    let caption = format!(
+        "{of}: full lines are the conservative law, dashed lines the built-in's law, in the plugin and in mdpd."
+    );
+    part.section.items.push(Item::figure(&plot, caption)?);
     Ok(())
 }
 

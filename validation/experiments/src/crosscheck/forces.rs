@@ -13,7 +13,7 @@ use psidpd_core::model::{ForceLaw, Model};
 use psidpd_core::truth;
 use psidpd_dynamics::run::{Simulation, State};
 use psidpd_lammps_host::Lammps;
-use psidpd_report::{Check, Item, Section, Table};
+use psidpd_report::{Item, Section, Table};
 use serde::Serialize;
 use serde_json::json;
 
@@ -113,26 +113,16 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
         let model = SET6.model(law, gamma)?;
         let found = native(&model, step)?.against(&plain(&model, state, step)?);
         let against = "the sums over pairs as they are written down";
-        part.bound(
-            ("forces", &format!("forces.native-{id}")),
-            &format!("native, {id}"),
-            against,
-            &found,
-            [1e-11; 3],
-        );
+        let of = format!("native, {id}");
+        part.bound(&format!("forces.native-{id}"), &of, against, &found, [1e-11; 3]);
     }
     let model = SET6.model(ForceLaw::Conservative, 0.0)?;
     let virial = native(&model, None)?.virial;
-    let (by_stress, by_energy) =
-        (virial[2] - 0.5 * (virial[0] + virial[1]), stretching(&model, state, fault)?);
-    part.checks.push(Check::at_most(
-        "forces.native.stretching",
-        "forces",
-        "native: W_zz − (W_xx + W_yy)/2, which makes the surface tension, against the change of U as the box is \
-         stretched at constant volume, relative",
-        by_stress / by_energy - 1.0,
-        1e-4,
-    ));
+    let by_stress = virial[2] - 0.5 * (virial[0] + virial[1]);
+    let what = "native: W_zz − (W_xx + W_yy)/2, which makes the surface tension, against the change of U as the box is \
+                stretched at constant volume, relative";
+    let apart = by_stress / stretching(&model, state, fault)? - 1.0;
+    part.at_most("forces.native.stretching", what, apart, 1e-4);
     Ok(())
 }
 
@@ -196,7 +186,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling { lengths, thickness: 0.5 * lengths[2] };
     let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let volume = state.domain.volume(3);
-    let mut part = Part { section: heading(state.len()), ..Part::default() };
+    let mut part = Part { section: heading(state.len()), ..Part::of("forces") };
     let mut table = Table::new(["code", "law", "against", "force", "energy", "virial"]);
     let mut compare =
         |part: &mut Part, setup: Setup, id: &str, truth: &Point, limits: [f64; 3], note: &str| {
@@ -210,7 +200,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
             let [force, energy, virial] = found.cells();
             table.push([label.clone(), law.to_owned(), note.to_owned(), force, energy, virial]);
             let id = format!("forces.{id}");
-            part.bound(("forces", &id), &format!("{label}, {law} law"), note, &found, limits);
+            part.bound(&id, &format!("{label}, {law} law"), note, &found, limits);
             part.values.push((id, json!(found)));
             Ok::<(), ExperimentError>(())
         };
@@ -232,7 +222,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let model = SET6.model(Conservative, 0.0)?;
     let mixed = point_of(simulation(&model, 1.0, &state, SEED, Mixed, context.fault)?, None)?.against(&truth);
     let of = "native in mixed precision";
-    part.bound(("forces", "forces.native-mixed"), of, "double precision", &mixed, loose);
+    part.bound("forces.native-mixed", of, "double precision", &mixed, loose);
     part.values.push(("forces.native-mixed".into(), json!(mixed)));
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
     let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
@@ -254,7 +244,8 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
          any force: its many-body term has the prefactor ½ B r_d, where the potential of the quadratic kernel \
          has ¼ B r_d.",
     ));
-    part.checks.push(gradient(context)?);
+    let what = "plugin dpd/psi: force against the central difference of compute pe, relative";
+    part.at_most("forces.gradient", what, gradient(context)?, 1e-8);
     Ok(part)
 }
 
@@ -267,7 +258,7 @@ fn heading(particles: usize) -> Section {
 }
 
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.
-fn gradient(context: &Context) -> Result<Check, ExperimentError> {
+fn gradient(context: &Context) -> Result<f64, ExperimentError> {
     let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5 };
     let state = equilibrated(&SET6.fluid, filling, 300, SEED)?;
     let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
@@ -294,13 +285,7 @@ fn gradient(context: &Context) -> Result<Check, ExperimentError> {
             worst = if error > worst || error.is_nan() { error } else { worst };
         }
     }
-    Ok(Check::at_most(
-        "forces.gradient",
-        "forces",
-        "plugin dpd/psi: force against the central difference of compute pe, relative",
-        worst,
-        1e-8,
-    ))
+    Ok(worst)
 }
 
 /// Particles (by tag − 1) none of whose neighbours, nor their neighbours, is about to cross the range of a

@@ -44,25 +44,19 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let deck = Deck::new(&style, SEED, data.display().to_string()).text();
     let theirs = point(&open_deck(context, &deck)?, state.domain.volume(3))?;
     let found = point_of(context.simulation(&model, 1.0, &state, SEED)?, None)?.against(&theirs);
-    let mut part = Part::default();
+    let mut part = Part::of("mixture");
     let mut table = Table::new(["", "relative difference"]);
     for ((what, _), value) in found.named().into_iter().zip(found.cells()) {
         table.push([what.to_owned(), value]);
     }
     let of = "two species in a tilted box, native";
-    part.bound(("mixture", "mixture.eam"), of, "LAMMPS eam/alloy", &found, [LARGEST; 3]);
+    part.bound("mixture.eam", of, "LAMMPS eam/alloy", &found, [LARGEST; 3]);
     part.values.push(("mixture.eam".into(), json!(found)));
-    part.section = Section::new(
-        "Two species in a tilted box",
-        vec![
-            Item::Prose(format!(
-                "{COUNT} particles at random (seed {SEED}) in a box of {LENGTHS:?} with tilts {TILT:?}, half of each of two \
-                 species: ψ_A = 0.3 n², ψ_B = 2 √(1 + n²), soft pairs of strengths 10, 15 and −5. The native runner against \
-                 tables for eam/alloy."
-            )),
-            Item::Table(table),
-        ],
+    let text = format!(
+        "{COUNT} particles at random (seed {SEED}) in a box of {LENGTHS:?} with tilts {TILT:?}, half of each of two species: \
+         ψ_A = 0.3 n², ψ_B = 2 √(1 + n²), soft pairs of strengths 10, 15 and −5. The native runner against tables for eam/alloy."
     );
+    part.section = Section::new("Two species in a tilted box", vec![Item::Prose(text), Item::Table(table)]);
     Ok(part)
 }
 

@@ -57,9 +57,11 @@ impl Context<'_> {
     }
 }
 
-/// Name, checks, and what a part of the validation adds to the report.
+/// What a part of the validation adds to the report.
 #[derive(Debug, Default)]
 pub struct Part {
+    /// Of its checks.
+    topic: &'static str,
     pub checks: Vec<Check>,
     pub section: Section,
     /// Named numbers for `results.json`.
@@ -67,19 +69,24 @@ pub struct Part {
 }
 
 impl Part {
+    fn of(topic: &'static str) -> Part {
+        Part { topic, ..Part::default() }
+    }
+
+    fn at_most(&mut self, id: impl Into<String>, description: impl Into<String>, value: f64, limit: f64) {
+        self.checks.push(Check::at_most(id, self.topic, description, value, limit));
+    }
+
+    fn at_least(&mut self, id: impl Into<String>, description: impl Into<String>, value: f64, limit: f64) {
+        self.checks.push(Check::at_least(id, self.topic, description, value, limit));
+    }
+
     /// Bounds the differences of a code `of` from what it is held against. An infinite limit marks a number that the code cannot
     /// be held to.
-    fn bound(
-        &mut self,
-        (section, id): (&str, &str),
-        of: &str,
-        against: &str,
-        found: &Difference,
-        limits: [f64; 3],
-    ) {
+    fn bound(&mut self, id: &str, of: &str, against: &str, found: &Difference, limits: [f64; 3]) {
         for ((what, value), limit) in found.named().into_iter().zip(limits).filter(|(_, l)| l.is_finite()) {
             let description = format!("{of}: {what} against {against}, relative");
-            self.checks.push(Check::at_most(format!("{id}.{what}"), section, description, value, limit));
+            self.at_most(format!("{id}.{what}"), description, value, limit);
         }
     }
 }

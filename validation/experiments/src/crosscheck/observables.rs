@@ -11,7 +11,7 @@ use crate::models;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
 use psidpd_observe::{Observation, Observers};
-use psidpd_report::{Check, Item, Section, Table};
+use psidpd_report::{Item, Section, Table};
 use serde_json::json;
 use std::path::Path;
 use std::time::Duration;
@@ -39,7 +39,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let found = observed.iter().find(|o| o.name == name).and_then(|o| o.get(column));
         found.map_or_else(Vec::new, |column| column.values.clone())
     };
-    let mut part = Part::default();
+    let mut part = Part::of("observables");
     let mut table = Table::new(["", "numbers", "largest of LAMMPS", "largest difference, relative"]);
     for (name, label, ours, theirs) in
         [("rdf", "compute rdf", ours("rdf", "g"), g), ("msd", "compute msd", ours("msd", "msd"), msd)]
@@ -47,33 +47,20 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let scale = theirs.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let apart = psidpd_core::maximum::largest(ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs()));
         let apart = if ours.len() == theirs.len() && scale > 0.0 { apart / scale } else { f64::NAN };
-        table.push([
-            format!("{name}, {label}"),
-            theirs.len().to_string(),
-            format!("{scale:.4}"),
-            format!("{apart:.1e}"),
-        ]);
-        part.checks.push(Check::at_most(
-            format!("observables.{name}"),
-            "observables",
-            format!("{name} against LAMMPS's {label} of the same configurations, relative"),
-            apart,
-            LARGEST,
-        ));
+        let (count, scale_shown) = (theirs.len().to_string(), format!("{scale:.4}"));
+        table.push([format!("{name}, {label}"), count, scale_shown, format!("{apart:.1e}")]);
+        let what = format!("{name} against LAMMPS's {label} of the same configurations, relative");
+        part.at_most(format!("observables.{name}"), what, apart, LARGEST);
         part.values.push((format!("observables.{name}"), json!({"largest": scale, "difference": apart})));
     }
-    part.section = Section::new(
-        "Distances and displacements of the same configurations",
-        vec![
-            Item::Prose(format!(
-                "LAMMPS runs {} particles of its own dpd, and dumps a configuration every {EVERY} steps: g(r) is the mean \
-                 over {} of them, in {BINS} shells up to {RANGE}, the displacements are those from the first.",
-                state.len(),
-                FRAMES + 1
-            )),
-            Item::Table(table),
-        ],
+    let text = format!(
+        "LAMMPS runs {} particles of its own dpd, and dumps a configuration every {EVERY} steps: g(r) is the mean over {} of \
+         them, in {BINS} shells up to {RANGE}, the displacements are those from the first.",
+        state.len(),
+        FRAMES + 1
     );
+    let heading = "Distances and displacements of the same configurations";
+    part.section = Section::new(heading, vec![Item::Prose(text), Item::Table(table)]);
     Ok(part)
 }
 

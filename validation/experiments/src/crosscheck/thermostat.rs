@@ -51,7 +51,7 @@ fn deck(
 }
 
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
-    let mut part = Part::default();
+    let mut part = Part::of("thermostat");
     let mut forces = Table::new(["", "force", "energy", "virial"]);
     let filling = Filling::cube(6.0);
     let state = equilibrated(&SET6.fluid, filling, 100, SEED)?;
@@ -70,7 +70,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let (code, against) =
             (format!("dpd.{}", id.replace(' ', "-")), "LAMMPS dpd at the same positions and velocities");
         let limits = [ROUNDING, if has_energy { ROUNDING } else { f64::INFINITY }, ROUNDING];
-        part.bound(("thermostat", &code), &format!("native, {id}"), against, &found, limits);
+        part.bound(&code, &format!("native, {id}"), against, &found, limits);
     }
     let noise = noise(context, &mut part)?;
     part.section = Section::new(
@@ -135,19 +135,10 @@ fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
                 check.passed &= error < VAGUE;
                 part.checks.push(check);
             }
-            part.values.push((
-                format!("dpd.noise.{gamma}.{r}"),
-                json!({"native": ours.value, "lammps": theirs.value, "error": error}),
-            ));
-            let shown = |m: Measured| with_error(m.value, Some(m.error));
-            table.push([
-                gamma.to_string(),
-                kt.to_string(),
-                dt.to_string(),
-                r.to_string(),
-                shown(ours),
-                shown(theirs),
-            ]);
+            let values = json!({"native": ours.value, "lammps": theirs.value, "error": error});
+            part.values.push((format!("dpd.noise.{gamma}.{r}"), values));
+            let codes = [ours, theirs].map(|m| with_error(m.value, Some(m.error)));
+            table.push([gamma, kt, dt, r].map(|x| x.to_string()).into_iter().chain(codes));
         }
     }
     Ok(table)

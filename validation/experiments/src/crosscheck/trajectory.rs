@@ -13,7 +13,7 @@ use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::{Integrator, State};
 use psidpd_formats::dump;
-use psidpd_report::{Check, Item, Section, Table};
+use psidpd_report::{Item, Section, Table};
 use serde_json::json;
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0 };
     let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let ours = native(context, &state)?;
-    let mut part = Part::default();
+    let mut part = Part::of("trajectory");
     let mut table = Table::new(["code", "ranks", "newton", "largest distance from native"]);
     for (code, ranks, newton) in [
         (Code::Psi, 1, true),
@@ -47,28 +47,17 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let slug = Setup::new(code, &SET6, ForceLaw::Conservative).slug();
         let id = format!("trajectory.{slug}.{ranks}.newton-{newton}");
         part.values.push((id.clone(), json!(distance)));
-        part.checks.push(Check::at_most(
-            id,
-            "trajectory",
-            format!(
-                "{}, {ranks} rank(s), newton {newton}: positions after {STEPS} steps with noise",
-                code.label()
-            ),
-            distance,
-            LARGEST,
-        ));
+        let label = code.label();
+        let what =
+            format!("{label}, {ranks} rank(s), newton {newton}: positions after {STEPS} steps with noise");
+        part.at_most(id, what, distance, LARGEST);
     }
-    part.section = Section::new(
-        "One trajectory in both hosts",
-        vec![
-            Item::Prose(format!(
-                "{} particles of set 6, {STEPS} steps of {DT} with drag and noise, seed {SEED}. The noise of a pair \
-                 depends on seed, step and the two tags only, so ranks, order and neighbour settings do not change it.",
-                state.len()
-            )),
-            Item::Table(table),
-        ],
+    let text = format!(
+        "{} particles of set 6, {STEPS} steps of {DT} with drag and noise, seed {SEED}. The noise of a pair depends on seed, \
+         step and the two tags only, so ranks, order and neighbour settings do not change it.",
+        state.len()
     );
+    part.section = Section::new("One trajectory in both hosts", vec![Item::Prose(text), Item::Table(table)]);
     Ok(part)
 }
 
@@ -97,10 +86,7 @@ fn lammps(
     context.lammps.run(ranks, &folder, &deck, LOG, Duration::from_secs(300))?;
     let path = folder.join("final.txt");
     let frames = dump::read(&path)?;
-    frames.first().and_then(|f| f.vectors(["x", "y", "z"])).filter(|x| x.len() == state.len()).ok_or_else(
-        || ExperimentError::Output {
-            path,
-            problem: format!("expected one frame of {} particles", state.len()),
-        },
-    )
+    let problem = format!("expected one frame of {} particles", state.len());
+    let x = frames.first().and_then(|f| f.vectors(["x", "y", "z"])).filter(|x| x.len() == state.len());
+    x.ok_or(ExperimentError::Output { path, problem })
 }

@@ -11,7 +11,6 @@
 
 mod equation;
 mod fluid;
-mod slab;
 mod substance;
 mod units;
 
@@ -20,11 +19,14 @@ pub use substance::Substance;
 pub use units::Units;
 
 use crate::ExperimentError;
-use crate::bulk::{Bulk, Sampling};
+use crate::bulk::{self, Bulk, Sampling};
 use crate::calibrate::{Options as Calibrate, calibrate, spaced};
 use psidpd_core::model::Model;
+use psidpd_dynamics::run::Begin;
+use psidpd_dynamics::scene::Scene;
 use psidpd_observe::Measured;
 use serde::Serialize;
+use std::path::Path;
 
 #[derive(Debug, Clone)]
 pub struct Options {
@@ -79,7 +81,6 @@ pub struct Found {
 
 const TRIALS: usize = 5;
 
-/// Makes a model of `substance`.
 pub fn from_eos(
     substance: &Substance,
     options: &Options,
@@ -117,34 +118,25 @@ pub fn from_eos(
             &mut |_| {},
         )?;
         std::fs::write(&path, &calibration.text).map_err(ExperimentError::io(&path))?;
-        let slab = slab::measure(&path, options, folder.path())?;
+        let [dense, tension] = slab(&path, options, folder.path())?;
         told(&format!(
             "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",
-            slab.tension.value,
-            slab.tension.error,
+            tension.value,
+            tension.error,
             if calibration.converged { "" } else { "not " }
         ));
-        trials.push(Trial { attraction, tension: slab.tension, calibrated: calibration.converged });
-        let met = (slab.tension.value / wanted - 1.0).abs() <= options.tolerance;
+        trials.push(Trial { attraction, tension, calibrated: calibration.converged });
+        let met = (tension.value / wanted - 1.0).abs() <= options.tolerance;
         let next = next(&trials, wanted);
         if met || trials.len() == TRIALS || next.is_none() {
             let (compressibility, by_eos) = compressibility(&path, &liquid, options, &units, folder.path())?;
+            let property = |name, wanted, measured| Property { name, wanted, measured };
+            let mass = liquid.density * substance.molar_mass;
+            let squeezed = "isothermal compressibility up to 5 % denser, 1/GPa";
             let compared = vec![
-                Property {
-                    name: "density, kg/m3",
-                    wanted: liquid.density * substance.molar_mass,
-                    measured: slab.liquid.times(liquid.density * substance.molar_mass / options.density),
-                },
-                Property {
-                    name: "isothermal compressibility up to 5 % denser, 1/GPa",
-                    wanted: by_eos * 1e9,
-                    measured: compressibility.times(1e9),
-                },
-                Property {
-                    name: "surface tension, mN/m",
-                    wanted: liquid.tension * 1e3,
-                    measured: slab.tension.times(units.tension * 1e3),
-                },
+                property("density, kg/m3", mass, dense.times(mass / options.density)),
+                property(squeezed, by_eos * 1e9, compressibility.times(1e9)),
+                property("surface tension, mN/m", liquid.tension * 1e3, tension.times(units.tension * 1e3)),
             ];
             return Ok(Found {
                 substance: substance.name.clone(),
@@ -159,6 +151,23 @@ pub fn from_eos(
         }
         attraction = next.unwrap_or(attraction);
     }
+}
+
+/// Density of the liquid and tension of a slab of the model in the file `path`, in its vapour.
+fn slab(path: &Path, options: &Options, folder: &Path) -> Result<[Measured; 2], ExperimentError> {
+    let dt = options.sampling.dt;
+    let text = format!(
+        "title = \"slab\"\nmodel = \"trial.toml\"\nkT = 1.0\nseed = {}\nbox = [7.0, 7.0, 18.0]\ndt = {dt:?}\nequilibrate = {}\n\
+         steps = {}\n[initial]\nkind = \"slab\"\naxis = \"z\"\nthickness = 9.0\ndensity = {:?}\n[output]\nthermo = 0\n[observe]\n\
+         every = 10\nsurface_tension = {{ every = 20 }}\ninterface_width = true\n",
+        options.sampling.seed,
+        options.sampling.equilibrate * 3,
+        options.sampling.steps * 8,
+        options.density,
+    );
+    let scene = Scene::parse("slab", &text, path.parent().unwrap_or(Path::new("")))?;
+    let observed = bulk::run(&scene, &folder.join("slab"), Begin::Overwrite, options.sampling.threads, None)?;
+    Ok([observed.scalar("interface_width", "liquid"), observed.scalar("surface_tension", "stress")])
 }
 
 /// The next strength: a step that should change the tension as it must, then the secant. None if trials no longer
@@ -178,11 +187,11 @@ fn next(trials: &[Trial], wanted: f64) -> Option<f64> {
 
 /// Δ ln ρ/Δp in 1/Pa between the liquid and its first compressed state, of the model and by the equation of state.
 fn compressibility(
-    path: &std::path::Path,
+    path: &Path,
     liquid: &Liquid,
     options: &Options,
     units: &Units,
-    folder: &std::path::Path,
+    folder: &Path,
 ) -> Result<(Measured, f64), ExperimentError> {
     let model = Model::open(path)?;
     let pressure = |rho: f64| -> Result<Measured, ExperimentError> {
@@ -195,10 +204,8 @@ fn compressibility(
     };
     let factor = denser / liquid.density;
     let (a, b) = (pressure(options.density)?, pressure(factor * options.density)?);
-    let rise = (b.value - a.value) * units.pressure;
-    let error = a.error.hypot(b.error) * units.pressure;
-    let value = factor.ln() / rise;
-    Ok((Measured { value, error: value * error / rise }, factor.ln() / (compressed - liquid.pressure)))
+    let found = Measured::from(factor.ln()).over(b.minus(a).times(units.pressure));
+    Ok((found, factor.ln() / (compressed - liquid.pressure)))
 }
 
 #[cfg(test)]

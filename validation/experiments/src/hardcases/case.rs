@@ -1,6 +1,7 @@
 //! A hard case: a scene, and what must come of it.
 
 use psidpd_dynamics::integrator::Integrator;
+use std::fmt::Write;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Must {
@@ -70,7 +71,6 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Inputs without a data file.
     pub fn new(
         model: impl Into<String>,
         kt: f64,
@@ -92,7 +92,30 @@ pub struct Case {
     pub exact: Option<Must>,
 }
 
+/// The lines of a scene for a cube.
+pub fn cube(edge: f64, density: f64) -> String {
+    format!("box = {edge:?}\ndensity = {density:?}\n")
+}
+
+/// A data file of one species in a cube.
+pub fn data(x: &[[f64; 3]], edge: f64) -> String {
+    let mut text = format!(
+        "psidpd hard case\n\n{} atoms\n1 atom types\n\n0 {edge:?} xlo xhi\n0 {edge:?} ylo yhi\n0 {edge:?} zlo zhi\n\n\
+         Masses\n\n1 1.0\n\nAtoms # atomic\n\n",
+        x.len()
+    );
+    for (k, [x, y, z]) in x.iter().enumerate() {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{} 1 {x:?} {y:?} {z:?}", k + 1);
+    }
+    text
+}
+
 impl Case {
+    pub fn new(name: &'static str, run: Inputs, must: Must) -> Case {
+        Case { group: "", name, run, must, exact: None }
+    }
+
     /// What must happen with an integrator.
     pub fn must(&self, integrator: Integrator) -> Must {
         let approximate = ["velocity-verlet", "groot-warren", "dpd-vv", "self-consistent"];

@@ -1,19 +1,13 @@
 //! Forces of configurations in which digits are lost, against the reference.
 
-use super::case::{Case, Inputs, Must};
-use super::data_file::data;
+use super::case::{Case, Inputs, Must, data};
 use crate::models::{SET6, STANDARD};
-
-const GROUP: &str = "forces";
 
 pub fn cases() -> Vec<Case> {
     let scene = "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"zero\"\n";
-    let case = |name, model: &str, x: &[[f64; 3]], edge: f64| Case {
-        group: GROUP,
-        name,
-        run: Inputs { data: Some(data(x, edge)), ..Inputs::new(model, 1.0, scene, 0.01, [1, 1]) },
-        must: Must::Agrees(1e-11),
-        exact: None,
+    let case = |name, model: &str, x: &[[f64; 3]], edge: f64| {
+        let run = Inputs { data: Some(data(x, edge)), ..Inputs::new(model, 1.0, scene, 0.01, [1, 1]) };
+        Case::new(name, run, Must::Agrees(1e-11))
     };
     // Close pairs: distances of 1e-3 down to 1e-6 of the box.
     let close: Vec<[f64; 3]> = (0..200usize)

@@ -3,9 +3,7 @@
 //! A file for each group of cases; [`case`] says what a case is and judges, [`native`] and [`plugin`] carry it out.
 
 mod case;
-mod data_file;
 mod forces;
-mod long;
 mod native;
 mod phases;
 mod plugin;
@@ -17,7 +15,8 @@ use crate::ExperimentError;
 use crate::code::Host;
 use crate::jobs;
 use crate::lammps::host::PluginHost;
-use case::{Case, Must};
+use crate::models::SET6;
+use case::{Case, Inputs, Must, cube};
 use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_report::{Progress, Table};
@@ -46,13 +45,26 @@ pub struct Verdict {
 }
 
 fn cases(extent: Extent) -> Vec<Case> {
-    let mut all = starts::cases();
-    all.extend(singular::cases());
-    all.extend(phases::cases());
-    all.extend(steps::cases());
-    all.extend(forces::cases());
-    all.extend(long::cases(extent == Extent::Full));
-    all
+    let groups = [
+        ("starts and boxes", starts::cases()),
+        ("singular formulas", singular::cases()),
+        ("phases", phases::cases()),
+        ("time steps and masses", steps::cases()),
+        ("forces", forces::cases()),
+        ("long runs", vec![long(extent == Extent::Full)]),
+    ];
+    let named = |(group, cases): (_, Vec<Case>)| cases.into_iter().map(move |case| Case { group, ..case });
+    groups.into_iter().flat_map(named).collect()
+}
+
+/// Momentum, and energy without thermostat.
+fn long(full: bool) -> Case {
+    let (name, steps) = match full {
+        true => ("10^6 steps without thermostat", 1_000_000),
+        false => ("2000 steps without thermostat", 2_000),
+    };
+    let run = Inputs::new(SET6, 1.0, cube(3.0, 6.05), 0.002, [500, steps]);
+    Case::new(name, run, Must::Conserves(0.02))
 }
 
 fn settings(extent: Extent) -> Vec<(Integrator, Precision)> {
@@ -127,15 +139,7 @@ pub fn table(results: &[Verdict]) -> Table {
         let verdict = if r.wrong.is_some() { "fail" } else { "pass" };
         // Messages are long, and their beginning says what happened.
         let did: String = r.did.chars().take(90).collect();
-        table.push([
-            r.case,
-            r.host.name(),
-            r.integrator,
-            r.precision.as_str(),
-            r.must.as_str(),
-            did.as_str(),
-            verdict,
-        ]);
+        table.push([r.case, r.host.name(), r.integrator, &r.precision, &r.must, &did, verdict]);
     }
     table
 }

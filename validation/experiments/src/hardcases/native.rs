@@ -194,7 +194,7 @@ mod tests {
         let must = super::super::case::Must::Right(0.04);
         let judged = |drift: &str| {
             let run = Inputs::new(IDEAL, 1.0, format!("box = 4.0\n{part}{drift}"), 0.02, [200, 2000]);
-            let case = Case { group: "tests", name: "drift", run, must, exact: None };
+            let case = Case::new("drift", run, must);
             let folder = tempfile::tempdir().unwrap();
             let integrator = Integrator::VelocityVerlet;
             let found = carry_out(&case, integrator, Precision::Double, folder.path(), None).unwrap();

@@ -23,7 +23,6 @@ pub fn must(case: &Case) -> Option<Must> {
     }
 }
 
-/// Carries out a case in `folder`.
 pub fn carry_out(
     lammps: &PluginHost,
     case: &Case,

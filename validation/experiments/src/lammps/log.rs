@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 /// LAMMPS's own account of a timed loop.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Loop {
-    /// Wall time in seconds.
     pub seconds: f64,
     pub steps: u64,
     pub particles: usize,

@@ -1,4 +1,3 @@
-use crate::bulk::Observed;
 use psidpd_observe::Measured;
 use psidpd_report::{Plot, Series, Style};
 use serde::Serialize;
@@ -63,11 +62,10 @@ impl Compared {
     }
 
     pub fn to_json(&self) -> Value {
-        let pair = |m: Measured| json!({ "value": m.value, "error": m.error });
         json!({
             "name": self.name,
-            "measured": pair(self.measured),
-            "published": pair(self.published),
+            "measured": self.measured,
+            "published": self.published,
             "rule": self.rule,
             "own": self.own,
             "allowance": self.allowance.map(|(size, why)| json!({ "size": size, "why": why })),
@@ -89,74 +87,51 @@ impl Reproduction {
         !self.values.is_empty() && self.values.iter().all(Compared::passes)
     }
 
-    /// Adds a value that is to equal `value ± error`.
-    pub fn equal(&mut self, name: impl Into<String>, measured: Measured, value: f64, error: f64) {
-        self.add(name, measured, Rule::Equal, value, error);
+    pub fn equal(
+        &mut self,
+        name: impl Into<String>,
+        measured: impl Into<Measured>,
+        published: impl Into<Measured>,
+    ) {
+        self.add(name, measured, Rule::Equal, published);
     }
 
     /// Adds a value that is to equal another of this program: that of a run, or of its mean field.
-    pub fn own(&mut self, name: impl Into<String>, measured: Measured, own: Measured) {
-        self.equal(name, measured, own.value, own.error);
-        self.values.iter_mut().last().into_iter().for_each(|value| value.own = true);
+    pub fn own(&mut self, name: impl Into<String>, measured: Measured, own: impl Into<Measured>) {
+        self.add(name, measured, Rule::Equal, own).own = true;
     }
 
-    /// Adds a value that is to be `value` or more.
-    pub fn at_least(&mut self, name: impl Into<String>, measured: Measured, value: f64) {
-        self.add(name, measured, Rule::AtLeast, value, 0.0);
+    pub fn at_least(&mut self, name: impl Into<String>, measured: impl Into<Measured>, value: f64) {
+        self.add(name, measured, Rule::AtLeast, value);
     }
 
-    /// Adds a value that is to be `value` or less.
-    pub fn at_most(&mut self, name: impl Into<String>, measured: Measured, value: f64) {
-        self.add(name, measured, Rule::AtMost, value, 0.0);
+    pub fn at_most(&mut self, name: impl Into<String>, measured: impl Into<Measured>, value: f64) {
+        self.add(name, measured, Rule::AtMost, value);
     }
 
-    fn add(&mut self, name: impl Into<String>, measured: Measured, rule: Rule, value: f64, error: f64) {
-        let published = Measured { value, error };
-        self.values.push(Compared {
-            name: name.into(),
-            measured,
-            published,
-            rule,
-            own: false,
-            allowance: None,
-        });
-    }
-
-    /// Adds a plot of measured points beside a published line.
-    pub fn plot(
+    fn add(
         &mut self,
-        file: &'static str,
-        title: &str,
-        axes: [&str; 2],
-        measured: &[(&str, Vec<(f64, Measured)>)],
-        published: &[(&str, Vec<(f64, f64)>)],
-    ) {
-        let points = measured.iter().map(|(name, points)| {
-            let errors = points.iter().map(|(_, y)| y.error).collect();
-            Series::new(*name, bare(points), Style::Points).with_errors(errors)
-        });
-        let lines = published.iter().map(|(name, points)| Series::new(*name, points.clone(), Style::Line));
-        let plot = Plot::new(title, axes, points.chain(lines).collect());
-        self.plots.push((file, plot));
+        name: impl Into<String>,
+        measured: impl Into<Measured>,
+        rule: Rule,
+        published: impl Into<Measured>,
+    ) -> &mut Compared {
+        let (name, measured, published) = (name.into(), measured.into(), published.into());
+        self.values.push_mut(Compared { name, measured, published, rule, own: false, allowance: None })
+    }
+
+    pub fn plot(&mut self, file: &'static str, title: &str, axes: [&str; 2], series: Vec<Series>) {
+        self.plots.push((file, Plot::new(title, axes, series)));
     }
 }
 
-pub fn difference(a: Measured, b: Measured) -> Measured {
-    Measured { value: a.value - b.value, error: a.error.hypot(b.error) }
+pub fn points(name: &str, points: &[(f64, Measured)]) -> Series {
+    let errors = points.iter().map(|(_, y)| y.error).collect();
+    Series::new(name, bare(points), Style::Points).with_errors(errors)
 }
 
-pub fn ratio(a: Measured, b: Measured) -> Measured {
-    let value = a.value / b.value;
-    Measured { value, error: (a.error / b.value).hypot(value * b.error / b.value) }
-}
-
-/// A column of an observation against its abscissa; nothing where it was not observed.
-pub fn profile(observed: &Observed, name: &str, column: &str) -> Vec<(f64, Measured)> {
-    let Some(observation) = observed.get(name) else { return Vec::new() };
-    let (Some(x), Some(y)) = (&observation.x, observation.get(column)) else { return Vec::new() };
-    let values =
-        y.values.iter().zip(&y.errors).map(|(value, error)| Measured { value: *value, error: *error });
-    x.values.iter().copied().zip(values).collect()
+pub fn curve(name: &str, points: Vec<(f64, f64)>) -> Series {
+    Series::new(name, points, Style::Line)
 }
 
 /// Means amid two layers that fill a periodic box, one of which is in the middle of the profile: over a quarter of the
@@ -164,24 +139,24 @@ pub fn profile(observed: &Observed, name: &str, column: &str) -> Vec<(f64, Measu
 pub fn layers(profile: &[(f64, Measured)]) -> [Measured; 2] {
     let count = profile.len();
     let mean = |from: usize| {
-        let some: Vec<Measured> =
-            profile.iter().cycle().skip(from).take(count / 4).map(|(_, c)| *c).collect();
-        let n = some.len() as f64;
-        let variance: f64 = some.iter().map(|c| c.error * c.error).sum();
+        let some = || profile.iter().cycle().skip(from).take(count / 4).map(|(_, c)| *c);
+        let n = some().count() as f64;
+        let variance: f64 = some().map(|c| c.error * c.error).sum();
         // Neighbouring bins move together: their errors are not averaged out.
-        Measured { value: some.iter().map(|c| c.value).sum::<f64>() / n, error: (variance / n).sqrt() }
+        Measured { value: some().map(|c| c.value).sum::<f64>() / n, error: (variance / n).sqrt() }
     };
     [mean(count - count / 8), mean(count / 2 - count / 8)]
+}
+
+/// The highest point of a profile, or with a `sign` of −1 the lowest.
+pub fn extreme(profile: &[(f64, Measured)], sign: f64) -> Measured {
+    let values = profile.iter().map(|(_, d)| *d);
+    values.max_by(|a, b| (sign * a.value).total_cmp(&(sign * b.value))).unwrap_or(Measured::NONE)
 }
 
 /// A profile without its errors.
 pub fn bare(points: &[(f64, Measured)]) -> Vec<(f64, f64)> {
     points.iter().map(|(x, y)| (*x, y.value)).collect()
-}
-
-/// A number that is exact, or has only rounding errors.
-pub fn exact(value: f64) -> Measured {
-    Measured { value, error: 0.0 }
 }
 
 /// A curve at 100 places.
@@ -215,7 +190,7 @@ mod tests {
     /// Relative errors of a quotient add up by squares: (6 ± 0.3)/(3 ± 0.2) is 2 ± √(0.1² + (2/15)²) = 2 ± 1/6.
     #[test]
     fn both_errors_are_in_that_of_a_quotient() {
-        let found = ratio(Measured { value: 6.0, error: 0.3 }, Measured { value: 3.0, error: 0.2 });
+        let found = Measured { value: 6.0, error: 0.3 }.over([3.0, 0.2]);
         assert!(found.value == 2.0 && (found.error - 1.0 / 6.0).abs() < 1e-15, "{found:?}");
     }
 
@@ -232,8 +207,8 @@ mod tests {
     #[test]
     fn what_is_our_own_says_so() {
         let mut outcome = Reproduction::default();
-        outcome.equal("x", exact(1.0), 1.0, 0.1);
-        outcome.own("y", exact(1.0), Measured { value: 2.0, error: 0.1 });
+        outcome.equal("x", 1.0, [1.0, 0.1]);
+        outcome.own("y", 1.0.into(), [2.0, 0.1]);
         let own: Vec<Value> = outcome.values.iter().map(|v| v.to_json()["own"].clone()).collect();
         assert_eq!(own, [false, true]);
         assert!(outcome.values[0].passes() && !outcome.values[1].passes());

@@ -1,10 +1,12 @@
 use crate::ExperimentError;
 use crate::bulk::{self, Bulk, Observed, Sampling};
+use crate::papers::case::{Reproduction, curve};
 use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::Scene;
+use psidpd_observe::Measured;
 use psidpd_report::run::SeriesTable;
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -32,7 +34,7 @@ pub struct Context {
 }
 
 /// A change of a scene: the path of a key, through tables and by the number of an array's entry, and its value.
-pub type Change<'a> = (&'a [&'a str], toml_edit::Value);
+pub type Change<'a, V = i64> = (&'a str, V);
 
 /// A homogeneous fluid of one species that a case measures.
 pub struct Fluid<'a> {
@@ -43,6 +45,13 @@ pub struct Fluid<'a> {
     pub edge: f64,
     /// Observables beside temperature and pressure.
     pub observe: &'a str,
+}
+
+impl Fluid<'_> {
+    /// At kT = 1, with the step and the box of most papers.
+    pub fn of(model: &str) -> Fluid<'_> {
+        Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" }
+    }
 }
 
 impl Context {
@@ -83,7 +92,18 @@ impl Context {
         };
         let bulk = Bulk { model: &model, kt: fluid.kt, densities, observe: fluid.observe, sampling };
         let folder = self.folder.join(name);
-        Ok(bulk::run_with(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
+        Ok(bulk::run(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
+    }
+
+    /// Pressures of a fluid of one species at several densities, which end the names of the runs.
+    pub fn pressures(
+        &self,
+        name: &str,
+        fluid: &Fluid,
+        densities: &[f64],
+    ) -> Result<Vec<(f64, Measured)>, ExperimentError> {
+        let at = |rho: &f64| Ok((*rho, self.bulk(&format!("{name}{rho}"), fluid, &[*rho])?.pressure()));
+        densities.iter().map(at).collect()
     }
 
     /// Runs a scene, the text of which does not name its model.
@@ -93,16 +113,16 @@ impl Context {
         let scene =
             Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
         let folder = self.folder.join(name);
-        Ok(bulk::run_with(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
+        Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
     /// Runs a scene of `scenes/full`, as it is at full size and with `changes` at quick size.
-    pub fn shipped(
+    pub fn shipped<V: Into<toml_edit::Value> + Clone>(
         &self,
         name: &str,
         model: &str,
         scene: &str,
-        changes: &[Change],
+        changes: &[Change<V>],
     ) -> Result<Observed, ExperimentError> {
         self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
     }
@@ -113,34 +133,45 @@ impl Context {
         Context { folder, ..self.clone() }
     }
 
-    /// Columns of `thermo.csv` of a run, by their names.
-    pub fn thermo<const N: usize>(
+    /// Plots temperature and pressure of a run in two dimensions against time, from its `thermo.csv`.
+    pub fn plot_thermo(
         &self,
-        name: &str,
-        columns: [&str; N],
-    ) -> Result<Vec<[f64; N]>, ExperimentError> {
-        let path = self.folder.join(name).join("thermo.csv");
+        run: &str,
+        title: &str,
+        outcome: &mut Reproduction,
+    ) -> Result<(), ExperimentError> {
+        let path = self.folder.join(run).join("thermo.csv");
         let missing = || ExperimentError::Output { path: path.clone(), problem: "it is missing".into() };
         let table = SeriesTable::read(&path)?.ok_or_else(missing)?;
-        let row = |k: usize| columns.map(|name| table.get(name).map_or(f64::NAN, |column| column[k]));
-        Ok((0..table.rows()).map(row).collect())
+        let column = |name| table.get(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);
+        for (file, axis, name, of) in [
+            ("temperature", "kT", "kinetic", column("temperature")),
+            ("pressure", "pressure", "mean of xx and yy", column("pressure")),
+        ] {
+            let points = column("time").into_iter().zip(of).collect();
+            outcome.plot(file, title, ["time", axis], vec![curve(name, points)]);
+        }
+        Ok(())
     }
 }
 
 /// A scene without its model and with other values.
-fn edited(scene: &str, changes: &[Change]) -> Result<String, ExperimentError> {
+fn edited<V: Into<toml_edit::Value> + Clone>(
+    scene: &str,
+    changes: &[Change<V>],
+) -> Result<String, ExperimentError> {
     let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
     let mut document: toml_edit::DocumentMut = scene.parse().map_err(|_| missing("scene"))?;
     document.remove("model");
     for (path, value) in changes {
         let mut item = document.as_item_mut();
-        for step in *path {
+        for step in path.split('.') {
             item = match step.parse::<usize>() {
                 Ok(k) => item.get_mut(k).ok_or_else(|| missing(step))?,
                 Err(_) => &mut item[step],
             };
         }
-        *item = toml_edit::Item::Value(value.clone());
+        *item = toml_edit::value(value.clone());
     }
     Ok(document.to_string())
 }
@@ -149,7 +180,6 @@ pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
     Ok(MeanField::new(&Model::parse("model.toml", model)?.at(kt)?)?)
 }
 
-/// A model file with other parameters.
 pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, ExperimentError> {
     let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
     let mut document: toml_edit::DocumentMut = model.parse().map_err(|_| missing("parameters"))?;
@@ -167,15 +197,14 @@ mod tests {
     #[test]
     fn a_scene_is_changed_where_the_path_leads_and_nowhere_else() {
         let scene = "model = \"m.toml\"\nsteps = 1\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 3\n[output]\nthermo = 4\n";
-        let changes: [Change; 3] = [
-            (&["steps"], 10.into()),
-            (&["stage", "1", "steps"], 30.into()),
-            (&["output", "thermo"], 0.into()),
-        ];
+        let changes: [Change; 3] = [("steps", 10), ("stage.1.steps", 30), ("output.thermo", 0)];
         let text = edited(scene, &changes).unwrap();
         let expected = "steps = 10\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 30\n[output]\nthermo = 0\n";
         assert_eq!(text, expected);
-        assert!(edited(scene, &[(&["stage", "2", "steps"], 1.into())]).is_err());
-        assert_eq!(edited(scene, &[]).unwrap(), scene.trim_start_matches("model = \"m.toml\"\n"));
+        assert!(edited(scene, &[("stage.2.steps", 1i64)]).is_err());
+        assert_eq!(
+            edited(scene, &[] as &[Change]).unwrap(),
+            scene.trim_start_matches("model = \"m.toml\"\n")
+        );
     }
 }

@@ -50,7 +50,6 @@ pub fn schemes() -> Vec<Physics> {
     found
 }
 
-/// Runs a scheme without its thermostat.
 pub fn drift(origin: &Origin, physics: &Physics, effort: Effort) -> Result<EnergyDrift, ExperimentError> {
     let dt = origin.dt(physics);
     let every = physics.interval();

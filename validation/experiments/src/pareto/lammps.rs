@@ -4,7 +4,7 @@ use super::origin::Origin;
 use super::own_style::own_style;
 use super::quantity::{Class, Quantities};
 use super::recommend::scene_of;
-use super::sample::{Effort, FAR_OFF, Sampled, observe};
+use super::sample::{Effort, FAR_OFF, Made, Sampled, observe};
 use super::setting::{Physics, Setting};
 use crate::ExperimentError;
 use crate::code::Host;
@@ -16,7 +16,6 @@ use psidpd_observe::{Observers, Series};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Longest time that one run may take.
 const LIMIT: Duration = Duration::from_secs(3600);
 
 #[derive(Debug)]
@@ -64,9 +63,7 @@ impl LammpsRuns {
         let text = match self.run(origin, &setting, &steps, name, &output) {
             Ok(text) => text,
             Err(ExperimentError::Lammps(error @ psidpd_lammps_host::LammpsError::Run { .. })) => {
-                return Ok(Sampled::Unstable(
-                    error.to_string().lines().next().unwrap_or_default().to_owned(),
-                ));
+                return Ok(Err(error.to_string().lines().next().unwrap_or_default().to_owned()));
             }
             Err(other) => return Err(other),
         };
@@ -79,10 +76,7 @@ impl LammpsRuns {
         let calm = mean.value < FAR_OFF * origin.stage.kt;
         // NaN is not calm.
         if !calm {
-            return Ok(Sampled::Unstable(format!(
-                "the temperature is {:.1} kT",
-                mean.value / origin.stage.kt
-            )));
+            return Ok(Err(format!("the temperature is {:.1} kT", mean.value / origin.stage.kt)));
         }
         let observe = observe(origin, every, Host::Lammps, true)?;
         let mut observers = Observers::new(&observe, [origin.stage.name.as_str()]);
@@ -93,7 +87,7 @@ impl LammpsRuns {
         let means = [(Class::Temperature, "T_kin", mean), (Class::Pressure, "p_total", sampled.mean(1))];
         let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
         let time = sampled.samples() as f64 * physics.interval() as f64 * origin.dt(physics);
-        Ok(Sampled::Made { quantities: Box::new(quantities), samples: sampled.samples(), time })
+        Ok(Ok(Made { quantities, samples: sampled.samples(), time }))
     }
 
     /// Runs a deck of these stages, with commands before the last, and gives what LAMMPS prints.

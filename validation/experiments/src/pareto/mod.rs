@@ -39,7 +39,7 @@ use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::write_atomically;
 use psidpd_report::Progress;
 use quantity::{Known, Quantities, deviations};
-use sample::Sampled;
+use sample::{Made, Sampled};
 use setting::{Physics, Setting};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -84,16 +84,9 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
     spinner.finish();
     let known = known(&origin)?;
     let mut left_out = Vec::new();
-    let lammps = match options.lammps {
-        true => match LammpsRuns::open(&origin, &out.join("runs"), &|line| progress.note(line)) {
-            Ok(lammps) => Some(lammps),
-            Err(error) => {
-                left_out.push(format!("LAMMPS is not among the points: {error}."));
-                None
-            }
-        },
-        false => None,
-    };
+    let open = || LammpsRuns::open(&origin, &out.join("runs"), &|line| progress.note(line));
+    let without = |error| left_out.push(format!("LAMMPS is not among the points: {error}."));
+    let lammps = options.lammps.then(open).and_then(|found| found.map_err(without).ok());
 
     let share = if lammps.is_some() { SAMPLING } else { SAMPLING + LAMMPS };
     let physics = setting::physics(options.choice);
@@ -103,8 +96,9 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
     let reference_quantities = references.quantities(&origin)?;
     let drifts = drifts(&origin, known, options, DRIFTS * WORKERS * seconds, progress)?;
 
-    let mut points =
-        native_points(&origin, options, &physics, &sampled, |q| deviations(q, &reference_quantities, known));
+    let mut points = native_points(&origin, options, &physics, &sampled, |made| {
+        deviations(&made.quantities, &reference_quantities, known)
+    });
     let mut lammps_reference = None;
     if let Some(lammps) = &lammps {
         plugin_points(&origin, &mut points);
@@ -196,10 +190,8 @@ impl References {
     /// Their quantities: those of configurations from Monte Carlo, if there is one.
     fn quantities(&self, origin: &Origin) -> Result<Quantities, ExperimentError> {
         let made = |sampled: &Sampled, physics: &Physics| match sampled {
-            Sampled::Made { quantities, .. } => Ok(quantities.as_ref().clone()),
-            Sampled::Unstable(why) => {
-                Err(ExperimentError::Reference { what: what(origin, physics), why: why.clone() })
-            }
+            Ok(made) => Ok(made.quantities.clone()),
+            Err(why) => Err(ExperimentError::Reference { what: what(origin, physics), why: why.clone() }),
         };
         let small = made(&self.small_steps, &Physics::small_steps());
         match &self.configurations {
@@ -256,10 +248,7 @@ fn drifts(
 }
 
 fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Deviation>) -> Point {
-    let (samples, time, unstable) = match sampled {
-        Sampled::Made { samples, time, .. } => (*samples, *time, None),
-        Sampled::Unstable(why) => (0, 0.0, Some(why.clone())),
-    };
+    let (samples, time) = sampled.as_ref().map_or((0, 0.0), |made| (made.samples, made.time));
     Point {
         code: setting.host,
         integrator: recommend::short(&setting.physics.integrator),
@@ -271,8 +260,8 @@ fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Devia
         time,
         errors,
         worst: None,
-        stable: unstable.is_none(),
-        unstable,
+        stable: sampled.is_ok(),
+        unstable: sampled.as_ref().err().cloned(),
         front: false,
         setting,
     }
@@ -284,14 +273,11 @@ fn native_points(
     options: &Options,
     physics: &[Physics],
     sampled: &[Sampled],
-    errors: impl Fn(&Quantities) -> Vec<Deviation>,
+    errors: impl Fn(&Made) -> Vec<Deviation>,
 ) -> Vec<Point> {
     let mut points = Vec::new();
     for (physics, sampled) in physics.iter().zip(sampled) {
-        let errors = match sampled {
-            Sampled::Made { quantities, .. } => errors(quantities),
-            Sampled::Unstable(_) => Vec::new(),
-        };
+        let errors = sampled.as_ref().map_or_else(|_| Vec::new(), &errors);
         let fewest = options.threads.iter().min().copied().unwrap_or(NonZeroUsize::MIN);
         let usual = match physics.integrator {
             Integrator::VelocityVerlet => physics.multiple == 1.0,
@@ -300,7 +286,7 @@ fn native_points(
         };
         let matters = options.choice == Choice::Full || usual && physics.precision == Precision::Mixed;
         for &threads in &options.threads {
-            if threads == fewest || (matters && matches!(sampled, Sampled::Made { .. })) {
+            if threads == fewest || (matters && sampled.is_ok()) {
                 let setting = Setting { host: Host::Native, physics: *physics, threads };
                 points.push(point(origin, setting, sampled, errors.clone()));
             }
@@ -351,33 +337,26 @@ fn own_points(
     let sampled: Vec<Sampled> = sampled.into_iter().collect::<Result<_, _>>()?;
     let mut known = known;
     let (reference, first) = match (&sampled[0], is_another_law(own)) {
-        (Sampled::Made { quantities, .. }, true) => {
+        (Ok(made), true) => {
             known.temperature = false;
-            (quantities.as_ref().clone(), 1)
+            (made.quantities.clone(), 1)
         }
-        (Sampled::Unstable(_), true) => return Ok(Some((None, Vec::new()))),
+        (Err(_), true) => return Ok(Some((None, Vec::new()))),
         (_, false) => (native.clone(), 0),
     };
-    let mut points = Vec::new();
-    for (physics, sampled) in physics.iter().zip(&sampled).skip(first) {
-        let errors = match sampled {
-            Sampled::Made { quantities, .. } => deviations(quantities, &reference, known),
-            Sampled::Unstable(_) => Vec::new(),
-        };
-        points.push(point(origin, setting(*physics), sampled, errors));
-    }
+    let errors = |made: &Made| deviations(&made.quantities, &reference, known);
+    let runs = physics.iter().zip(&sampled).skip(first).map(|(physics, sampled)| {
+        let errors = sampled.as_ref().map_or_else(|_| Vec::new(), errors);
+        point(origin, setting(*physics), sampled, errors)
+    });
     let itself = is_another_law(own).then(|| reference_of(origin, &physics[0], &sampled[0], known));
-    Ok(Some((itself, points)))
+    Ok(Some((itself, runs.collect())))
 }
 
 /// A reference with its own errors: of temperatures from kT where that is known, statistical ones of all else.
 fn reference_of(origin: &Origin, physics: &Physics, sampled: &Sampled, known: Known) -> Reference {
-    let (values, samples, time) = match sampled {
-        Sampled::Made { quantities, samples, time } => {
-            (deviations(quantities, &quantities.as_if_exact(), known), *samples, *time)
-        }
-        Sampled::Unstable(_) => (Vec::new(), 0, 0.0),
-    };
+    let Made { quantities, samples, time } = sampled.clone().unwrap_or_default();
+    let values = deviations(&quantities, &quantities.as_if_exact(), known);
     let dt = physics.integrator.has_time().then(|| origin.dt(physics));
     Reference { what: what(origin, physics), dt, samples, time, values }
 }
@@ -395,13 +374,10 @@ fn recommend(origin: &Origin, outcome: &Comparison) -> Option<Recommended> {
         let found = front::cheapest(&runs, tolerances, &[Host::Native])?;
         points.iter().position(|p| *p == runs[found])
     });
-    let (lammps, lammps_refusal) = match (same, other) {
-        (Ok(lines), None) => (Some(lines), None),
-        (same, Some(k)) => (
-            recommend::lammps_lines(origin, &points[k].setting.physics).ok(),
-            same.err().map(|e| e.to_string()),
-        ),
-        (Err(refusal), None) => (None, Some(refusal.to_string())),
+    let lammps_refusal = same.as_ref().err().map(ToString::to_string);
+    let lammps = match other {
+        None => same.ok(),
+        Some(k) => recommend::lammps_lines(origin, &points[k].setting.physics).ok(),
     };
     let scene = recommend::scene_lines(origin.dt(&setting.physics), &setting);
     Some(Recommended { point: best, scene, lammps, point_in_lammps: timed, lammps_refusal })

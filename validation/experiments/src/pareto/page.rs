@@ -11,12 +11,10 @@ fn shown(d: &Deviation) -> String {
     if !d.resolved {
         return format!("< {:.2}", 100.0 * d.bound());
     }
-    let sign = if d.class == Class::Structure {
-        ""
-    } else if d.value < 0.0 {
-        "-"
-    } else {
-        "+"
+    let sign = match d.class {
+        Class::Structure => "",
+        _ if d.value < 0.0 => "-",
+        _ => "+",
     };
     format!("{sign}{:.2} ± {:.2}", 100.0 * d.value.abs(), 100.0 * d.error)
 }
@@ -30,14 +28,6 @@ fn names(outcome: &Comparison) -> Vec<String> {
 fn row(names: &[String], errors: &[Deviation]) -> Vec<String> {
     let of = |name: &String| errors.iter().find(|d| d.name == *name).map_or_else(|| "–".into(), shown);
     names.iter().map(of).collect()
-}
-
-fn reference_row(names: &[String], who: &str, reference: &Reference) -> Vec<String> {
-    let dt = reference.dt.map_or_else(|| "none".into(), |dt| dt.to_string());
-    let mut cells = vec![who.to_owned(), dt, String::new(), String::new(), String::new()];
-    cells.extend(row(names, &reference.values));
-    cells.extend([String::new(), String::new()]);
-    cells
 }
 
 /// Every setting, the cheapest first; errors in percent.
@@ -62,24 +52,24 @@ pub fn table(outcome: &Comparison) -> Table {
         cells.push(if p.front { "front".into() } else { String::new() });
         table.push(cells);
     }
-    table.push(reference_row(&names, "the reference itself", &outcome.reference));
-    if let Some(reference) = &outcome.reference_of_dynamics {
-        table.push(reference_row(&names, "that of D and eta itself", reference));
-    }
-    if let Some(reference) = &outcome.lammps_reference {
-        table.push(reference_row(&names, "LAMMPS's reference itself", reference));
+    for (who, reference) in [
+        ("the reference itself", Some(&outcome.reference)),
+        ("that of D and eta itself", outcome.reference_of_dynamics.as_ref()),
+        ("LAMMPS's reference itself", outcome.lammps_reference.as_ref()),
+    ] {
+        let Some(Reference { dt, values, .. }) = reference else { continue };
+        let dt = dt.map_or_else(|| "none".into(), |dt| dt.to_string());
+        let mut cells = vec![who.to_owned(), dt, String::new(), String::new(), String::new()];
+        cells.extend(row(&names, values));
+        cells.extend([String::new(), String::new()]);
+        table.push(cells);
     }
     table
 }
 
 pub fn drifts(outcome: &Comparison) -> Table {
-    let mut table = Table::new([
-        "conservative steps of",
-        "dt",
-        "precision",
-        "drift, kT per particle and time unit",
-        "largest departure, kT",
-    ]);
+    let errors = ["drift, kT per particle and time unit", "largest departure, kT"];
+    let mut table = Table::new(["conservative steps of", "dt", "precision"].into_iter().chain(errors));
     for d in &outcome.drifts {
         let drift = match (d.slope, d.slope_error) {
             (Some(slope), Some(error)) => format!("{slope:.1e} ± {error:.0e}"),
@@ -204,7 +194,6 @@ pub fn explanation(outcome: &Comparison) -> String {
     )
 }
 
-/// `pareto.html`.
 pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));

@@ -3,31 +3,23 @@
 use psidpd_observe::{Measured, Observation};
 use serde::{Serialize, Serializer};
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     /// Energy of the particles, in kT for each.
-    #[serde(rename = "u")]
     Energy,
     /// Pressures of the conservative forces and of the momentum carried, in ρkT.
-    #[serde(rename = "p")]
     Pressure,
     /// Kinetic and configurational temperature, in kT.
-    #[serde(rename = "T")]
     Temperature,
     /// Coexisting densities, in units of the liquid's.
-    #[serde(rename = "rho")]
     Density,
     /// Surface tension, in units of itself.
-    #[serde(rename = "sigma")]
     Tension,
     /// Diffusion coefficient, in units of itself.
-    #[serde(rename = "D")]
     Diffusion,
     /// Shear viscosity, in units of itself.
-    #[serde(rename = "eta")]
     Viscosity,
     /// The distance of g(r): root mean square difference over root mean square, weighed by shells.
-    #[serde(rename = "g")]
     Structure,
 }
 

@@ -59,7 +59,6 @@ pub fn lammps_lines(origin: &Origin, physics: &Physics) -> Result<String, Lammps
     Ok(lines.fold(String::new(), |all, line| all + line + "\n"))
 }
 
-/// Whether LAMMPS with the plugin can make the steps.
 pub fn in_lammps(origin: &Origin, physics: &Physics) -> bool {
     lammps_lines(origin, physics).is_ok()
 }

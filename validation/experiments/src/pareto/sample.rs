@@ -37,18 +37,17 @@ impl Effort {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
-pub enum Sampled {
-    Made {
-        quantities: Box<Quantities>,
-        /// Samples of the kinetic temperature.
-        samples: u64,
-        /// Simulated time that they are spread over.
-        time: f64,
-    },
-    /// It stopped, or left its temperature far behind.
-    Unstable(String),
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Made {
+    pub quantities: Quantities,
+    /// Samples of the kinetic temperature.
+    pub samples: u64,
+    /// Simulated time that they are spread over.
+    pub time: f64,
 }
+
+/// What a run made, or why it stopped or left its temperature far behind.
+pub type Sampled = Result<Made, String>;
 
 /// Part of a run that is left for it to settle.
 const SETTLE: f64 = 0.2;
@@ -90,18 +89,12 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
         .requests
         .into_iter()
         .map(|request| {
-            let cheap = matches!(
-                request.meter,
-                AnyMeter::Pressure(_) | AnyMeter::Msd(_) | AnyMeter::InterfaceWidth(_)
-            );
-            // Correlations in time are asked for at steps of the scene.
-            let own = matches!(request.meter, AnyMeter::Viscosity(_));
-            let every = if own {
-                request.every
-            } else if cheap || !with_forces {
-                every
-            } else {
-                RARELY * every
+            let every = match request.meter {
+                // Correlations in time are asked for at steps of the scene.
+                AnyMeter::Viscosity(_) => request.every,
+                AnyMeter::Pressure(_) | AnyMeter::Msd(_) | AnyMeter::InterfaceWidth(_) => every,
+                _ if !with_forces => every,
+                _ => RARELY * every,
             };
             Request { every, skip: 0, stages: vec![stage.name.clone()], ..request }
         })
@@ -109,7 +102,6 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
     Ok(found)
 }
 
-/// Makes a run.
 pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ExperimentError> {
     let (dt, every) = (origin.dt(physics), physics.interval());
     let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;
@@ -120,15 +112,18 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
     let per_particle = 1.0 / run.len() as f64;
     let begin = Instant::now();
     let mut settling = 0;
-    let stopped = |error: RunError| Ok(Sampled::Unstable(error.to_string()));
+    let calm = |made: Result<(), RunError>, run: &Simulation| {
+        made.map_err(|e| e.to_string())?;
+        let ratio = run.temperature() / stage.kt;
+        let hot = || Err(format!("step {}: the temperature is {ratio:.1} kT", run.step_number()));
+        if ratio > FAR_OFF { hot() } else { Ok(()) }
+    };
     while settling < FEWEST / 4 || !effort.is_used(SETTLE, begin, settling) {
-        if let Err(error) = run.advance(every, dt, physics.integrator) {
-            return stopped(error);
+        let made = run.advance(every, dt, physics.integrator);
+        if let Err(why) = calm(made, &run) {
+            return Ok(Err(why));
         }
         settling += 1;
-        if let Some(hot) = too_hot(&run, stage.kt) {
-            return Ok(hot);
-        }
     }
     let mut time = 0.0;
     while sampled.samples() < FEWEST || !effort.is_used(1.0, begin, settling + sampled.samples()) {
@@ -137,11 +132,8 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
             run.record_flux(observers.wants_flux(run.step_number() + 1, &stage.name));
             run.step(dt, physics.integrator, Want::TOTALS)
         });
-        if let Err(error) = made {
-            return stopped(error);
-        }
-        if let Some(hot) = too_hot(&run, stage.kt) {
-            return Ok(hot);
+        if let Err(why) = calm(made, &run) {
+            return Ok(Err(why));
         }
         time += dt * every as f64;
         sampled.push(&[run.temperature(), per_particle * run.potential_energy()]);
@@ -149,11 +141,5 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
     }
     let means = [(Class::Temperature, "T_kin", sampled.mean(0)), (Class::Energy, "u", sampled.mean(1))];
     let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
-    Ok(Sampled::Made { quantities: Box::new(quantities), samples: sampled.samples(), time })
-}
-
-fn too_hot(run: &Simulation, kt: f64) -> Option<Sampled> {
-    let ratio = run.temperature() / kt;
-    (ratio > FAR_OFF)
-        .then(|| Sampled::Unstable(format!("step {}: the temperature is {ratio:.1} kT", run.step_number())))
+    Ok(Ok(Made { quantities, samples: sampled.samples(), time }))
 }

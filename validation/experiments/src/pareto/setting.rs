@@ -90,20 +90,25 @@ pub enum Choice {
 
 /// The steps that are tried, without the references.
 pub fn physics(choice: Choice) -> Vec<Physics> {
-    let mut ladder: Vec<(Integrator, &[f64])> = match choice {
+    let ladder: Vec<(Integrator, &[f64])> = match choice {
         Choice::Few => vec![
             (named("velocity-verlet"), &[1.0, 4.0]),
             (two_stage(1), &[2.0]),
             (force_gradient(LAMBDAS[0], 1), &[4.0]),
         ],
-        Choice::Quick => vec![
-            (named("velocity-verlet"), &[0.25, 0.5, 1.0, 2.0]),
-            (named("groot-warren"), &[1.0, 2.0]),
-            (named("shardlow-s1"), &[2.0]),
-            (named("aboba"), &[2.0]),
-            (two_stage(1), &[2.0, 4.0, 6.0]),
-            (two_stage(2), &[4.0, 6.0]),
-        ],
+        Choice::Quick => {
+            let mut all: Vec<(Integrator, &[f64])> = vec![
+                (named("velocity-verlet"), &[0.25, 0.5, 1.0, 2.0]),
+                (named("groot-warren"), &[1.0, 2.0]),
+                (named("shardlow-s1"), &[2.0]),
+                (named("aboba"), &[2.0]),
+                (two_stage(1), &[2.0, 4.0, 6.0]),
+                (two_stage(2), &[4.0, 6.0]),
+                (force_gradient(LAMBDAS[0], 1), &[4.0]),
+            ];
+            all.extend(LAMBDAS.map(|lambda| (force_gradient(lambda, 2), &[5.0, 6.0, 7.0, 8.0][..])));
+            all
+        }
         Choice::Full => {
             let several = |name: &str| matches!(name, "two-stage" | "force-gradient");
             let mut all: Vec<(Integrator, &[f64])> = Integrator::ALL
@@ -112,20 +117,11 @@ pub fn physics(choice: Choice) -> Vec<Physics> {
                 .map(|(_, it)| (*it, &[0.25, 0.5, 1.0, 2.0, 4.0][..]))
                 .collect();
             all.extend([1, 2, 4].map(|every| (two_stage(every), &[1.0, 2.0, 3.0, 4.0, 6.0, 8.0][..])));
+            let each = LAMBDAS.iter().flat_map(|l| [1, 2, 4].map(|every| force_gradient(*l, every)));
+            all.extend(each.map(|integrator| (integrator, &[4.0, 5.0, 6.0, 7.0, 8.0, 10.0][..])));
             all
         }
     };
-    match choice {
-        Choice::Few => {}
-        Choice::Quick => {
-            ladder.push((force_gradient(LAMBDAS[0], 1), &[4.0]));
-            ladder.extend(LAMBDAS.map(|lambda| (force_gradient(lambda, 2), &[5.0, 6.0, 7.0, 8.0][..])));
-        }
-        Choice::Full => {
-            let each = LAMBDAS.iter().flat_map(|l| [1, 2, 4].map(|every| force_gradient(*l, every)));
-            ladder.extend(each.map(|integrator| (integrator, &[4.0, 5.0, 6.0, 7.0, 8.0, 10.0][..])));
-        }
-    }
     let precisions: &[Precision] = match choice {
         Choice::Full => &[Precision::Mixed, Precision::Double],
         _ => &[Precision::Mixed],

@@ -42,7 +42,6 @@ fn folder_name(p: &Point) -> String {
     p.folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The same for people.
 pub fn table(axes: &[Axis], points: &[Point]) -> Table {
     let names = quantities(points);
     let keys = axes.iter().map(|a| a.key.clone());
@@ -63,7 +62,6 @@ pub fn table(axes: &[Axis], points: &[Point]) -> Table {
     table
 }
 
-/// A page with a plot of each result.
 pub fn page(title: &str, axes: &[Axis], points: &[Point]) -> Result<Report, ReportError> {
     let mut sections = vec![Section::new("Results", vec![Item::Table(table(axes, points))])];
     let mut plots = Vec::new();
@@ -91,30 +89,23 @@ pub fn page(title: &str, axes: &[Axis], points: &[Point]) -> Result<Report, Repo
 }
 
 /// One result against the axis `x`, a series for each combination of the values of the others.
-fn plot(name: &str, x: usize, axes: &[Axis], points: &[Point]) -> Plot {
-    let mut series: Vec<Series> = Vec::new();
-    let mut theory: Vec<(f64, f64)> = Vec::new();
-    let mut unit = String::new();
-    for p in points {
-        let (Some(at), Some(v)) = (p.edits[x].number(), p.headline.get(name)) else { continue };
-        unit.clone_from(&v.unit);
-        let others: Vec<String> =
-            p.edits.iter().enumerate().filter(|(k, _)| *k != x).map(|(_, e)| e.to_string()).collect();
-        let others = others.join(", ");
-        let of_these = match series.iter_mut().find(|s| s.name == others) {
-            Some(found) => found,
-            None => {
-                series.push(Series::new(others, Vec::new(), Style::Points).with_errors(Vec::new()));
-                let last = series.len() - 1;
-                &mut series[last]
-            }
-        };
-        of_these.points.push((at, v.value));
-        if let Some(errors) = &mut of_these.errors {
-            errors.push(v.error.unwrap_or(f64::NAN));
-        }
-        theory.extend(v.mean_field.map(|y| (at, y)));
-    }
+fn plot<'a>(name: &str, x: usize, axes: &[Axis], points: &'a [Point]) -> Plot {
+    let others = |p: &Point| {
+        let others = p.edits.iter().enumerate().filter(|(k, _)| *k != x).map(|(_, e)| e.to_string());
+        others.collect::<Vec<_>>().join(", ")
+    };
+    let value = |p: &'a Point| Some((others(p), p.edits[x].number()?, p.headline.get(name)?));
+    let found: Vec<_> = points.iter().filter_map(value).collect();
+    let of = |others: &String| {
+        let these = || found.iter().filter(move |(of, ..)| of == others);
+        let errors = these().map(|(.., v)| v.error.unwrap_or(f64::NAN)).collect();
+        let points = these().map(|(_, at, v)| (*at, v.value)).collect();
+        Series::new(others, points, Style::Points).with_errors(errors)
+    };
+    let mut series: Vec<Series> =
+        distinct(found.iter().map(|(others, ..)| others)).into_iter().map(of).collect();
+    let mut theory: Vec<_> = found.iter().filter_map(|(_, at, v)| Some((*at, v.mean_field?))).collect();
+    let unit = found.last().map_or("", |(.., v)| v.unit.as_str());
     // Beside a single series, theory is one curve.
     if series.len() == 1 && theory.len() > 1 {
         theory.sort_by(|a, b| a.0.total_cmp(&b.0));

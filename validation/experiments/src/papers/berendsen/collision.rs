@@ -3,7 +3,7 @@
 use super::IMMISCIBLE;
 use crate::ExperimentError;
 use crate::machine::peak_kilobytes;
-use crate::papers::case::{Reproduction, bare, exact, profile};
+use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::{Change, Context};
 
 const SMALL: &str = include_str!("../../../../scenes/drop-collision.toml");
@@ -22,51 +22,45 @@ pub fn tension(context: &Context, outcome: &mut Reproduction) -> Result<(), Expe
     );
     let observed = context.scene("layers", IMMISCIBLE, &scene)?;
     // Printed without a digit after the point.
-    outcome.equal("tension by the stress", observed.scalar("surface_tension", "stress"), 28.0, 0.5);
-    outcome.equal("tension by the free energy", observed.scalar("surface_tension", "free_energy"), 28.0, 0.5);
-    let fraction = profile(&observed, "composition_profile", "fraction_D");
-    outcome.plot("fraction", "Two liquids", ["z", "fraction of D"], &[("fraction", fraction)], &[]);
+    outcome.equal("tension by the stress", observed.scalar("surface_tension", "stress"), [28.0, 0.5]);
+    outcome.equal(
+        "tension by the free energy",
+        observed.scalar("surface_tension", "free_energy"),
+        [28.0, 0.5],
+    );
+    let fraction = vec![points("fraction", &observed.profile("composition_profile", "fraction_D"))];
+    outcome.plot("fraction", "Two liquids", ["z", "fraction of D"], fraction);
     Ok(())
 }
 
 pub fn merge(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[])?;
-    let series = |column| profile(&observed, "clusters_series", column);
-    let largest = series("largest");
+    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[] as &[Change])?;
+    let largest = observed.profile("clusters_series", "largest");
     let drops = context.pick(2.0_f64, 15.0).powi(3) * 10.0 * 8.0 / 3.0 * std::f64::consts::PI;
     if let [(_, first), .., (_, last)] = largest[..] {
-        outcome.equal("largest drop over one drop, before", exact(2.0 * first.value / drops), 1.0, 0.02);
-        outcome.equal("largest drop over both, after", exact(last.value / drops), 1.0, 0.02);
+        outcome.equal("largest drop over one drop, before", 2.0 * first.value / drops, [1.0, 0.02]);
+        outcome.equal("largest drop over both, after", last.value / drops, [1.0, 0.02]);
     }
-    outcome.plot(
-        "largest",
-        "Collision",
-        ["time", "particles of the largest drop"],
-        &[],
-        &[("largest", bare(&largest))],
-    );
+    let axes = ["time", "particles of the largest drop"];
+    outcome.plot("largest", "Collision", axes, vec![curve("largest", bare(&largest))]);
     Ok(())
 }
 
 pub fn size(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let box_: toml_edit::Value =
         [60.0, 60.0, 104.1667].into_iter().map(|l| l / 100_f64.cbrt()).collect::<toml_edit::Array>().into();
-    let changes: &[Change] = &[(&["box"], box_)];
     // A few steps of the scene, with nothing observed; at quick size one liquid fills a smaller box.
     let head = FULL.split("[[part]]").next().unwrap_or(FULL).replace("steps   = 5000", "steps = 20");
     let text = format!(
         "{head}[initial]\nkind = \"lattice\"\nspecies = \"D\"\n[output]\nthermo = 20\n[observe]\nevery = 10\ntemperature = true\n"
     );
     let begun = std::time::Instant::now();
-    context.shipped("size", IMMISCIBLE, &text, changes)?;
+    context.shipped("size", IMMISCIBLE, &text, &[("box", box_)])?;
     let seconds = begun.elapsed().as_secs_f64();
     let particles = context.pick(3.75e4, 3.75e6);
     // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.
-    outcome.at_most("memory, GB", exact(peak_kilobytes()? as f64 / 1e6), 4.0);
-    outcome.at_most(
-        "seconds for a step of 3.75 million particles",
-        exact(seconds / 20.0 * 3.75e6 / particles),
-        60.0,
-    );
+    outcome.at_most("memory, GB", peak_kilobytes()? as f64 / 1e6, 4.0);
+    let each = seconds / 20.0 * 3.75e6 / particles;
+    outcome.at_most("seconds for a step of 3.75 million particles", each, 60.0);
     Ok(())
 }

@@ -1,10 +1,11 @@
-//! Figures 10 and 11: the binary mixture at half of its critical temperature, from phases apart.
+//! Figures 10 to 12: the binary mixture, from phases apart.
 
 use super::BINARY;
 use crate::ExperimentError;
 use crate::bulk::Observed;
-use crate::papers::case::{Reproduction, bare, exact, layers, profile, ratio};
-use crate::papers::context::{Context, mean_field};
+use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
+use crate::papers::context::{Change, Context, mean_field};
+use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 
 const SCENE: &str = include_str!("../../../../scenes/full/binary-2d.toml");
@@ -20,28 +21,13 @@ const RHO: f64 = 10.0;
 const BOXES: [f64; 2] = [10.0, 3.0];
 
 fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, ExperimentError> {
-    let changes: &[crate::papers::context::Change] = &[
-        (&["equilibrate"], 3000.into()),
-        (&["steps"], 40_000.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-    ];
-    context.shared("pagonabarraga-binary").shipped(name, BINARY, scene, changes)
+    let changes: [Change; 4] =
+        [("equilibrate", 3000), ("steps", 40_000), ("output.dump", 0), ("observe.every", 20)];
+    context.shared("pagonabarraga-binary").shipped(name, BINARY, scene, &changes)
 }
 
 fn mixture(context: &Context) -> Result<Observed, ExperimentError> {
     run(context, RUN, &format!("{SCENE}msd = {{ length = {} }}\n", context.pick(300, 2000)))
-}
-
-/// The tension by the stress of the layers, at half of the critical temperature of mean field and above.
-pub fn tensions(context: &Context) -> Result<Vec<(f64, Measured)>, ExperimentError> {
-    // Of two interfaces.
-    let tension = |o: &Observed| o.scalar("stress_profile_integral", "integral").times(0.5);
-    let mut all = vec![(KT, tension(&mixture(context)?))];
-    for (kt, name, scene) in WARMER {
-        all.push((kt, tension(&run(context, name, scene)?)));
-    }
-    Ok(all)
 }
 
 /// The fraction of A along y, from the middle of its layer.
@@ -54,18 +40,15 @@ struct Layers {
 }
 
 fn composition(observed: &Observed) -> Layers {
-    let fraction = profile(observed, "composition_profile", "fraction_A");
+    let fraction = observed.profile("composition_profile", "fraction_A");
     let phases = layers(&fraction);
     let [b, a] = phases.map(|p| p.value);
     let place = |level: f64, side: f64| crossing(&fraction, b + level * (a - b), side);
     let widths = [-1.0, 1.0].map(|side| {
         let [outer, inner] = [0.1, 0.9].map(|level| place(level, side));
-        Measured { value: side * (outer.value - inner.value), error: outer.error.hypot(inner.error) }
+        outer.minus(inner).times(side)
     });
-    let width = Measured {
-        value: 0.5 * (widths[0].value + widths[1].value),
-        error: 0.5 * widths[0].error.hypot(widths[1].error),
-    };
+    let width = widths[0].plus(widths[1]).times(0.5);
     Layers { phases, width, fraction }
 }
 
@@ -107,30 +90,20 @@ fn without_waves([wide, narrow]: [Measured; 2]) -> Measured {
 
 pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = mixture(context)?;
-    outcome.equal("kinetic temperature", observed.temperature(), KT, 0.05);
+    outcome.equal("kinetic temperature", observed.temperature(), [KT, 0.05]);
     let width = composition(&observed).width;
     let mut lines = Vec::new();
     for (species, column) in [("A", "msd_A"), ("B", "msd_B")] {
-        let msd = profile(&observed, "msd", column);
+        let msd = observed.profile("msd", column);
         if let Some((_, last)) = msd.last() {
             let share = last.times(1.0 / (width.value * width.value));
             // "Much larger than the interfacial width", of which the displacement is a root.
             outcome.at_least(format!("mean-square displacement of {species} over width squared"), share, 4.0);
         }
-        lines.push((species, bare(&msd)));
+        lines.push(curve(species, bare(&msd)));
     }
-    outcome.plot("msd", "Mean-square displacements", ["time", "msd"], &[], &lines);
-    let rows = context.shared("pagonabarraga-binary").thermo(RUN, ["time", "temperature", "pressure"])?;
-    let series = |k: usize| rows.iter().map(|row| (row[0], row[k])).collect();
-    outcome.plot("temperature", "Binary mixture", ["time", "kT"], &[], &[("kinetic", series(1))]);
-    outcome.plot(
-        "pressure",
-        "Binary mixture",
-        ["time", "pressure"],
-        &[],
-        &[("mean of xx and yy", series(2))],
-    );
-    Ok(())
+    outcome.plot("msd", "Mean-square displacements", ["time", "msd"], lines);
+    context.shared("pagonabarraga-binary").plot_thermo(RUN, "Binary mixture", outcome)
 }
 
 pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
@@ -140,8 +113,8 @@ pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
     let binodal = theory.composition_binodal(RHO)?;
     // "Goes basically to zero"; mean field has 2 %. One in a hundred can be read in the figure.
     for (place, k) in [("B", 0), ("A", 1)] {
-        let expected = Measured { value: binodal.composition[k], error: 0.01 };
-        outcome.own(format!("fraction of A where {place} is, beside mean field"), layers.phases[k], expected);
+        let name = format!("fraction of A where {place} is, beside mean field");
+        outcome.own(name, layers.phases[k], [binodal.composition[k], 0.01]);
     }
     // "Keeps its width within r_c". In a box L wide, waves of an interface in two dimensions add to the square of its
     // width in proportion to L, kT L/(12 γ) to the variance of its place; the paper does not say how wide its box is.
@@ -149,26 +122,49 @@ pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
     let narrow = SCENE.replace("box     = [10.0, ", "box     = [3.0, ");
     let narrow = composition(&run(context, "binary-narrow", &narrow)?).width;
     outcome.at_most("in a box 3 wide", narrow, 1.0);
-    outcome.at_most(
-        "without waves: squares at both widths extrapolated to none",
-        without_waves([layers.width, narrow]),
-        1.0,
-    );
+    let without = without_waves([layers.width, narrow]);
+    outcome.at_most("without waves: squares at both widths extrapolated to none", without, 1.0);
     // The dip of the density "is not large compared with the typical fluctuations": of a square of edge r_c.
-    let density = profile(&observed, "density_profile", "density");
-    let lowest = density.iter().map(|(_, d)| *d).min_by(|a, b| a.value.total_cmp(&b.value));
-    let fluctuation =
-        (KT / theory.pressure_slope(&[RHO * binodal.composition[0], RHO * binodal.composition[1]]) / RHO)
-            .sqrt();
-    if let Some(lowest) = lowest {
-        let dip = ratio(lowest, exact(RHO));
-        let dip = Measured { value: (1.0 - dip.value) / fluctuation, error: dip.error / fluctuation };
-        outcome.at_most("dip of the density over its fluctuations", dip, 2.0);
+    let density = observed.profile("density_profile", "density");
+    let fluctuation = (KT / theory.pressure_slope(&binodal.composition.map(|x| RHO * x)) / RHO).sqrt();
+    let dip = Measured::from(1.0).minus(extreme(&density, -1.0).over(RHO)).over(fluctuation);
+    outcome.at_most("dip of the density over its fluctuations", dip, 2.0);
+    let density = density.iter().map(|(y, d)| (*y, d.value / RHO)).collect();
+    let lines = vec![curve("fraction of A", bare(&layers.fraction)), curve("density over its mean", density)];
+    outcome.plot("profiles", "Binary mixture", ["y", "fraction, density"], lines);
+    Ok(())
+}
+
+/// The tension, in mean field and measured.
+pub fn fig12(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
+    // kT_c = rho (lambda - lambda_A) = 10 · 0.8.
+    let model = Model::parse("model.toml", BINARY)?;
+    let tension = |kt: f64| -> Result<f64, ExperimentError> {
+        Ok(mean_field(BINARY, kt)?.composition_interface(RHO, 400)?.tension)
+    };
+    let critical =
+        psidpd_core::theory::composition_critical_point(&|kt| Ok(model.at(kt)?), RHO, [2.0, 20.0])?;
+    outcome.equal("kT_c", critical.parameter, [8.0, 1e-4]);
+    // γ ∝ (1 − T/T_c)^(3/2), eq. (40).
+    let [near, nearer] = [0.04, 0.02];
+    let exponent =
+        (tension(8.0 * (1.0 - near))? / tension(8.0 * (1.0 - nearer))?).ln() / (near / nearer).ln();
+    outcome.equal("exponent of the tension", exponent, [1.5, 0.02]);
+    // The paper multiplies mean field by a number of its own, so that only the fall with temperature can be compared.
+    // Of two interfaces.
+    let by_stress = |o: Observed| o.scalar("stress_profile_integral", "integral").times(0.5);
+    let mut measured = vec![(KT / 8.0, by_stress(mixture(context)?))];
+    for (kt, name, scene) in WARMER {
+        measured.push((kt / 8.0, by_stress(run(context, name, scene)?)));
     }
-    let lines = [
-        ("fraction of A", bare(&layers.fraction)),
-        ("density over its mean", density.iter().map(|(y, d)| (*y, d.value / RHO)).collect()),
-    ];
-    outcome.plot("profiles", "Binary mixture", ["y", "fraction, density"], &[], &lines);
+    if let [(_, cold), .., (_, warm)] = measured[..] {
+        outcome.at_least("tension by the stress at T = T_c/2", cold, 0.0);
+        outcome.at_most("what it gains up to T = 7 T_c/8", warm.minus(cold), 0.0);
+    }
+    let temperatures = (0..20).map(|k| 3.0 + 0.25 * f64::from(k));
+    let theory =
+        temperatures.map(|kt| Ok((kt / 8.0, tension(kt)?))).collect::<Result<_, ExperimentError>>()?;
+    let series = vec![points("by the stress", &measured), curve("mean field", theory)];
+    outcome.plot("tension", "Binary mixture", ["T/T_c", "tension"], series);
     Ok(())
 }

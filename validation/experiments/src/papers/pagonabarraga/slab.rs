@@ -3,9 +3,8 @@
 use super::SLAB;
 use crate::ExperimentError;
 use crate::bulk::Observed;
-use crate::papers::case::{Reproduction, bare, difference, exact, profile, ratio};
-use crate::papers::context::{Context, mean_field};
-use psidpd_observe::Measured;
+use crate::papers::case::{Reproduction, bare, curve, extreme, points};
+use crate::papers::context::{Change, Context, mean_field};
 
 const SCENE: &str = include_str!("../../../../scenes/full/van-der-waals-2d-slab.toml");
 const RUN: &str = "slab";
@@ -13,35 +12,28 @@ const KT: f64 = 0.75;
 
 fn slab(context: &Context) -> Result<(Context, Observed), ExperimentError> {
     let context = context.shared("pagonabarraga-slab");
-    let changes: &[crate::papers::context::Change] = &[
-        (&["equilibrate"], 2000.into()),
-        (&["steps"], 10_000.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-    ];
+    let changes: [Change; 4] =
+        [("equilibrate", 2000), ("steps", 10_000), ("output.dump", 0), ("observe.every", 20)];
     let scene = format!("{SCENE}msd = {{ length = {} }}\ninterface_width = true\n", context.pick(250, 2000));
-    let observed = context.shipped(RUN, SLAB, &scene, changes)?;
+    let observed = context.shipped(RUN, SLAB, &scene, &changes)?;
     Ok((context, observed))
 }
 
 pub fn fig7(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let (context, observed) = slab(context)?;
     // "Does not shift, and corresponds to its nominally assigned value": the last digit of that.
-    outcome.equal("kinetic temperature", observed.temperature(), KT, 0.005);
+    outcome.equal("kinetic temperature", observed.temperature(), [KT, 0.005]);
     let tension = observed.scalar("surface_tension", "stress");
-    outcome.at_least("tension over its error", exact(tension.value / tension.error), 3.0);
-    let msd = profile(&observed, "msd", "msd");
+    outcome.at_least("tension over its error", tension.value / tension.error, 3.0);
+    let msd = observed.profile("msd", "msd");
     let width = observed.scalar("interface_width", "width_10_90");
     if let Some((_, last)) = msd.last() {
-        let ratio = ratio(*last, width.times(width.value));
+        let ratio = last.over(width.times(width.value));
         outcome.at_least("mean-square displacement over the square of the width", ratio, 1.0);
     }
-    outcome.plot("msd", "Mean-square displacement", ["time", "msd"], &[], &[("msd", bare(&msd))]);
-    let rows = context.thermo(RUN, ["time", "temperature", "pressure"])?;
-    let series = |k: usize| rows.iter().map(|row| (row[0], row[k])).collect();
-    outcome.plot("temperature", "Slab", ["time", "kT"], &[], &[("kinetic", series(1))]);
-    outcome.plot("pressure", "Slab", ["time", "pressure"], &[], &[("mean of xx and yy", series(2))]);
-    Ok(())
+    let msd = vec![curve("msd", bare(&msd))];
+    outcome.plot("msd", "Mean-square displacement", ["time", "msd"], msd);
+    context.plot_thermo(RUN, "Slab", outcome)
 }
 
 pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
@@ -49,30 +41,21 @@ pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     let shape = |column| observed.scalar("interface_width", column);
     let (gas, liquid) = (shape("vapour"), shape("liquid"));
     // Printed without a digit after the point.
-    outcome.equal("density of the gas", gas, 10.0, 0.5);
+    outcome.equal("density of the gas", gas, [10.0, 0.5]);
     // "ρ_liq/ρ_gas = 4": between 3.5 and 4.5.
-    outcome.equal("density of the gas over that of the liquid", ratio(gas, liquid), 0.25, 0.03);
+    outcome.equal("density of the gas over that of the liquid", gas.over(liquid), [0.25, 0.03]);
     // What follows from the printed parameters.
     let binodal = mean_field(SLAB, KT)?.binodal()?;
     // A hundredth is for the correlations that mean field leaves out.
-    let expected = Measured { value: binodal.liquid, error: 0.01 * binodal.liquid };
+    let expected = [binodal.liquid, 0.01 * binodal.liquid];
     outcome.own("density of the liquid beside mean field", liquid, expected);
-    let density = profile(&observed, "density_profile", "density");
-    let highest = density.iter().map(|(_, d)| *d).max_by(|a, b| a.value.total_cmp(&b.value));
-    if let Some(highest) = highest {
-        // "The decay of the density is monotonic": no layer is denser than the liquid, but for noise.
-        let share = ratio(difference(highest, liquid), liquid);
-        outcome.at_most("highest density over that of the liquid, less one", share, 0.03);
-    }
-    outcome.plot("density", "Slab", ["y", "density"], &[("density", density)], &[]);
-    let stress = |column| profile(&observed, "stress_profile", column);
-    outcome.plot(
-        "pressures",
-        "Slab",
-        ["y", "pressure"],
-        &[],
-        &[("normal", bare(&stress("normal"))), ("tangential", bare(&stress("tangential")))],
-    );
+    let density = observed.profile("density_profile", "density");
+    // "The decay of the density is monotonic": no layer is denser than the liquid, but for noise.
+    let share = extreme(&density, 1.0).minus(liquid).over(liquid);
+    outcome.at_most("highest density over that of the liquid, less one", share, 0.03);
+    outcome.plot("density", "Slab", ["y", "density"], vec![points("density", &density)]);
+    let stress = |column| curve(column, bare(&observed.profile("stress_profile", column)));
+    outcome.plot("pressures", "Slab", ["y", "pressure"], vec![stress("normal"), stress("tangential")]);
     Ok(())
 }
 
@@ -83,13 +66,8 @@ pub fn fig9(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     // 0.005.
     let conservative = observed.scalar("surface_tension", "stress_conservative");
     outcome.own("tension by the free energy beside that by the stress", free_energy, conservative);
-    let profiles = |column| profile(&observed, "stress_profile", column);
-    outcome.plot(
-        "difference",
-        "Slab",
-        ["y", "P_N − P_T"],
-        &[],
-        &[("P_N − P_T", bare(&profiles("difference"))), ("integral", bare(&profiles("integral")))],
-    );
+    let stress = |name, column| curve(name, bare(&observed.profile("stress_profile", column)));
+    let lines = vec![stress("P_N − P_T", "difference"), stress("integral", "integral")];
+    outcome.plot("difference", "Slab", ["y", "P_N − P_T"], lines);
     Ok(())
 }

@@ -5,14 +5,14 @@ use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::calibrate::Point;
 use crate::models::HUGGINS;
-use crate::papers::case::{Reproduction, bare, exact, layers, profile};
-use crate::papers::context::{Context, mean_field, with_parameters};
+use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
+use crate::papers::context::{Change, Context, mean_field, with_parameters};
 use psidpd_observe::Measured;
 
 pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = context.bulk("e1.6", &fluid(HUGGINS), &[8.0, 8.0])?;
     // One digit after the point is printed, and no error.
-    outcome.equal("pressure", observed.pressure(), 954.5, 0.05);
+    outcome.equal("pressure", observed.pressure(), [954.5, 0.05]);
     // With the integrator of the paper, at its step, from all forces and the velocities at the ends of steps.
     let scene = format!(
         "kT = 1.0\nseed = 1\nbox = {}\ndensity = 16.0\ndt = 0.01\nintegrator = \"self-consistent\"\nequilibrate = 400\nsteps = {}\n\
@@ -21,18 +21,17 @@ pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), Exper
         context.pick(1600, 50_000),
     );
     let same = context.scene("self-consistent", HUGGINS, &scene)?.scalar("pressure", "total");
-    outcome.equal("pressure by the paper's integrator", same, 954.5, 0.05);
+    outcome.equal("pressure by the paper's integrator", same, [954.5, 0.05]);
     let names = ["A".to_owned(), "B".to_owned()];
     let point = Point::of(&observed, &names, &[8.0, 8.0]);
     for (k, (at, of, offset)) in
         [("A", "A", 1.57), ("A", "B", 0.13), ("B", "A", 0.13), ("B", "B", 1.57)].into_iter().enumerate()
     {
-        let n = point.means[k];
-        let missing = Measured { value: 8.0 - n.value, error: n.error };
-        outcome.equal(format!("rho - <n> of {of} at {at}"), missing, offset, 0.005);
+        let missing = Measured::from(8.0).minus(point.means[k]);
+        outcome.equal(format!("rho - <n> of {of} at {at}"), missing, [offset, 0.005]);
     }
     let theory = mean_field(HUGGINS, 1.0)?.pressure(&[8.0, 8.0]);
-    outcome.equal("pressure of the theory", exact(theory), 969.4, 0.05);
+    outcome.equal("pressure of the theory", theory, [969.4, 0.05]);
     Ok(())
 }
 
@@ -50,13 +49,13 @@ fn demixed(context: &Context, strength: f64) -> Result<Observed, ExperimentError
          composition_profile = { recentre = \"A\" }\n",
         SCENE,
     );
-    context.shipped(&format!("e{strength}"), &model, scene, &[])
+    context.shipped(&format!("e{strength}"), &model, scene, &[] as &[Change])
 }
 
 /// Fraction of A in the layer of B and in that of A, which is in the middle of the profile: a quarter of the box amid
 /// each.
 fn phases(observed: &Observed) -> [Measured; 2] {
-    layers(&profile(observed, "composition_profile", "fraction_A"))
+    layers(&observed.profile("composition_profile", "fraction_A"))
 }
 
 /// Compositions of coexisting phases in mean field at the density of the mixture, as the paper has its critical point.
@@ -67,55 +66,37 @@ fn binodal(strength: f64) -> Result<[f64; 2], ExperimentError> {
 
 pub fn fig9(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = demixed(context, 1.9)?;
-    let density = profile(&observed, "density_profile", "density");
-    let extreme = |sign: f64| {
-        density
-            .iter()
-            .map(|(_, d)| *d)
-            .max_by(|a, b| (sign * a.value).total_cmp(&(sign * b.value)))
-            .unwrap_or(Measured::NONE)
-    };
+    let density = |column| observed.profile("density_profile", column);
+    let total = density("density");
     // The total density of the figure is flat, but for a dip that can be seen: within a tenth.
-    outcome.at_least("lowest density over the mean", extreme(-1.0).times(1.0 / 16.0), 0.9);
-    outcome.at_most("highest density over the mean", extreme(1.0).times(1.0 / 16.0), 1.1);
+    outcome.at_least("lowest density over the mean", extreme(&total, -1.0).times(1.0 / 16.0), 0.9);
+    outcome.at_most("highest density over the mean", extreme(&total, 1.0).times(1.0 / 16.0), 1.1);
     let [poor, rich] = phases(&observed);
     // Two layers: either is purer than the mixture by more than can be chance.
     outcome.at_most("fraction of A in the layer of B", poor, 0.4);
     outcome.at_least("fraction of A in the layer of A", rich, 0.6);
-    let part = |name| bare(&profile(&observed, "density_profile", name));
-    let lines = [("total", bare(&density)), ("A", part("density_A")), ("B", part("density_B"))];
-    outcome.plot("density", "e_AA = 1.9", ["z", "density"], &[], &lines);
+    let all = [("total", total), ("A", density("density_A")), ("B", density("density_B"))];
+    let lines = all.map(|(name, density)| curve(name, bare(&density))).to_vec();
+    outcome.plot("density", "e_AA = 1.9", ["z", "density"], lines);
     Ok(())
 }
 
 pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let strengths = context.pick(&[1.9, 2.1, 2.3][..], &[1.8, 1.9, 2.0, 2.1, 2.2, 2.3][..]);
-    let mut points = Vec::new();
+    let mut found = Vec::new();
     for strength in strengths {
         let [poor, rich] = phases(&demixed(context, *strength)?);
         let theory = binodal(*strength)?;
         // "A good agreement", and no numbers: one in a hundred can be read in the figure.
-        for (phase, found, value) in [("poorer", poor, theory[0]), ("richer", rich, theory[1])] {
+        for (phase, measured, value) in [("poorer", poor, theory[0]), ("richer", rich, theory[1])] {
             let name = format!("{phase} phase at e_AA = {strength}, beside mean field");
-            outcome.own(name, found, Measured { value, error: 0.01 });
+            outcome.own(name, measured, [value, 0.01]);
         }
-        points.extend([(*strength, poor), (*strength, rich)]);
+        found.extend([(*strength, poor), (*strength, rich)]);
     }
-    let curve = |side: usize| -> Vec<(f64, f64)> {
-        (0..=32)
-            .filter_map(|k| {
-                let e = 1.68 + 0.02 * f64::from(k);
-                Some((e, binodal(e).ok()?[side]))
-            })
-            .collect()
-    };
-    let lines = [("binodal", curve(0)), ("other side", curve(1))];
-    outcome.plot(
-        "binodal",
-        "Compressible Huggins mixture",
-        ["e_AA", "fraction of A"],
-        &[("measured", points)],
-        &lines,
-    );
+    let strengths = || (0..=32).map(|k| 1.68 + 0.02 * f64::from(k));
+    let side = |side: usize| strengths().filter_map(|e| Some((e, binodal(e).ok()?[side]))).collect();
+    let series = vec![points("measured", &found), curve("binodal", side(0)), curve("other side", side(1))];
+    outcome.plot("binodal", "Compressible Huggins mixture", ["e_AA", "fraction of A"], series);
     Ok(())
 }

@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::SPLINE;
-use crate::papers::case::{Reproduction, bare, profile, ratio};
+use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::{Change, Context};
 use psidpd_observe::Measured;
 
@@ -27,26 +27,22 @@ fn drop(context: &Context, which: usize) -> Result<Observed, ExperimentError> {
     let (count, scene) = SCENES[which];
     // Smaller drops come to rest sooner, and need more samples for the same error.
     let steps = (36_000_000 / count) as i64;
-    let changes: &[Change] = &[
-        (&["equilibrate"], 2000.into()),
-        (&["steps"], steps.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-    ];
-    context.shipped(&format!("drop-{count}"), SPLINE, scene, changes)
+    let changes: [Change; 4] =
+        [("equilibrate", 2000), ("steps", steps), ("output.dump", 0), ("observe.every", 20)];
+    context.shipped(&format!("drop-{count}"), SPLINE, scene, &changes)
 }
 
 pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = drop(context, 3)?;
     let [liquid, vapour, tension] =
         ["liquid", "vapour", "tension"].map(|column| observed.scalar("drop", column));
-    outcome.equal("liquid density", liquid, LIQUID[0], LIQUID[1]);
+    outcome.equal("liquid density", liquid, LIQUID);
     // "About 0.3", and the densities "more than 400 times" apart: both cannot be.
-    outcome.equal("vapour density, as printed", vapour, 0.3, 0.05);
-    outcome.at_least("liquid density over vapour density", ratio(liquid, vapour), 400.0);
-    outcome.equal("tension by Laplace's law", tension, LAPLACE[0], LAPLACE[1]);
-    let density = profile(&observed, "drop_profile", "density");
-    outcome.plot("density", "Drop of 5960", ["r", "density"], &[("density", density)], &[]);
+    outcome.equal("vapour density, as printed", vapour, [0.3, 0.05]);
+    outcome.at_least("liquid density over vapour density", liquid.over(vapour), 400.0);
+    outcome.equal("tension by Laplace's law", tension, LAPLACE);
+    let density = points("density", &observed.profile("drop_profile", "density"));
+    outcome.plot("density", "Drop of 5960", ["r", "density"], vec![density]);
     Ok(())
 }
 
@@ -55,8 +51,8 @@ const SURFACE: f64 = 2.5;
 
 /// Mean over shells of a function of normal and tangential pressure, by volume.
 fn mean(observed: &Observed, from: f64, to: f64, f: impl Fn(f64, f64) -> f64) -> Measured {
-    let (normal, tangential) =
-        (profile(observed, "drop_profile", "normal"), profile(observed, "drop_profile", "tangential"));
+    let [normal, tangential] =
+        ["normal", "tangential"].map(|column| observed.profile("drop_profile", column));
     let (mut sum, mut variance, mut weight) = (0.0, 0.0, 0.0);
     for ((r, n), (_, t)) in normal.iter().zip(&tangential).filter(|((r, _), _)| (from..to).contains(r)) {
         let w = r * r;
@@ -74,24 +70,20 @@ pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     // Beyond two widths of the surface; a hundredth of the peak can be read in the figure.
     let readable = 0.03;
     let bulk = |from, to| mean(&observed, from, to, |n, t| n - t);
-    outcome.equal("P_n - P_t in the liquid", bulk(0.0, radius - SURFACE), 0.0, readable);
-    outcome.equal("P_n - P_t in the vapour", bulk(radius + SURFACE, 9.5), 0.0, readable);
-    let (normal, tangential) =
-        (profile(&observed, "drop_profile", "normal"), profile(&observed, "drop_profile", "tangential"));
+    outcome.equal("P_n - P_t in the liquid", bulk(0.0, radius - SURFACE), [0.0, readable]);
+    outcome.equal("P_n - P_t in the vapour", bulk(radius + SURFACE, 9.5), [0.0, readable]);
+    let [normal, tangential] =
+        ["normal", "tangential"].map(|column| observed.profile("drop_profile", column));
     let bin = normal.get(1).map_or(f64::NAN, |(r, _)| r - normal[0].0);
-    let difference: Vec<(f64, Measured)> = normal
-        .iter()
-        .zip(&tangential)
-        .map(|((r, n), (_, t))| (*r, Measured { value: n.value - t.value, error: n.error.hypot(t.error) }))
-        .collect();
+    let both = normal.iter().zip(&tangential);
+    let difference: Vec<(f64, Measured)> = both.map(|((r, n), (_, t))| (*r, n.minus(*t))).collect();
     let around = || difference.iter().filter(|(r, _)| (r - radius).abs() < SURFACE).map(|(_, d)| d);
-    let integral = Measured {
-        value: bin * around().map(|d| d.value).sum::<f64>(),
-        error: bin * around().map(|d| d.error * d.error).sum::<f64>().sqrt(),
-    };
+    let value = bin * around().map(|d| d.value).sum::<f64>();
+    let error = bin * around().map(|d| d.error * d.error).sum::<f64>().sqrt();
     // Through the middle of the drop, as the paper does it, once across the surface.
-    outcome.equal("integral of P_n - P_t across the surface", integral, 3.320, 0.0005);
-    outcome.plot("difference", "Drop of 5960", ["r", "P_N − P_T"], &[("P_N − P_T", difference)], &[]);
+    outcome.equal("integral of P_n - P_t across the surface", [value, error], [3.320, 0.0005]);
+    let difference = vec![points("P_N − P_T", &difference)];
+    outcome.plot("difference", "Drop of 5960", ["r", "P_N − P_T"], difference);
     Ok(())
 }
 
@@ -102,56 +94,42 @@ pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
     let radius = (3.0 * 5960.0 / (4.0 * std::f64::consts::PI * LIQUID[0])).cbrt();
     let pressure = 2.0 * LAPLACE[0] / radius;
     let error = pressure * (LAPLACE[1] / LAPLACE[0]).hypot(LIQUID[1] / LIQUID[0] / 3.0);
-    outcome.equal("pressure inside", inside, pressure, error);
+    outcome.equal("pressure inside", inside, [pressure, error]);
     outcome.at_most("pressure outside over that inside", outside.times(1.0 / inside.value), 0.01);
     let edge = observed.scalar("drop", "radius").value;
-    outcome.at_most(
-        "pressure in the surface",
-        mean(&observed, edge - 0.2, edge + 0.4, |n, t| (n + 2.0 * t) / 3.0),
-        0.0,
-    );
-    let column = |name| bare(&profile(&observed, "drop_profile", name));
-    outcome.plot(
-        "pressure",
-        "Drop of 5960",
-        ["r", "pressure"],
-        &[],
-        &[("normal", column("normal")), ("tangential", column("tangential"))],
-    );
+    let surface = mean(&observed, edge - 0.2, edge + 0.4, |n, t| (n + 2.0 * t) / 3.0);
+    outcome.at_most("pressure in the surface", surface, 0.0);
+    let column = |name| curve(name, bare(&observed.profile("drop_profile", name)));
+    outcome.plot("pressure", "Drop of 5960", ["r", "pressure"], vec![column("normal"), column("tangential")]);
     Ok(())
 }
 
 pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let which: &[usize] = context.pick(&[0, 3], &[0, 1, 2, 3, 4, 5, 6]);
-    let mut points = Vec::new();
+    let mut found = Vec::new();
     for k in which {
         let observed = drop(context, *k)?;
         let (count, _) = SCENES[*k];
         // Eq. (17): all particles in the liquid.
         let liquid = observed.scalar("drop", "liquid").value;
         let radius = (3.0 * count as f64 / (4.0 * std::f64::consts::PI * liquid)).cbrt();
-        points.push((2.0 / radius, observed.scalar("drop", "laplace")));
+        found.push((2.0 / radius, observed.scalar("drop", "laplace")));
     }
     // A straight line through the origin, weighted by the errors.
     let (mut xy, mut xx) = (0.0, 0.0);
-    for (x, p) in &points {
+    for (x, p) in &found {
         let weight = p.error.powi(-2);
         xy += weight * x * p.value;
         xx += weight * x * x;
     }
     let tension = Measured { value: xy / xx, error: xx.powf(-0.5) };
-    outcome.equal("tension by Laplace's law", tension, LAPLACE[0], LAPLACE[1]);
-    for ((count, _), (x, p)) in which.iter().map(|k| SCENES[*k]).zip(&points) {
+    outcome.equal("tension by Laplace's law", tension, LAPLACE);
+    for ((count, _), (x, p)) in which.iter().map(|k| SCENES[*k]).zip(&found) {
         // "A straight line through the origin".
         outcome.own(format!("pressure of {count} particles beside the line"), *p, tension.times(*x));
     }
-    let published = vec![(0.0, 0.0), (0.6, 0.6 * LAPLACE[0])];
-    outcome.plot(
-        "laplace",
-        "Laplace's law",
-        ["2/R", "pressure difference"],
-        &[("measured", points)],
-        &[("3.245 · 2/R", published)],
-    );
+    let published = curve("3.245 · 2/R", vec![(0.0, 0.0), (0.6, 0.6 * LAPLACE[0])]);
+    let series = vec![points("measured", &found), published];
+    outcome.plot("laplace", "Laplace's law", ["2/R", "pressure difference"], series);
     Ok(())
 }

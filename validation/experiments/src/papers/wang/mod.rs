@@ -5,6 +5,8 @@ mod drop;
 mod pressure;
 
 use super::Paper;
+use demixing::{fig3, fig4, limit};
+use drop::{fig6, fig8, fig10, fig11};
 
 const EOS: &str = include_str!("../../../../models/spline-eos.toml");
 const WEAK: &str = include_str!("../../../../models/spline-demixing-b08.toml");
@@ -19,16 +21,12 @@ pub const PAPER: Paper = (
             "equation of state of 8.0 W(0.8) - 4.08 W(1.0) against the van der Waals fit of the paper",
             pressure::fig2,
         ),
-        ("fig3", "attraction B = 0.8: no two phases", demixing::fig3),
-        ("fig4", "attraction B = 1.0: two phases", demixing::fig4),
-        ("limit", "17.0 W(0.8) collapses, 19.0 W(0.8) does not (theory)", demixing::limit),
-        (
-            "fig6",
-            "drop of 5960 particles: densities inside and outside, tension by Laplace's law",
-            drop::fig6,
-        ),
-        ("fig8", "drop of 5960 particles: P_n - P_t, tension by its integral", drop::fig8),
-        ("fig10", "drop of 5960 particles: pressure inside, in the surface, outside", drop::fig10),
-        ("fig11", "drops of 2828 to 16312 particles: tension by Laplace's law", drop::fig11),
+        ("fig3", "attraction B = 0.8: no two phases", fig3),
+        ("fig4", "attraction B = 1.0: two phases", fig4),
+        ("limit", "17.0 W(0.8) collapses, 19.0 W(0.8) does not (theory)", limit),
+        ("fig6", "drop of 5960 particles: densities inside and outside, tension by Laplace's law", fig6),
+        ("fig8", "drop of 5960 particles: P_n - P_t, tension by its integral", fig8),
+        ("fig10", "drop of 5960 particles: pressure inside, in the surface, outside", fig10),
+        ("fig11", "drops of 2828 to 16312 particles: tension by Laplace's law", fig11),
     ],
 );

@@ -2,39 +2,37 @@
 
 use super::EOS;
 use crate::ExperimentError;
-use crate::papers::case::{Reproduction, line};
+use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid};
-use psidpd_observe::Measured;
 
 /// How far the fluid of half the potential is from the fit at most; that of the potential as printed is 12 to 28 %.
 const NEAR: f64 = 0.025;
 
 pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let fluid = Fluid { model: EOS, kt: 1.0, dt: 0.01, edge: 8.0, observe: "" };
+    let fluid = Fluid { edge: 8.0, ..Fluid::of(EOS) };
     let published = |rho: f64| rho / (1.0 - 0.0134 * rho) - 0.0333 * rho * rho;
-    let [mut points, mut halves] = [Vec::new(), Vec::new()];
+    let [mut whole, mut halves] = [Vec::new(), Vec::new()];
     for rho in [2.0, 5.0, 10.0] {
         let p = context.bulk(&format!("rho{rho}"), &fluid, &[rho])?.configurational_pressure();
         // The last printed digits of b and a.
         let b = 0.00005 * (rho / (1.0 - 0.0134 * rho)).powi(2);
-        outcome.equal(format!("pressure at density {rho}"), p, published(rho), b.hypot(0.00005 * rho * rho));
-        points.push((rho, p));
+        outcome.equal(
+            format!("pressure at density {rho}"),
+            p,
+            [published(rho), b.hypot(0.00005 * rho * rho)],
+        );
+        whole.push((rho, p));
         // Both strengths halved, or kT doubled and p in units of it.
         let half = EOS.replace("strength = 1.0", "strength = 0.5");
-        let p = context
-            .bulk(&format!("half-rho{rho}"), &Fluid { model: &half, ..fluid }, &[rho])?
-            .configurational_pressure();
+        let half = Fluid { model: &half, ..fluid };
+        let p = context.bulk(&format!("half-rho{rho}"), &half, &[rho])?.configurational_pressure();
         // The points of the paper are not printed, and lie about their fit.
-        let off = Measured { value: (p.value / published(rho) - 1.0).abs(), error: p.error / published(rho) };
+        let off = [(p.value / published(rho) - 1.0).abs(), p.error / published(rho)];
         outcome.at_most(format!("half the potential against the fit at density {rho}, relative"), off, NEAR);
         halves.push((rho, p));
     }
-    outcome.plot(
-        "pressure",
-        "Spline potential",
-        ["density", "pressure"],
-        &[("measured", points), ("half the potential", halves)],
-        &[("van der Waals fit of the paper", line(0.0, 11.0, published))],
-    );
+    let fit = curve("van der Waals fit of the paper", line(0.0, 11.0, published));
+    let series = vec![points("measured", &whole), points("half the potential", &halves), fit];
+    outcome.plot("pressure", "Spline potential", ["density", "pressure"], series);
     Ok(())
 }

@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
-use crate::papers::case::{Reproduction, bare, difference, profile};
+use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::{Context, Fluid};
 use psidpd_observe::Measured;
 
@@ -19,19 +19,9 @@ const SETS: [Set; 2] = [
     ("set 6", SET6, [(0.5, 6.3), (1.0, 6.05), (2.0, 5.6)]),
 ];
 
-/// The slab of a set at a temperature.
-fn of_set(
-    context: &Context,
-    set: &str,
-    model: &str,
-    (kt, rho): (f64, f64),
-) -> Result<Observed, ExperimentError> {
-    slab(context, &format!("{}-kT{kt}", set.replace(' ', "")), model, kt, rho)
-}
-
 /// Eq. (19) with the slope between bins 0.25 wide, two apart: the largest of the profile and its mirror image.
 fn width_by_bins(observed: &Observed) -> Measured {
-    let density = profile(observed, "density_profile", "density");
+    let density = observed.profile("density_profile", "density");
     let count = density.len();
     let wide = (0.25 / BIN) as usize;
     let mean = |from: usize| {
@@ -48,8 +38,13 @@ fn width_by_bins(observed: &Observed) -> Measured {
     Measured { value, error: value * fit.error / fit.value }
 }
 
-/// A slab between two surfaces; figures and the table share the runs.
-fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result<Observed, ExperimentError> {
+/// A slab of a set between two surfaces; figures and the table share the runs.
+fn slab(
+    context: &Context,
+    set: &str,
+    model: &str,
+    (kt, rho): (f64, f64),
+) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-slab");
     let [edge, height] = context.pick([7.0, 18.0], [10.0, 30.0]);
     let scene = format!(
@@ -62,7 +57,7 @@ fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result
         0.5 * height,
         (height / BIN) as u32,
     );
-    context.scene(name, model, &scene)
+    context.scene(&format!("{}-kT{kt}", set.replace(' ', "")), model, &scene)
 }
 
 pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
@@ -71,24 +66,20 @@ pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), Exper
         ("set 6", SET6, [6.05, 0.01], [0.66, 0.03], [7.45, 0.04], [47.0, 2.0]),
     ];
     for (set, model, liquid, width, tension, slope) in printed {
-        let observed = of_set(context, set, model, (1.0, liquid[0]))?;
+        let observed = slab(context, set, model, (1.0, liquid[0]))?;
         let shape = |column| observed.scalar("interface_width", column);
-        outcome.equal(format!("liquid density of {set}"), shape("liquid"), liquid[0], liquid[1]);
-        outcome.equal(format!("width of {set}"), shape("width"), width[0], width[1]);
-        let name = format!("width of {set}, slope between bins of 0.25");
-        outcome.equal(name, width_by_bins(&observed), width[0], width[1]);
-        let measured = observed.scalar("surface_tension", "stress");
-        outcome.equal(format!("tension of {set}"), measured, tension[0], tension[1]);
+        outcome.equal(format!("liquid density of {set}"), shape("liquid"), liquid);
+        outcome.equal(format!("width of {set}"), shape("width"), width);
+        let by_bins = width_by_bins(&observed);
+        outcome.equal(format!("width of {set}, slope between bins of 0.25"), by_bins, width);
+        outcome.equal(format!("tension of {set}"), observed.scalar("surface_tension", "stress"), tension);
         // The paper has it from eq. (18), which is fitted to such pressures.
-        let fluid = Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" };
-        let name = |rho: f64| format!("{}-rho{rho:.2}", set.replace(' ', ""));
-        let [below, above] = [liquid[0] - NEAR, liquid[0] + NEAR];
-        let rise = difference(
-            context.bulk(&name(above), &fluid, &[above])?.pressure(),
-            context.bulk(&name(below), &fluid, &[below])?.pressure(),
-        );
-        let name = format!("dp/drho of {set} at the density of its liquid");
-        outcome.equal(name, rise.times(0.5 / NEAR), slope[0], slope[1]);
+        let pressure = |rho: f64| -> Result<Measured, ExperimentError> {
+            let name = format!("{}-rho{rho:.2}", set.replace(' ', ""));
+            Ok(context.bulk(&name, &Fluid::of(model), &[rho])?.pressure())
+        };
+        let rise = pressure(liquid[0] + NEAR)?.minus(pressure(liquid[0] - NEAR)?).times(0.5 / NEAR);
+        outcome.equal(format!("dp/drho of {set} at the density of its liquid"), rise, slope);
     }
     Ok(())
 }
@@ -99,23 +90,23 @@ pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
         let mut gaps = Vec::new();
         let mut ends = Vec::new();
         for state in states {
-            let observed = of_set(context, set, model, state)?;
+            let observed = slab(context, set, model, state)?;
             let [vapour, liquid] =
                 ["vapour", "liquid"].map(|column| observed.scalar("interface_width", column));
             if state.0 <= 1.0 {
                 // "Virtually devoid of particles".
                 outcome.at_most(format!("density of the vapour of {set} at kT = {}", state.0), vapour, 0.05);
             }
-            gaps.push(difference(liquid, vapour));
+            gaps.push(liquid.minus(vapour));
             ends.extend([(vapour.value, state.0), (liquid.value, state.0)]);
         }
         for (pair, states) in gaps.windows(2).zip(states.windows(2)) {
             let name = format!("growth of the gap of {set} from kT = {} to {}", states[0].0, states[1].0);
-            outcome.at_most(name, difference(pair[1], pair[0]), 0.0);
+            outcome.at_most(name, pair[1].minus(pair[0]), 0.0);
         }
-        plotted.push((set, ends));
+        plotted.push(curve(set, ends));
     }
-    outcome.plot("tie-lines", "Vapour and liquid", ["density", "kT"], &[], &plotted);
+    outcome.plot("tie-lines", "Vapour and liquid", ["density", "kT"], plotted);
     Ok(())
 }
 
@@ -123,29 +114,25 @@ pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     for (set, model, states) in SETS {
         let mut lines = Vec::new();
         for (state, name) in states.into_iter().zip(["kT = 0.5", "kT = 1", "kT = 2"]) {
-            let observed = of_set(context, set, model, state)?;
-            let density = profile(&observed, "density_profile", "density");
+            let observed = slab(context, set, model, state)?;
+            let density = observed.profile("density_profile", "density");
             // Two bins together, and both sides: as wide as the layers are told apart.
             let count = density.len();
-            let smooth: Vec<f64> = (0..count / 2 - 1)
-                .map(|k| {
-                    [k, k + 1, count - 1 - k, count - 2 - k].map(|k| density[k].1.value).iter().sum::<f64>()
-                        / 4.0
-                })
-                .collect();
+            let of_four = |k: usize| [k, k + 1, count - 1 - k, count - 2 - k].map(|k| density[k].1.value);
+            let smooth = (0..count / 2 - 1).map(|k| of_four(k).iter().sum::<f64>() / 4.0);
+            let highest = smooth.fold(0.0, f64::max);
             let liquid = observed.scalar("interface_width", "liquid");
-            let highest = smooth.iter().copied().fold(0.0, f64::max);
             let noise = density.iter().map(|(_, d)| d.error).fold(0.0, f64::max) / 2.0;
             let excess = Measured { value: highest / liquid.value - 1.0, error: noise / liquid.value };
-            if state.0 < 0.75 {
-                outcome.equal(format!("height of the layers of {set}, {name}"), excess, 0.10, 0.01);
-            } else {
-                outcome.at_most(format!("height of the layers of {set}, {name}"), excess, 0.02);
+            let of = format!("height of the layers of {set}, {name}");
+            match state.0 < 0.75 {
+                true => outcome.equal(of, excess, [0.10, 0.01]),
+                false => outcome.at_most(of, excess, 0.02),
             }
-            lines.push((name, bare(&density)));
+            lines.push(curve(name, bare(&density)));
         }
         let file = if set == "set 5" { "profiles-set5" } else { "profiles-set6" };
-        outcome.plot(file, &format!("Warren, {set}"), ["z", "density"], &[], &lines);
+        outcome.plot(file, &format!("Warren, {set}"), ["z", "density"], lines);
     }
     Ok(())
 }
@@ -155,22 +142,18 @@ pub fn fig5(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     for (set, model, states) in SETS {
         let (mut tensions, mut widths) = (Vec::new(), Vec::new());
         for state in states {
-            let observed = of_set(context, set, model, state)?;
+            let observed = slab(context, set, model, state)?;
             tensions.push((state.0, observed.scalar("surface_tension", "stress")));
             widths.push((state.0, observed.scalar("interface_width", "width")));
         }
         for (t, w) in tensions.windows(2).zip(widths.windows(2)) {
             let steps = format!("of {set} from kT = {} to {}", t[0].0, t[1].0);
-            outcome.at_most(format!("growth of the tension {steps}"), difference(t[1].1, t[0].1), 0.0);
-            outcome.at_least(format!("growth of the width {steps}"), difference(w[1].1, w[0].1), 0.0);
+            outcome.at_most(format!("growth of the tension {steps}"), t[1].1.minus(t[0].1), 0.0);
+            outcome.at_least(format!("growth of the width {steps}"), w[1].1.minus(w[0].1), 0.0);
         }
-        let names = if set == "set 5" {
-            ["tension, set 5", "width, set 5"]
-        } else {
-            ["tension, set 6", "width, set 6"]
-        };
-        plotted.extend([(names[0], tensions), (names[1], widths)]);
+        plotted.push(points(&format!("tension, {set}"), &tensions));
+        plotted.push(points(&format!("width, {set}"), &widths));
     }
-    outcome.plot("temperature", "Warren", ["kT", "tension, width"], &plotted, &[]);
+    outcome.plot("temperature", "Warren", ["kT", "tension, width"], plotted);
     Ok(())
 }

@@ -3,8 +3,8 @@
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::{SET5, SET6};
-use crate::papers::case::{Reproduction, bare, profile};
-use crate::papers::context::{Change, Context};
+use crate::papers::case::{Reproduction, bare, curve};
+use crate::papers::context::Context;
 
 /// Name, model, scene, tension from the shape with its error, and from the planar interface.
 type Drop = (&'static str, &'static str, &'static str, [f64; 2], [f64; 2]);
@@ -19,26 +19,17 @@ const DROPS: [Drop; 4] = [
 fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-pendant");
     // As the paper has them, at the small size too: twenty seconds each. With a longer step the drop of set 5 falls.
-    let changes: &[Change] = &[(&["output", "dump"], 0.into())];
-    context.shipped(name, model, scene, changes)
+    context.shipped(name, model, scene, &[("output.dump", 0i64)])
 }
 
 pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = hang(context, DROPS[2])?;
     // The curve of the figure goes through its circles, whose size is about this.
-    outcome.at_most(
-        "distance of the surface from the curve, root mean square",
-        observed.scalar("pendant", "residual"),
-        0.1,
-    );
-    let radius = profile(&observed, "pendant_profile", "radius");
-    outcome.plot(
-        "profile",
-        "Drop 6h",
-        ["height", "radius"],
-        &[],
-        &[("surface at half the density", bare(&radius))],
-    );
+    let residual = observed.scalar("pendant", "residual");
+    outcome.at_most("distance of the surface from the curve, root mean square", residual, 0.1);
+    let radius = bare(&observed.profile("pendant_profile", "radius"));
+    let radius = vec![curve("surface at half the density", radius)];
+    outcome.plot("profile", "Drop 6h", ["height", "radius"], radius);
     Ok(())
 }
 
@@ -46,13 +37,8 @@ pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), Exper
     for drop in DROPS {
         let (name, _, _, shape, planar) = drop;
         let tension = hang(context, drop)?.scalar("pendant", "tension");
-        outcome.equal(format!("tension from the shape of drop {name}"), tension, shape[0], shape[1]);
-        outcome.equal(
-            format!("the same, against the planar interface, {name}"),
-            tension,
-            planar[0],
-            planar[1],
-        );
+        outcome.equal(format!("tension from the shape of drop {name}"), tension, shape);
+        outcome.equal(format!("the same, against the planar interface, {name}"), tension, planar);
     }
     Ok(())
 }

@@ -3,61 +3,63 @@
 use super::ALPHA;
 use crate::ExperimentError;
 use crate::models::{SET5, SET6, STANDARD};
-use crate::papers::case::{Reproduction, line};
+use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
+/// Set 6 with other A, B r_d⁴ and r_d.
+fn with([a, many]: [f64; 2], rd: f64) -> Result<String, ExperimentError> {
+    with_parameters(SET6, &[("A", a), ("B", many / rd.powi(4)), ("rd", rd)])
+}
+
+/// F B r_d⁴ = p − ρ − αAρ² − 2αBr_d⁴ρ³; the slope of F against ρ² is −2αc.
+fn rest(p: f64, rho: f64, alpha: f64, [a, many]: [f64; 2]) -> f64 {
+    let x = rho * rho;
+    p - rho - alpha * a * x - 2.0 * alpha * many * x * rho
+}
+
 pub fn table1(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let mut points = Vec::new();
-    let printed: [(f64, f64, f64); 5] =
-        [(0.5, 4.0, 0.5), (0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
+    let printed = [
+        (0.5, [4.0, 0.5]),
+        (0.65, [4.1, 0.1]),
+        (0.75, [3.07, 0.05]),
+        (0.85, [2.08, 0.05]),
+        (1.0, [1.29, 0.05]),
+    ];
+    let mut converged: Vec<(f64, Measured)> = Vec::new();
     // In the middle of the paper's ranges, A = 0–50 and B r_d⁴ = 0–10, and over its densities.
-    let (a, many) = (25.0, 5.0);
-    for (rd, value, error) in printed {
-        let model = with_parameters(SET6, &[("A", a), ("B", many / rd.powi(4)), ("rd", rd)])?;
-        let fluid = Fluid { model: &model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" };
-        let mut pressures = Vec::new();
-        for rho in [3.0, 6.0, 9.0] {
-            let name = format!("rd{rd}-rho{rho}");
-            pressures.push((rho, context.bulk(&name, &fluid, &[rho])?.pressure()));
-        }
-        // The slope of F = (p − ρ − αAρ² − 2αBr_d⁴ρ³)/Br_d⁴ against ρ² is −2αc.
+    let strengths = [25.0, 5.0];
+    for (rd, published) in printed {
+        let model = with(strengths, rd)?;
+        let pressures = context.pressures(&format!("rd{rd}-rho"), &Fluid::of(&model), &[3.0, 6.0, 9.0])?;
         let slope = |alpha: f64, shift: usize| -> f64 {
             let (mut fx, mut xx) = (0.0, 0.0);
             for (k, (rho, p)) in pressures.iter().enumerate() {
                 let p = if k + 1 == shift { p.value + p.error } else { p.value };
-                let x: f64 = rho * rho;
-                fx += x * (p - rho - alpha * a * x - 2.0 * alpha * many * x * rho) / many;
+                let x = rho * rho;
+                fx += x * rest(p, *rho, alpha, strengths) / strengths[1];
                 xx += x * x;
             }
             -fx / xx / (2.0 * alpha)
         };
         let c = slope(ALPHA[0], 0);
         let noise: f64 = (1..=pressures.len()).map(|k| (slope(ALPHA[0], k) - c).powi(2)).sum();
-        let c = Measured { value: c, error: noise.sqrt().hypot(slope(ALPHA[0] + ALPHA[1], 0) - c) };
-        outcome.equal(format!("c at r_d = {rd}"), c, value, error);
-        points.push((rd, c));
+        let c = [c, noise.sqrt().hypot(slope(ALPHA[0] + ALPHA[1], 0) - c)];
+        outcome.equal(format!("c at r_d = {rd}"), c, published);
+        converged.push((rd, c.into()));
     }
     let mut same = Vec::new();
     // At r_d = 0.5 no run is within 10 % of kT.
-    for (rd, value, error) in [printed[1], printed[2], printed[4]] {
+    for (rd, published) in [printed[1], printed[2], printed[4]] {
         let (c, kept, all) = by_protocol(context, rd)?;
-        outcome.equal(
-            format!("c at r_d = {rd}, step 0.05, {kept} of {all} runs within 10 % of kT"),
-            c,
-            value,
-            error,
-        );
+        let name = format!("c at r_d = {rd}, step 0.05, {kept} of {all} runs within 10 % of kT");
+        outcome.equal(name, c, published);
         same.push((rd, c));
     }
-    let published = printed.iter().map(|(rd, c, _)| (*rd, *c)).collect();
-    outcome.plot(
-        "c",
-        "Correction of the many-body term",
-        ["r_d", "c"],
-        &[("converged", points), ("by the protocol of the paper", same)],
-        &[("Table 1", published)],
-    );
+    let published = curve("Table 1", printed.map(|(rd, [c, _])| (rd, c)).to_vec());
+    let series =
+        vec![points("converged", &converged), points("by the protocol of the paper", &same), published];
+    outcome.plot("c", "Correction of the many-body term", ["r_d", "c"], series);
     Ok(())
 }
 
@@ -68,8 +70,7 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), E
     let (mut kept, mut all) = (Vec::new(), 0);
     for a in [0.0, 25.0, 50.0] {
         for many in [1.0, 2.5, 5.0, 10.0] {
-            let model = with_parameters(SET6, &[("A", a), ("B", many / f64::powi(rd, 4)), ("rd", rd)])?;
-            let model = model.replace("gamma = 18.0", "gamma = 4.5");
+            let model = with([a, many], rd)?.replace("gamma = 18.0", "gamma = 4.5");
             for rho in [3.0_f64, 6.0, 9.0] {
                 let scene = format!(
                     "kT = 1.0\nseed = 1\nbox = {:?}\ndt = 0.05\nintegrator = \"groot-warren\"\nlambda = 0.5\nequilibrate = 100\n\
@@ -85,9 +86,8 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), E
                         other => other?,
                     };
                 if (observed.temperature().value - 1.0).abs() < 0.1 {
-                    let x = rho * rho;
                     let p = observed.pressure().value;
-                    kept.push((x, (p - rho - ALPHA[0] * a * x - 2.0 * ALPHA[0] * many * x * rho) / many));
+                    kept.push((rho * rho, rest(p, rho, ALPHA[0], [a, many]) / many));
                 }
             }
         }
@@ -105,28 +105,20 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), E
 }
 
 pub fn fig1(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let mut points = Vec::new();
+    let mut found = Vec::new();
     for a in [10.0, 25.0, 50.0] {
         let model = with_parameters(STANDARD, &[("a", a)])?;
-        let fluid = Fluid { model: &model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" };
-        for rho in [5.0, 10.0] {
-            let p = context.bulk(&format!("a{a}-{rho}"), &fluid, &[rho])?.pressure();
-            let scale = a * rho * rho;
-            let alpha = Measured { value: (p.value - rho) / scale, error: p.error / scale };
-            outcome.equal(format!("alpha at A = {a}, density {rho}"), alpha, ALPHA[0], ALPHA[1]);
-            points.push((scale, Measured { value: p.value - rho, error: p.error }));
+        for (rho, p) in context.pressures(&format!("a{a}-"), &Fluid::of(&model), &[5.0, 10.0])? {
+            let (scale, excess) = (a * rho * rho, p.minus(rho));
+            outcome.equal(format!("alpha at A = {a}, density {rho}"), excess.over(scale), ALPHA);
+            found.push((scale, excess));
         }
     }
-    outcome.plot(
-        "standard",
-        "B = 0",
-        ["A rho²", "p − rho"],
-        &[("measured", points)],
-        &[("0.101 A rho²", line(0.0, 5000.0, |x| ALPHA[0] * x))],
-    );
+    let published = curve("0.101 A rho²", line(0.0, 5000.0, |x| ALPHA[0] * x));
+    outcome.plot("standard", "B = 0", ["A rho²", "p − rho"], vec![points("measured", &found), published]);
     // One point of the line F = −2αc ρ² for each set, r_d = 0.75.
     let rd: f64 = 0.75;
-    let mut collapsed = Vec::new();
+    let mut collapsed: Vec<(f64, Measured)> = Vec::new();
     for (a, many, rho) in [
         (0.0, 1.0, 6.0),
         (0.0, 10.0, 6.0),
@@ -135,29 +127,15 @@ pub fn fig1(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
         (25.0, 5.0, 3.0),
         (25.0, 5.0, 9.0),
     ] {
-        let model = with_parameters(SET6, &[("A", a), ("B", many / rd.powi(4)), ("rd", rd)])?;
-        let fluid = Fluid { model: &model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" };
-        let p = context.bulk(&format!("A{a}-B{many}-{rho}"), &fluid, &[rho])?.pressure();
-        let x = rho * rho;
-        let f = Measured {
-            value: (p.value - rho - ALPHA[0] * a * x - 2.0 * ALPHA[0] * many * x * rho) / many,
-            error: p.error / many,
-        };
-        outcome.equal(
-            format!("c at A = {a}, B r_d^4 = {many}, density {rho}"),
-            f.times(-1.0 / (2.0 * ALPHA[0] * x)),
-            3.07,
-            0.05,
-        );
-        collapsed.push((x, f));
+        let model = with([a, many], rd)?;
+        let p = context.bulk(&format!("A{a}-B{many}-{rho}"), &Fluid::of(&model), &[rho])?.pressure();
+        let f: Measured = [rest(p.value, rho, ALPHA[0], [a, many]) / many, p.error / many].into();
+        let c = f.times(-1.0 / (2.0 * ALPHA[0] * (rho * rho)));
+        outcome.equal(format!("c at A = {a}, B r_d^4 = {many}, density {rho}"), c, [3.07, 0.05]);
+        collapsed.push((rho * rho, f));
     }
-    outcome.plot(
-        "many-body",
-        "r_d = 0.75",
-        ["rho²", "F"],
-        &[("measured", collapsed)],
-        &[("c = 3.07", line(0.0, 100.0, |x| -2.0 * ALPHA[0] * 3.07 * x))],
-    );
+    let published = curve("c = 3.07", line(0.0, 100.0, |x| -2.0 * ALPHA[0] * 3.07 * x));
+    outcome.plot("many-body", "r_d = 0.75", ["rho²", "F"], vec![points("measured", &collapsed), published]);
     Ok(())
 }
 
@@ -178,25 +156,15 @@ pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     for (set, model, b, densities) in
         [("set 5", SET5, 40.0, [5.5, 6.5, 7.5]), ("set 6", SET6, 25.0, [6.5, 7.0, 7.5])]
     {
-        let fluid = Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" };
-        let mut points = Vec::new();
-        for rho in densities {
-            let name = format!("{}-{rho}", set.replace(' ', ""));
-            let p = context.bulk(&name, &fluid, &[rho])?.pressure();
-            let eq = eq18(-40.0, b, rho);
-            outcome.equal(format!("pressure of {set} at density {rho}"), p, eq.value, eq.error);
-            points.push((rho, p));
+        let name = format!("{}-", set.replace(' ', ""));
+        let measured = context.pressures(&name, &Fluid::of(model), &densities)?;
+        for &(rho, p) in &measured {
+            outcome.equal(format!("pressure of {set} at density {rho}"), p, eq18(-40.0, b, rho));
         }
         let file = if b == 40.0 { "pressure-set5" } else { "pressure-set6" };
-        let published = line(5.0, 8.0, |rho| eq18(-40.0, b, rho).value);
-        let title = format!("Warren, {set}");
-        outcome.plot(
-            file,
-            &title,
-            ["density", "pressure"],
-            &[("measured", points)],
-            &[("eq. (18)", published)],
-        );
+        let published = curve("eq. (18)", line(5.0, 8.0, |rho| eq18(-40.0, b, rho).value));
+        let series = vec![points("measured", &measured), published];
+        outcome.plot(file, &format!("Warren, {set}"), ["density", "pressure"], series);
     }
     Ok(())
 }
