@@ -24,7 +24,7 @@ pub enum FormatError {
     #[error("{0}")]
     Request(String),
     #[error(transparent)]
-    Write(#[from] crate::files::WriteError),
+    Write(#[from] WriteError),
 }
 
 impl FormatError {
@@ -36,5 +36,20 @@ impl FormatError {
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
         let path = path.to_owned();
         move |source| FormatError::Io { action, path, source }
+    }
+}
+
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {cause}", path.display())]
+pub struct WriteError {
+    pub path: PathBuf,
+    #[source]
+    pub cause: std::io::Error,
+}
+
+impl WriteError {
+    /// Makes the error of `map_err` for operations that write `path`.
+    pub fn at(path: &Path) -> impl FnOnce(std::io::Error) -> WriteError + '_ {
+        move |cause| WriteError { path: path.to_owned(), cause }
     }
 }

@@ -1,26 +1,12 @@
 //! Writing files whole or not at all.
 
 use super::FormatError;
+pub use super::error::WriteError;
 use serde::de::DeserializeOwned;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {cause}", path.display())]
-pub struct WriteError {
-    pub path: PathBuf,
-    #[source]
-    pub cause: std::io::Error,
-}
-
-impl WriteError {
-    /// Makes the error of `map_err` for operations that write `path`.
-    pub fn at(path: &Path) -> impl FnOnce(io::Error) -> WriteError + '_ {
-        move |cause| WriteError { path: path.to_owned(), cause }
-    }
-}
 
 /// Replaces a file so that readers see the old content or the new, never a part.
 ///
