@@ -89,15 +89,22 @@ pub struct Series {
     rows: Vec<f64>,
 }
 
-/// The fields of a [`Series`] before validation; in checkpoints fields have no names.
-type Unchecked = (usize, usize, u64, Vec<f64>, u64, Vec<f64>);
+/// The stored form of a [`Series`] before validation.
+#[derive(Deserialize)]
+struct Unchecked {
+    width: usize,
+    most: usize,
+    block: u64,
+    pending: Vec<f64>,
+    pending_samples: u64,
+    rows: Vec<f64>,
+}
 
 impl TryFrom<Unchecked> for Series {
     type Error = &'static str;
 
-    fn try_from(
-        (width, most, block, pending, pending_samples, rows): Unchecked,
-    ) -> Result<Series, &'static str> {
+    fn try_from(read: Unchecked) -> Result<Series, &'static str> {
+        let Unchecked { width, most, block, pending, pending_samples, rows } = read;
         let whole_rows = if width == 0 { rows.is_empty() } else { rows.len().is_multiple_of(width) };
         let series = Series { width, most, block, pending, pending_samples, rows };
         let even = most >= 2 && most.is_multiple_of(2);
@@ -316,8 +323,8 @@ mod tests {
             whole.push(&[*x]);
             parts.push(&[*x]);
             if k % 701 == 0 {
-                let bytes = postcard::to_allocvec(&parts).unwrap();
-                parts = postcard::from_bytes(&bytes).unwrap();
+                let text = serde_json::to_string(&parts).unwrap();
+                parts = serde_json::from_str(&text).unwrap();
             }
         }
         assert_eq!(whole, parts);
