@@ -5,7 +5,7 @@ use crate::Rule;
 use crate::kernels::{Arguments, DEFERRED, NOISE, Run, groups_of};
 use psidpd_core::engine::noise::PairNoise;
 
-/// Tolerance of conjugate gradients and least tolerance, as on the CPU; single precision ends before its `FINEST` of 10⁻⁶.
+/// Tolerance of conjugate gradients and least tolerance, as on the CPU; single precision ends before its `FINEST` of 10⁻⁷.
 const TOLERANCE: f32 = 2e-2;
 const FINEST: f32 = 3e-5;
 

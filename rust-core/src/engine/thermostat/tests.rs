@@ -320,8 +320,8 @@ fn the_temperature_is_right() {
     }
 }
 
-/// Two particles apart from a liquid feel almost no drag on each other, and theirs is solved as well as that of the liquid:
-/// their part of the solution is exact but for the residual of modes without drag.
+/// Two particles far from a liquid, almost as far from each other as drag reaches, change their velocities by drag and noise
+/// at the middle of the step to 1 %, however strong the drag in the liquid is.
 #[test]
 fn slow_flow_beside_strong_drag_is_right() {
     let mut cloud = Cloud::new(1, Matrix3::from_diagonal_element(3.0), [false; 3], 6.0);
@@ -339,7 +339,6 @@ fn slow_flow_beside_strong_drag_is_right() {
         thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
         let mut v = cloud.v.clone();
         thermostat.act(&pool, Update::Midpoint, &mut v);
-        // The relative velocity u becomes (1 − 2k) u + noise, over 1 + 2k; drag and noise are 0.06 F at the middle of both.
         let middle: Vec<[f64; 3]> =
             v.iter().zip(&cloud.v).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
         let mut force = vec![[0.0; 3]; v.len()];
