@@ -250,9 +250,7 @@ fn compositions(pairs: &[f64], count: usize) -> Vec<Vec<f64>> {
             }
         }
         let matrix = DMatrix::from_fn(size, size, |i, j| pairs[face[i] * count + face[j]]);
-        let Some(y) = matrix.lu().solve(&DVector::from_element(size, 1.0)) else {
-            continue;
-        };
+        let Some(y) = matrix.lu().solve(&DVector::from_element(size, 1.0)) else { continue };
         let total = y.sum();
         if total.is_finite() && total != 0.0 && y.iter().all(|y| y / total > 0.0) {
             let mut x = vec![0.0; count];

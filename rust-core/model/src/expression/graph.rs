@@ -95,9 +95,7 @@ impl Node {
 ///
 /// Returns c, x and n. All code that evaluates or prints a graph calls this function, so that all of it agrees.
 pub(super) fn as_quotient(nodes: &[Node], node: Node) -> Option<(f64, Id, i32)> {
-    let Node::Multiply(factor, power) = node else {
-        return None;
-    };
+    let Node::Multiply(factor, power) = node else { return None };
     match (nodes[factor.index()], nodes[power.index()]) {
         (Node::Constant(c), Node::IntegerPower(base, n)) if n < 0 => Some((c.value(), base, -n)),
         _ => None,

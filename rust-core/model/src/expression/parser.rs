@@ -199,9 +199,7 @@ impl Parser<'_> {
             && waiting.strength() >= at_least
         {
             self.pop();
-            let Some(right) = self.operands.pop() else {
-                return;
-            };
+            let Some(right) = self.operands.pop() else { return };
             match waiting {
                 Waiting::Sign(sign) => self.leaf(Action::Negate, sign.to(right)),
                 Waiting::Binary(binary) => {

@@ -198,9 +198,7 @@ impl PairSums {
         self.species.clear();
         for ((kind, tag), x) in particles.kind.iter().zip(particles.tag).zip(particles.x) {
             let species = usize::try_from(*kind).ok().and_then(|k| self.kinds.get(k));
-            let Some(species) = species else {
-                return Err(EngineError::Kind { tag: *tag, kind: *kind });
-            };
+            let Some(species) = species else { return Err(EngineError::Kind { tag: *tag, kind: *kind }) };
             if *tag < 1 {
                 return Err(EngineError::Tag { tag: *tag });
             }
