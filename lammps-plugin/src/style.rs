@@ -3,13 +3,14 @@
 mod device;
 mod model;
 
+use crate::bridge::{Atoms, Extent, Listed, Request, Totals};
 use crate::converted::{Converted, times};
 use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::{Effort, PairThermostat};
 use psidpd_core::engine::{
-    Engine, Newton, Particles, Path as EnginePath, Pending, PeriodicBox, Pool, Precision, Reason, Request,
-    Settings, Surroundings, Tally, Want, at_once,
+    Around, Engine, Newton, PairsOfHost, Path as EnginePath, Pending, Pool, Precision, Reason, Settings,
+    Surroundings, Tally, at_once,
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
@@ -20,22 +21,24 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Style {
     pub model: Model,
-    engine: Engine,
+    /// Computes in units of the model.
+    pub engine: Engine,
     /// The first half of an evaluation, until its second half.
     pending: Option<Pending>,
     /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
-    thermostat: Option<PairThermostat>,
+    pub(crate) thermostat: Option<PairThermostat>,
     /// Iterations of the thermostat at earlier temperatures and settings.
-    effort_before: Effort,
+    pub(crate) effort_before: Effort,
     settings: Settings,
-    pool: Arc<Pool>,
+    pub(crate) pool: Arc<Pool>,
     kt: f64,
     /// Species of each type, from 0; entry 0 is unused, as LAMMPS counts types from 1.
-    kinds: Vec<i32>,
+    pub(crate) kinds: Vec<i32>,
     /// Meaning of the letters of pair_coeff, for the log.
     letters: Option<&'static str>,
-    scale: Scale,
-    converted: Converted,
+    /// One unit of the model in units of LAMMPS.
+    pub(crate) scale: Scale,
+    pub(crate) converted: Converted,
 }
 
 /// Runs `work` and turns a panic into an error: a panic must not unwind into LAMMPS.
@@ -104,10 +107,10 @@ impl Style {
     }
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
-        self.effort_before = self.effort();
+        self.effort_before = self.effort_so_far();
         let mut engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
         if let Some(mut device) = self.engine.use_device(None) {
-            device.set_fluid(&self.model.at(self.kt).map_err(|e| StyleError(e.to_string()))?)?;
+            device.set_fluid(&self.model.at(self.kt)?)?;
             engine.use_device(Some(device));
         }
         self.engine = engine;
@@ -136,34 +139,6 @@ impl Style {
         self.settings.threads.get()
     }
 
-    /// One unit of the model in units of LAMMPS.
-    pub fn scale(&self) -> Scale {
-        self.scale
-    }
-
-    /// The engine; it computes in units of the model.
-    pub fn engine(&self) -> &Engine {
-        &self.engine
-    }
-
-    pub fn engine_mut(&mut self) -> &mut Engine {
-        &mut self.engine
-    }
-
-    /// The thermostat apart from the forces, with the threads, the species of the types, and room for positions.
-    pub(crate) fn thermostat(&mut self) -> (Option<&mut PairThermostat>, &Pool, &[i32], &mut Converted) {
-        (self.thermostat.as_mut(), &self.pool, &self.kinds, &mut self.converted)
-    }
-
-    /// The thermostat apart from the forces, and the engine, whose forces list its pairs.
-    pub(crate) fn thermostat_beside_engine(&mut self) -> Option<(&mut PairThermostat, &mut Engine)> {
-        Some((self.thermostat.as_mut()?, &mut self.engine))
-    }
-
-    pub(crate) fn effort_before(&self) -> Effort {
-        self.effort_before
-    }
-
     /// Describes the computation, and the letters of the coefficients, for the log.
     ///
     /// `search` says where pairs come from, and whether LAMMPS lists them; `apart`, whether a fix has the thermostat.
@@ -181,10 +156,10 @@ impl Style {
                 "  units         the model's, whose length is {length:.6e} here, energy {energy:.6e}, time {time:.6e}"
             );
         }
-        for line in self.engine().plan().to_string().lines() {
+        for line in self.engine.plan().to_string().lines() {
             let _ = writeln!(text, "  {line}");
         }
-        if !self.engine().plan().is_conservative() {
+        if !self.engine.plan().conservative {
             text.push_str(
                 "  WARNING       this force law has no potential: it does work around closed loops and heats \
                  the fluid; the energy printed is not that of the forces\n",
@@ -223,35 +198,63 @@ impl Style {
         text
     }
 
-    /// Adds to `f` all forces on particles in a box that this rank has all of; the box is in units of the model.
+    /// Adds to `f` all forces on atoms in a box that this rank has all of.
     pub fn evaluate(
         &mut self,
-        domain: &PeriodicBox,
+        extent: &Extent,
+        atoms: &Atoms,
         request: &Request,
         f: &mut [f64],
-    ) -> Result<Tally, StyleError> {
+    ) -> Result<Totals, StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, request);
-            Ok(scale.tally(taken.add_forces(scale, f, |request, f| engine.forces(domain, request, f, true))?))
+            let domain = scale.domain(extent)?;
+            let taken = converted.take(scale, atoms, Some(request));
+            let tally = taken.add_forces(scale, f, |request, f| engine.forces(&domain, request, f, true))?;
+            Ok(self.totals(&tally))
         })
     }
 
-    /// First half of an evaluation: adds to `f` all forces but those of the slopes of ghosts. With pairs that LAMMPS lists
-    /// all forces are added in the second half. Boxes are in units of the model.
+    /// First half of an evaluation: adds to `f` all forces but those of the slopes of ghosts.
     pub fn densities(
         &mut self,
-        surroundings: Surroundings,
+        extent: &Extent,
+        images: &[bool],
+        newton: bool,
+        atoms: &Atoms,
         request: &Request,
         f: &mut [f64],
     ) -> Result<(), StyleError> {
         guard(|| {
-            let Style { engine, pending, scale, converted, .. } = self;
-            *pending = None;
-            let taken = converted.take(scale, request);
-            *pending = Some(taken.add_forces(scale, f, |request, f| engine.first(surroundings, request, f))?);
-            Ok(())
+            let around = Around { domain: &self.scale.domain(extent)?, images };
+            self.first(Surroundings::Ghosts(around, newton_of(newton)), atoms, request, f)
         })
+    }
+
+    /// First half of an evaluation over pairs that LAMMPS lists: the second half adds all forces.
+    pub fn densities_of_pairs(
+        &mut self,
+        &Listed { i, j, factor }: &Listed,
+        newton: bool,
+        atoms: &Atoms,
+        request: &Request,
+    ) -> Result<(), StyleError> {
+        let surroundings = Surroundings::Listed(PairsOfHost { i, j, factor }, newton_of(newton));
+        guard(|| self.first(surroundings, atoms, request, &mut []))
+    }
+
+    fn first(
+        &mut self,
+        surroundings: Surroundings,
+        atoms: &Atoms,
+        request: &Request,
+        f: &mut [f64],
+    ) -> Result<(), StyleError> {
+        let Style { engine, pending, scale, converted, .. } = self;
+        *pending = None;
+        let taken = converted.take(scale, atoms, Some(request));
+        *pending = Some(taken.add_forces(scale, f, |request, f| engine.first(surroundings, request, f))?);
+        Ok(())
     }
 
     /// `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
@@ -263,12 +266,12 @@ impl Style {
     }
 
     /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
-    pub fn sum_densities(&mut self, particles: &Particles) -> Result<(), StyleError> {
+    pub fn sum_densities(&mut self, atoms: &Atoms) -> Result<(), StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, &at_rest(particles));
+            let taken = converted.take(scale, atoms, None);
             // LAMMPS has ghosts on all sides of its atoms, also across periods.
-            engine.sum_densities(Surroundings::ghosts(Newton::On), &taken.particles())?;
+            engine.sum_densities(Surroundings::ghosts(Newton::On), &taken.request.particles)?;
             Ok(())
         })
     }
@@ -283,53 +286,55 @@ impl Style {
     }
 
     /// ψ of owned particles, in LAMMPS's units of energy.
-    pub fn excess(&mut self) -> &[f64] {
-        if self.scale.is_one() {
-            return self.engine.excess();
-        }
-        times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)
+    pub fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {
+        guard(|| match self.scale.is_one() {
+            true => Ok(self.engine.excess()),
+            false => Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)),
+        })
     }
 
-    /// Energy of a pair of the given types at a distance, and the force along it. A many-body force
-    /// uses the slopes that the two particles had in the last evaluation.
-    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
+    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<[f64; 2], StyleError> {
         guard(|| {
-            let r = r / self.scale.length;
-            let Scale { energy, .. } = self.scale;
-            let force = self.scale.force();
-            let here = |(e, f): (f64, f64)| (energy * e, force * f);
-            let width = self.engine().plan().slope_width();
-            if width == 0 {
-                return Ok(here(self.engine.single(kinds, r, [0, 0])));
-            }
-            let known = self.engine.slopes_mut().len() / width;
-            let known = |i: i32| usize::try_from(i).ok().filter(|i| *i < known);
-            match particles.map(known) {
-                [Some(i), Some(j)] => Ok(here(self.engine.single(kinds, r, [i, j]))),
-                _ => Err(StyleError(format!(
+            let width = self.engine.plan().slope_width();
+            let known = self.engine.slopes_mut().len().checked_div(width);
+            let index = |i: i32| match known {
+                None => Some(0),
+                Some(known) => usize::try_from(i).ok().filter(|i| *i < known),
+            };
+            let [Some(i), Some(j)] = particles.map(index) else {
+                return Err(StyleError(format!(
                     "asked for the pair of particles {} and {}, which the last evaluation did not both contain",
                     particles[0], particles[1]
-                ))),
-            }
+                )));
+            };
+            let (energy, force) = self.engine.single(kinds, r / self.scale.length, [i, j]);
+            Ok([self.scale.energy * energy, self.scale.force() * force])
         })
     }
 
     /// Second half of an evaluation: adds the rest of the forces to `f`.
-    pub fn forces(&mut self, request: &Request, f: &mut [f64]) -> Result<Tally, StyleError> {
+    pub fn forces(&mut self, atoms: &Atoms, request: &Request, f: &mut [f64]) -> Result<Totals, StyleError> {
         guard(|| {
             let Style { engine, pending, scale, converted, .. } = self;
             let pending = pending.take().ok_or_else(|| {
                 StyleError("the second half of an evaluation needs the first half before it".to_owned())
             })?;
-            let taken = converted.take(scale, request);
-            Ok(scale.tally(taken.add_forces(scale, f, |request, f| pending.finish(engine, request, f))?))
+            let taken = converted.take(scale, atoms, Some(request));
+            let tally = taken.add_forces(scale, f, |request, f| pending.finish(engine, request, f))?;
+            Ok(self.totals(&tally))
         })
+    }
+
+    fn totals(&self, tally: &Tally) -> Totals {
+        let [below, above] = self.engine.statistics().out_of_bounds.map(|n| n as f64);
+        let unit = self.scale.energy;
+        let virial = std::array::from_fn(|k| unit * tally.virial[k] + unit * tally.thermostat_virial[k]);
+        Totals { excess: unit * tally.excess, pair: unit * tally.pair, virial, below, above }
     }
 }
 
-/// A request for forces of these particles without drag and noise.
-pub(crate) fn at_rest<'a>(particles: &Particles<'a>) -> Request<'a> {
-    Request { particles: *particles, v: &[], step: None, want: Want::FORCES }
+fn newton_of(newton: bool) -> Newton {
+    if newton { Newton::On } else { Newton::Off }
 }
 
 fn engine_at(
@@ -339,9 +344,7 @@ fn engine_at(
     settings: Settings,
     pool: &Arc<Pool>,
 ) -> Result<Engine, StyleError> {
-    let error = |e: &dyn std::error::Error| StyleError(e.to_string());
-    let fluid = model.at(kt).map_err(|e| error(&e))?;
-    let mut engine = Engine::with_pool(&fluid, settings, pool.clone()).map_err(|e| error(&e))?;
+    let mut engine = Engine::with_pool(&model.at(kt)?, settings, pool.clone())?;
     engine.map_kinds(kinds)?;
     Ok(engine)
 }

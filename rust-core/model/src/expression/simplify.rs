@@ -23,10 +23,7 @@ impl Graph {
     }
 
     pub fn as_constant(&self, id: Id) -> Option<f64> {
-        match self.node(id) {
-            Node::Constant(bits) => Some(bits.value()),
-            _ => None,
-        }
+        self.node(id).constant()
     }
 
     pub fn add(&mut self, a: Id, b: Id) -> Built {
