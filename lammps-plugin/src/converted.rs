@@ -1,16 +1,15 @@
 //! Converts positions, velocities and results between the units of LAMMPS and those of the model.
 
-use crate::bridge::{self, Atoms};
 use crate::error::StyleError;
 use crate::units::Scale;
-use psidpd_core::engine::{EngineError, Particles, Request, Step, Want};
+use psidpd_core::engine::{EngineError, Request};
 
 /// Positions and velocities in units of the model, and results in those of LAMMPS.
 #[derive(Debug, Default)]
 pub struct Converted {
-    x: Vec<f64>,
-    v: Vec<f64>,
-    forces: Vec<f64>,
+    pub x: Vec<f64>,
+    pub v: Vec<f64>,
+    pub forces: Vec<f64>,
     pub densities: Vec<f64>,
     pub excess: Vec<f64>,
 }
@@ -26,31 +25,10 @@ pub fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f6
     out
 }
 
-impl Converted {
-    /// Converts a request to units of the model; `None` stands for forces without drag and noise.
-    pub fn take<'a>(
-        &'a mut self,
-        scale: &Scale,
-        atoms: &Atoms<'a>,
-        request: Option<&bridge::Request>,
-    ) -> Taken<'a> {
-        let (mut x, mut v) = (atoms.x, if request.is_some() { atoms.v } else { &[] });
-        if !scale.is_one() {
-            x = times(x, 1.0 / scale.length, &mut self.x);
-            v = times(v, 1.0 / scale.velocity(), &mut self.v);
-        }
-        let particles = Particles { owned: atoms.owned, x: triples(x), tag: atoms.tag, kind: atoms.kind };
-        let step = request.filter(|request| request.thermostat);
-        let step = step.map(|r| Step { seed: r.seed, number: r.step, dt: r.dt / scale.time });
-        let want = request.map_or(Want::FORCES, bridge::Request::want);
-        Taken { request: Request { particles, v: triples(v), step, want }, forces: &mut self.forces }
-    }
-}
-
 /// A request in units of the model, and room for forces.
 pub struct Taken<'a> {
     pub request: Request<'a>,
-    forces: &'a mut Vec<f64>,
+    pub forces: &'a mut Vec<f64>,
 }
 
 impl Taken<'_> {

@@ -3,15 +3,11 @@
 mod device;
 mod model;
 
-use crate::bridge::{Atoms, Extent, Listed, Request, Totals};
 use crate::converted::{Converted, times};
 use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::{Effort, PairThermostat};
-use psidpd_core::engine::{
-    Around, Engine, Newton, PairsOfHost, Path as EnginePath, Pending, Pool, Precision, Reason, Settings,
-    Surroundings, Tally, at_once,
-};
+use psidpd_core::engine::{Engine, Path as EnginePath, Pending, Pool, Precision, Reason, Settings, at_once};
 use psidpd_core::model::Model;
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,7 +20,7 @@ pub struct Style {
     /// Computes in units of the model.
     pub engine: Engine,
     /// The first half of an evaluation, until its second half.
-    pending: Option<Pending>,
+    pub(crate) pending: Option<Pending>,
     /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
     pub(crate) thermostat: Option<PairThermostat>,
     /// Iterations of the thermostat at earlier temperatures and settings.
@@ -198,82 +194,12 @@ impl Style {
         text
     }
 
-    /// Adds to `f` all forces on atoms in a box that this rank has all of.
-    pub fn evaluate(
-        &mut self,
-        extent: &Extent,
-        atoms: &Atoms,
-        request: &Request,
-        f: &mut [f64],
-    ) -> Result<Totals, StyleError> {
-        guard(|| {
-            let Style { engine, scale, converted, .. } = self;
-            let domain = scale.domain(extent)?;
-            let taken = converted.take(scale, atoms, Some(request));
-            let tally = taken.add_forces(scale, f, |request, f| engine.forces(&domain, request, f, true))?;
-            Ok(self.totals(&tally))
-        })
-    }
-
-    /// First half of an evaluation: adds to `f` all forces but those of the slopes of ghosts.
-    pub fn densities(
-        &mut self,
-        extent: &Extent,
-        images: &[bool],
-        newton: bool,
-        atoms: &Atoms,
-        request: &Request,
-        f: &mut [f64],
-    ) -> Result<(), StyleError> {
-        guard(|| {
-            let around = Around { domain: &self.scale.domain(extent)?, images };
-            self.first(Surroundings::Ghosts(around, newton_of(newton)), atoms, request, f)
-        })
-    }
-
-    /// First half of an evaluation over pairs that LAMMPS lists: the second half adds all forces.
-    pub fn densities_of_pairs(
-        &mut self,
-        &Listed { i, j, factor }: &Listed,
-        newton: bool,
-        atoms: &Atoms,
-        request: &Request,
-    ) -> Result<(), StyleError> {
-        let surroundings = Surroundings::Listed(PairsOfHost { i, j, factor }, newton_of(newton));
-        guard(|| self.first(surroundings, atoms, request, &mut []))
-    }
-
-    fn first(
-        &mut self,
-        surroundings: Surroundings,
-        atoms: &Atoms,
-        request: &Request,
-        f: &mut [f64],
-    ) -> Result<(), StyleError> {
-        let Style { engine, pending, scale, converted, .. } = self;
-        *pending = None;
-        let taken = converted.take(scale, atoms, Some(request));
-        *pending = Some(taken.add_forces(scale, f, |request, f| engine.first(surroundings, request, f))?);
-        Ok(())
-    }
-
     /// `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         match &mut self.pending {
             Some(pending) => pending.slopes_mut(),
             None => self.engine.slopes_mut(),
         }
-    }
-
-    /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
-    pub fn sum_densities(&mut self, atoms: &Atoms) -> Result<(), StyleError> {
-        guard(|| {
-            let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, atoms, None);
-            // LAMMPS has ghosts on all sides of its atoms, also across periods.
-            engine.sum_densities(Surroundings::ghosts(Newton::On), &taken.request.particles)?;
-            Ok(())
-        })
     }
 
     /// Local densities of owned particles, per unit volume of LAMMPS.
@@ -292,49 +218,6 @@ impl Style {
             false => Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)),
         })
     }
-
-    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<[f64; 2], StyleError> {
-        guard(|| {
-            let width = self.engine.plan().slope_width();
-            let known = self.engine.slopes_mut().len().checked_div(width);
-            let index = |i: i32| match known {
-                None => Some(0),
-                Some(known) => usize::try_from(i).ok().filter(|i| *i < known),
-            };
-            let [Some(i), Some(j)] = particles.map(index) else {
-                return Err(StyleError(format!(
-                    "asked for the pair of particles {} and {}, which the last evaluation did not both contain",
-                    particles[0], particles[1]
-                )));
-            };
-            let (energy, force) = self.engine.single(kinds, r / self.scale.length, [i, j]);
-            Ok([self.scale.energy * energy, self.scale.force() * force])
-        })
-    }
-
-    /// Second half of an evaluation: adds the rest of the forces to `f`.
-    pub fn forces(&mut self, atoms: &Atoms, request: &Request, f: &mut [f64]) -> Result<Totals, StyleError> {
-        guard(|| {
-            let Style { engine, pending, scale, converted, .. } = self;
-            let pending = pending.take().ok_or_else(|| {
-                StyleError("the second half of an evaluation needs the first half before it".to_owned())
-            })?;
-            let taken = converted.take(scale, atoms, Some(request));
-            let tally = taken.add_forces(scale, f, |request, f| pending.finish(engine, request, f))?;
-            Ok(self.totals(&tally))
-        })
-    }
-
-    fn totals(&self, tally: &Tally) -> Totals {
-        let [below, above] = self.engine.statistics().out_of_bounds.map(|n| n as f64);
-        let unit = self.scale.energy;
-        let virial = std::array::from_fn(|k| unit * tally.virial[k] + unit * tally.thermostat_virial[k]);
-        Totals { excess: unit * tally.excess, pair: unit * tally.pair, virial, below, above }
-    }
-}
-
-fn newton_of(newton: bool) -> Newton {
-    if newton { Newton::On } else { Newton::Off }
 }
 
 fn engine_at(

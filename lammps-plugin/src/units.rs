@@ -1,9 +1,5 @@
 //! From the units of LAMMPS to those of a model.
 
-use crate::bridge::Extent;
-use crate::error::StyleError;
-use nalgebra::Matrix3;
-use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Units;
 
 /// One unit of the model in units of LAMMPS.
@@ -69,14 +65,6 @@ impl Scale {
 
     pub fn force(&self) -> f64 {
         self.energy / self.length
-    }
-
-    /// The box of LAMMPS in units of the model, with periods along the closed directions only.
-    pub fn domain(&self, extent: &Extent) -> Result<PeriodicBox, StyleError> {
-        let [xx, yy, zz, yz, xz, xy] = extent.edges.map(|edge| edge / self.length);
-        let edges = Matrix3::new(xx, xy, xz, 0.0, yy, yz, 0.0, 0.0, zz);
-        let origin = extent.origin.map(|x| x / self.length);
-        Ok(PeriodicBox::new(origin, edges, extent.closed)?)
     }
 }
 

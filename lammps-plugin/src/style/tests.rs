@@ -1,4 +1,5 @@
 use super::*;
+use crate::bridge::{Atoms, Extent, Listed, Request};
 use psidpd_core::model::WarrenPair;
 
 const MODEL: &str = "title = \"t\"\nspecies = [\"A\", \"B\"]\n[[pair]]\nbetween = [\"A\", \"B\"]\n\
