@@ -90,16 +90,12 @@ void PairDPDPsi::coeff(int narg, char **arg)
   std::string path = utils::get_potential_file_path(arg[2]);
   if (path.empty()) path = arg[2];
   set_names({arg + 3, arg + narg});
-  std::string trouble;
-  try {
+  insist([&] {
     const std::string read(read_model(path));
     style_from_text(path, read, update->unit_style, kt(), names, domain->dimension);
     source = path;
     text = read;
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop(trouble);
+  });
   given = true;
   // init_style() builds a new engine from the new model.
   style.reset();

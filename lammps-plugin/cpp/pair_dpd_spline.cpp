@@ -19,17 +19,6 @@ class PairDPDSpline : public PairTable {
   explicit PairDPDSpline(LAMMPS *lmp) : PairTable(lmp, "dpd/spline", {"a", "A", "B", "rc1", "rc2", "gamma"}) {}
 
  protected:
-  void read_settings(int narg, char **arg) override
-  {
-    if (narg < 3)
-      stop("expected 'pair_style dpd/spline T cutoff seed' and optional keywords, found " + std::to_string(narg) +
-           " arguments");
-    read_temperature(arg[0]);
-    read_cutoff(arg[1]);
-    read_seed(arg[2]);
-    read_keywords(3, narg, arg);
-  }
-
   void check(const Coefficients &given) override
   {
     const double rc1 = given.value[3], rc2 = given.value[4], gamma = given.value[5];

@@ -23,14 +23,8 @@ class PairMDPDPsi : public PairTable {
  protected:
   void read_settings(int narg, char **arg) override
   {
-    if (narg < 3)
-      stop("expected 'pair_style mdpd/psi T cutoff seed' and optional keywords, found " + std::to_string(narg) +
-           " arguments");
-    read_temperature(arg[0]);
-    read_cutoff(arg[1]);
-    read_seed(arg[2]);
     lucy = false;
-    read_keywords(3, narg, arg);
+    PairTable::read_settings(narg, arg);
   }
 
   bool read_keyword(const std::string &key, const std::string &value) override

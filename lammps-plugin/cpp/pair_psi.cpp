@@ -166,18 +166,14 @@ void PairPsi::refresh()
     stop("the temperature must be positive, found " + std::to_string(given.temperature));
   special.forget();
   exclusions.forget();
-  std::string trouble;
-  try {
+  insist([&] {
     if (!style || is_stale())
       style.emplace(make_style(kt()));
     else
       (*style)->set_temperature(kt());
     (*style)->configure(given.mixed, given.threads);
     (*style)->use_device(given.device);
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop(trouble);
+  });
   built_kt = kt();
 }
 

@@ -59,7 +59,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   Style &engine() { return **style; }
   // Iterations of the thermostat in its last update, and of all its updates since the style was set up.
   int iterations() { return style ? static_cast<int>((*style)->iterations()) : 0; }
-  Effort effort() { return style ? psidpd::effort(**style) : Effort{}; }
+  Effort effort() { return style ? (*style)->effort() : Effort{}; }
 
  protected:
   virtual void read_settings(int narg, char **arg) = 0;
@@ -93,6 +93,17 @@ class PairPsi : public LAMMPS_NS::Pair {
   void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   // Throws the text, for errors that make_style finds.
   [[noreturn]] static void complain(const std::string &text);
+  // Runs `work` on all ranks; stops them with the text of its error, after the stack of `work` has been unwound.
+  template <class Work> void insist(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
+  {
+    std::string trouble;
+    try {
+      return work();
+    } catch (const std::exception &e) {
+      trouble = e.what();
+    }
+    stop(trouble, file, line);
+  }
 
   const std::string name;
   std::optional<rust::Box<Style>> style;

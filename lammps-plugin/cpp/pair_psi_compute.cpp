@@ -86,10 +86,10 @@ void PairPsi::find_densities(const Atoms &atoms, const Request &request, rust::S
   if (why_listed.empty()) {
     Extent extent = this->extent();
     const auto images = left_out(extent, request);
-    style_densities(**style, extent, images, force->newton_pair, atoms, request, f);
+    (*style)->densities(extent, images, force->newton_pair, atoms, request, f);
     return;
   }
-  densities_of_pairs(**style, listed.collect(list, atom, force), force->newton_pair, atoms, request);
+  (*style)->densities_of_pairs(listed.collect(list, atom, force), force->newton_pair, atoms, request);
 }
 
 // Sends slopes from owners to ghosts.
@@ -162,13 +162,13 @@ void PairPsi::compute(int eflag, int vflag)
   tell_left_out(alone);
   Totals totals;
   if (alone) {
-    totals = attempt([&] { return style_evaluate(fluid, box, atoms(owned), request, f); });
+    totals = attempt([&] { return fluid.evaluate(box, atoms(owned), request, f); });
     without_slopes = {atom->nlocal, atom->nghost};
   } else {
     const Atoms with_ghosts = atoms(all);
     attempt([&] { find_densities(with_ghosts, request, f); });
     forward();
-    totals = attempt([&] { return style_forces(fluid, with_ghosts, request, f); });
+    totals = attempt([&] { return fluid.forces(with_ghosts, request, f); });
     without_slopes = {-1, -1};
   }
 
@@ -253,9 +253,9 @@ double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, d
     forward();
   }
   const double r = std::sqrt(rsq);
-  const PairValue pair = attempt([&] { return style_single(**style, itype, jtype, i, j, r); });
-  fforce = r > 0.0 ? factor_lj * pair.force / r : 0.0;
-  return factor_lj * pair.energy;
+  const auto [energy, along] = attempt([&] { return (*style)->single({itype, jtype}, r, {i, j}); });
+  fforce = r > 0.0 ? factor_lj * along / r : 0.0;
+  return factor_lj * energy;
 }
 
 void *PairPsi::extract(const char *what, int &dim)
@@ -279,7 +279,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (width == 0) return nullptr;
   // Forces may not have needed all densities.
   tell_left_out(false);
-  attempt([&] { psidpd::sum_densities(**style, atoms(atom->nlocal + atom->nghost)); });
+  attempt([&] { (*style)->sum_densities(atoms(atom->nlocal + atom->nghost)); });
   const auto densities = (*style)->local_densities();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;

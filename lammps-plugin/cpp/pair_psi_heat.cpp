@@ -58,7 +58,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   if (!alone) flags = attempt([&] { return left_out(box, forces); });
   const size_t reach = alone ? owned : all;
   const bool acts = attempt([&] {
-    return thermostat_pairs(fluid, box, flags, atoms(reach), {masses.data(), owned}, what);
+    return fluid.thermostat_pairs(box, flags, atoms(reach), {masses.data(), owned}, what);
   });
   if (!acts) return;
   rust::Slice<double> v;
@@ -77,14 +77,14 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
     if (owned > 0) std::copy_n(atom->v[0], 3 * owned, vectors.begin());
     forward_vectors();
     const rust::Slice<double> shared{vectors.data(), vectors.size()};
-    Round round = attempt([&] { return thermostat_begin(fluid, shared); });
+    Round round = attempt([&] { return fluid.thermostat_begin(shared); });
     while (round.wants != Wants::Nothing) {
       std::array<double, 3> totals{};
       if (round.wants == Wants::Totals)
         MPI_Allreduce(round.parts.data(), totals.data(), 3, MPI_DOUBLE, MPI_SUM, world);
       else
         forward_vectors();
-      round = attempt([&] { return thermostat_go_on(fluid, totals, shared, v); });
+      round = attempt([&] { return fluid.thermostat_go_on(totals, shared, v); });
     }
     w = round.virial;
   }

@@ -25,10 +25,15 @@ PairTable::~PairTable()
   for (auto &table : value) memory->destroy(table);
 }
 
-void PairTable::read_cutoff(const char *arg)
+void PairTable::read_settings(int narg, char **arg)
 {
-  cutoff = utils::numeric(FLERR, arg, false, lmp);
-  if (!(cutoff > 0.0)) stop(std::string("the cut-off must be positive, found ") + arg);
+  if (narg < 3)
+    stop("expected 'pair_style " + name + " T cutoff seed' and optional keywords, found " + std::to_string(narg) + " arguments");
+  read_temperature(arg[0]);
+  cutoff = utils::numeric(FLERR, arg[1], false, lmp);
+  if (!(cutoff > 0.0)) stop(std::string("the cut-off must be positive, found ") + arg[1]);
+  read_seed(arg[2]);
+  read_keywords(3, narg, arg);
 }
 
 void PairTable::coeff(int narg, char **arg)
@@ -54,13 +59,7 @@ void PairTable::coeff(int narg, char **arg)
   utils::bounds(FLERR, arg[1], 1, types, jlo, jhi, error);
   Coefficients given{true, {}};
   for (int k = 0; k < count; k++) given.value[k] = utils::numeric(FLERR, arg[2 + k], false, lmp);
-  std::string trouble;
-  try {
-    check(given);
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop(trouble);
+  insist([&] { check(given); });
 
   int set = 0;
   for (int i = ilo; i <= ihi; i++)

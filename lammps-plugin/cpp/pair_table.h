@@ -19,6 +19,7 @@ class PairTable : public PairPsi {
   void write_data_all(FILE *fp) override;
 
  protected:
+  void read_settings(int narg, char **arg) override;
   bool is_stale() override;
   std::vector<std::string> coefficients() override;
   void restore(const std::vector<std::string> &texts) override;
@@ -27,7 +28,6 @@ class PairTable : public PairPsi {
   virtual void check(const Coefficients &given) = 0;
   virtual rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) = 0;
   rust::Box<Style> make_style(double kt) final;
-  void read_cutoff(const char *arg);
 
   double cutoff = 0.0;
 

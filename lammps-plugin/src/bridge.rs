@@ -1,17 +1,9 @@
 //! The style's interface to C++. Errors and panics arrive there as exceptions.
 
-use crate::converted::triples;
 use crate::error::StyleError;
 use crate::style::{Style, guard};
-use crate::thermostat::Noise;
-use nalgebra::Matrix3;
 use psidpd_core::document::Document;
-use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Effort, Need};
-use psidpd_core::engine::{
-    Around, Mark, Newton, PairsOfHost, Particles, Path, PeriodicBox, Request, SpecialPair, Step,
-    Surroundings, Tally, Want,
-};
+use psidpd_core::engine::{Mark, Path, SpecialPair, Surroundings, Want};
 use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
@@ -22,12 +14,6 @@ mod ffi {
         /// Whether pair_coeff set them.
         set: bool,
         value: [f64; 6],
-    }
-
-    /// Energy of a pair, and the force along the line from the second particle to the first.
-    struct PairValue {
-        energy: f64,
-        force: f64,
     }
 
     /// The box as LAMMPS stores it.
@@ -188,16 +174,16 @@ mod ffi {
         /// Whether this rank can compute the request without images along the closed directions of the box.
         fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
         /// Computes all forces, without ghosts.
-        fn style_evaluate(
-            style: &mut Style,
+        fn evaluate(
+            self: &mut Style,
             extent: &Extent,
             atoms: &Atoms,
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
         /// Adds all forces but those of the slopes of ghosts. `images` flags ghosts to be left out: see `Around`.
-        fn style_densities(
-            style: &mut Style,
+        fn densities(
+            self: &mut Style,
             extent: &Extent,
             images: &[bool],
             newton: bool,
@@ -207,7 +193,7 @@ mod ffi {
         ) -> Result<()>;
         /// Computes densities and slopes over pairs that LAMMPS lists; adds no forces yet.
         fn densities_of_pairs(
-            style: &mut Style,
+            self: &mut Style,
             listed: &Listed,
             newton: bool,
             atoms: &Atoms,
@@ -216,8 +202,7 @@ mod ffi {
         fn slopes_mut(self: &mut Style) -> &mut [f64];
         /// Copies slopes of owned particles after an evaluation without ghosts, and makes room for those of ghosts.
         fn fetch_slopes(self: &mut Style, all: usize) -> Result<()>;
-        fn style_forces(style: &mut Style, atoms: &Atoms, request: &Request, f: &mut [f64])
-        -> Result<Totals>;
+        fn forces(self: &mut Style, atoms: &Atoms, request: &Request, f: &mut [f64]) -> Result<Totals>;
         /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of particles by it.
         fn energy_unit(self: &Style) -> f64;
         /// One unit of velocity of the model in the units of LAMMPS.
@@ -226,19 +211,14 @@ mod ffi {
         /// Virials, six numbers for each particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Sums all densities at the positions of the last evaluation.
-        fn sum_densities(style: &mut Style, atoms: &Atoms) -> Result<()>;
+        fn sum_densities(self: &mut Style, atoms: &Atoms) -> Result<()>;
         /// Densities of owned particles, a row of [`variables`] for each.
         fn local_densities(self: &mut Style) -> &[f64];
         /// ψ of owned particles.
         fn excess_of_owned(self: &mut Style) -> Result<&[f64]>;
-        fn style_single(
-            style: &mut Style,
-            kind_i: i32,
-            kind_j: i32,
-            i: i32,
-            j: i32,
-            r: f64,
-        ) -> Result<PairValue>;
+        /// Energy of a pair of types at a distance, and the force along the line from the second particle to the first. A
+        /// many-body force uses the slopes that the two particles had in the last evaluation.
+        fn single(self: &mut Style, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<[f64; 2]>;
         fn memory(self: &Style) -> usize;
 
         // Loops over atoms, which the threads divide.
@@ -254,7 +234,7 @@ mod ffi {
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
         /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
         fn thermostat_pairs(
-            style: &mut Style,
+            self: &mut Style,
             extent: &Extent,
             images: &[bool],
             atoms: &Atoms,
@@ -264,68 +244,23 @@ mod ffi {
         /// Changes the velocities of all atoms, and returns the virial.
         fn act_alone(self: &mut Style, v: &mut [f64]) -> Result<[f64; 6]>;
         /// Begins the thermostat on several ranks, with velocities of all atoms and ghosts.
-        fn thermostat_begin(style: &mut Style, vectors: &mut [f64]) -> Result<Round>;
+        fn thermostat_begin(self: &mut Style, vectors: &mut [f64]) -> Result<Round>;
         fn thermostat_go_on(
-            style: &mut Style,
+            self: &mut Style,
             totals: [f64; 3],
             vectors: &mut [f64],
             v: &mut [f64],
         ) -> Result<Round>;
         /// Iterations of the thermostat in its last update.
-        fn iterations(self: &mut Style) -> usize;
-        fn effort(style: &mut Style) -> Effort;
+        fn iterations(self: &Style) -> usize;
+        fn effort(self: &Style) -> Effort;
     }
 }
 
-pub use ffi::Movers;
-
-fn thermostat_pairs(
-    style: &mut Style,
-    extent: &ffi::Extent,
-    images: &[bool],
-    atoms: &ffi::Atoms,
-    mass: &[f64],
-    heat: &ffi::Heat,
-) -> Result<bool, StyleError> {
-    let ffi::Heat { seed, step, uniform, time, virial } = *heat;
-    let noise = Noise { seed, step, law: if uniform { Law::Uniform } else { Law::Gaussian } };
-    let domain = style.scale().domain(domain_of(extent)?);
-    let around = Around { domain: &domain, images };
-    style.find_thermostat_pairs(around, &particles_of(atoms), mass, time, virial, noise)
-}
-
-fn effort(style: &mut Style) -> ffi::Effort {
-    let Effort { updates, iterations, most, listed, inaccurate } = style.effort();
-    ffi::Effort { updates, iterations, most, listed, inaccurate }
-}
-
-fn round(need: Need) -> ffi::Round {
-    let (wants, parts, virial) = match need {
-        Need::Nothing(virial) => (ffi::Wants::Nothing, [0.0; 3], virial),
-        Need::Totals(parts) => (ffi::Wants::Totals, parts, [0.0; 6]),
-        Need::Ghosts => (ffi::Wants::Ghosts, [0.0; 3], [0.0; 6]),
-    };
-    ffi::Round { wants, parts, virial }
-}
-
-fn thermostat_begin(style: &mut Style, vectors: &mut [f64]) -> Result<ffi::Round, StyleError> {
-    style.begin_rounds(vectors).map(round)
-}
-
-fn thermostat_go_on(
-    style: &mut Style,
-    totals: [f64; 3],
-    vectors: &mut [f64],
-    v: &mut [f64],
-) -> Result<ffi::Round, StyleError> {
-    style.next_round(totals, vectors, v).map(round)
-}
+pub use ffi::{Atoms, Effort, Extent, Heat, Listed, Movers, Request, Round, Totals, Wants};
 
 pub fn read_model(path: &str) -> Result<String, StyleError> {
-    guard(|| {
-        let document = Document::open(path.as_ref()).map_err(|e| StyleError(e.to_string()))?;
-        Ok(document.source().text().to_owned())
-    })
+    guard(|| Ok(Document::open(path.as_ref())?.source().text().to_owned()))
 }
 
 #[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.
@@ -371,114 +306,22 @@ fn warren_style(
     Style::from_coefficients(kt, &pairs, types, dimensions, masses).map(Box::new)
 }
 
-fn particles_of<'a>(atoms: &ffi::Atoms<'a>) -> Particles<'a> {
-    Particles { owned: atoms.owned, x: triples(atoms.x), tag: atoms.tag, kind: atoms.kind }
-}
-
-fn request_of<'a>(atoms: &ffi::Atoms<'a>, request: &ffi::Request) -> Request<'a> {
-    let step = Step { seed: request.seed, number: request.step, dt: request.dt };
-    Request {
-        particles: particles_of(atoms),
-        v: triples(atoms.v),
-        step: request.thermostat.then_some(step),
-        want: want_of(request),
+impl Request {
+    pub fn want(&self) -> Want {
+        Want {
+            energy: self.energy,
+            virial: self.virial,
+            particle_energy: self.particle_energy,
+            particle_virial: self.particle_virial,
+            densities: false,
+        }
     }
-}
-
-fn want_of(request: &ffi::Request) -> Want {
-    Want {
-        energy: request.energy,
-        virial: request.virial,
-        particle_energy: request.particle_energy,
-        particle_virial: request.particle_virial,
-        densities: false,
-    }
-}
-
-fn newton_of(newton: bool) -> Newton {
-    if newton { Newton::On } else { Newton::Off }
-}
-
-/// The box, with periods along the closed directions only.
-fn domain_of(extent: &ffi::Extent) -> Result<PeriodicBox, StyleError> {
-    let [xx, yy, zz, yz, xz, xy] = extent.edges;
-    let edges = Matrix3::new(xx, xy, xz, 0.0, yy, yz, 0.0, 0.0, zz);
-    PeriodicBox::new(extent.origin, edges, extent.closed).map_err(|e| StyleError(e.to_string()))
-}
-
-fn style_evaluate(
-    style: &mut Style,
-    extent: &ffi::Extent,
-    atoms: &ffi::Atoms,
-    request: &ffi::Request,
-    f: &mut [f64],
-) -> Result<ffi::Totals, StyleError> {
-    let domain = style.scale().domain(domain_of(extent)?);
-    let tally = style.evaluate(&domain, &request_of(atoms, request), f)?;
-    Ok(totals(style, &tally))
-}
-
-fn totals(style: &Style, tally: &Tally) -> ffi::Totals {
-    let [below, above] = style.engine().statistics().out_of_bounds.map(|n| n as f64);
-    ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above }
-}
-
-fn style_densities(
-    style: &mut Style,
-    extent: &ffi::Extent,
-    images: &[bool],
-    newton: bool,
-    atoms: &ffi::Atoms,
-    request: &ffi::Request,
-    f: &mut [f64],
-) -> Result<(), StyleError> {
-    let domain = style.scale().domain(domain_of(extent)?);
-    let surroundings = Surroundings::Ghosts(Around { domain: &domain, images }, newton_of(newton));
-    style.densities(surroundings, &request_of(atoms, request), f)
-}
-
-fn densities_of_pairs(
-    style: &mut Style,
-    listed: &ffi::Listed,
-    newton: bool,
-    atoms: &ffi::Atoms,
-    request: &ffi::Request,
-) -> Result<(), StyleError> {
-    let ffi::Listed { i, j, factor } = *listed;
-    let surroundings = Surroundings::Listed(PairsOfHost { i, j, factor }, newton_of(newton));
-    style.densities(surroundings, &request_of(atoms, request), &mut [])
-}
-
-fn style_forces(
-    style: &mut Style,
-    atoms: &ffi::Atoms,
-    request: &ffi::Request,
-    f: &mut [f64],
-) -> Result<ffi::Totals, StyleError> {
-    let tally = style.forces(&request_of(atoms, request), f)?;
-    Ok(totals(style, &tally))
-}
-
-fn sum_densities(style: &mut Style, atoms: &ffi::Atoms) -> Result<(), StyleError> {
-    style.sum_densities(&particles_of(atoms))
-}
-
-fn style_single(
-    style: &mut Style,
-    kind_i: i32,
-    kind_j: i32,
-    i: i32,
-    j: i32,
-    r: f64,
-) -> Result<ffi::PairValue, StyleError> {
-    let (energy, force) = style.single([kind_i, kind_j], r, [i, j])?;
-    Ok(ffi::PairValue { energy, force })
 }
 
 impl Style {
     fn variables(&self) -> usize {
-        let plan = self.engine().plan();
-        plan.densities().count() * plan.species().len()
+        let plan = self.engine.plan();
+        plan.densities().count() * plan.species.len()
     }
 
     fn set_special_pairs(&mut self, pairs: &[ffi::SpecialPair]) -> Result<(), StyleError> {
@@ -486,7 +329,7 @@ impl Style {
         let number = |k: i32| u32::try_from(k).unwrap_or(u32::MAX);
         let pairs = pairs.iter().map(|p| SpecialPair { i: number(p.i), j: number(p.j), factor: p.factor });
         guard(|| {
-            self.engine_mut().set_special_pairs(pairs);
+            self.engine.set_special_pairs(pairs);
             Ok(())
         })
     }
@@ -495,64 +338,59 @@ impl Style {
         let (marks, _) = marks.as_chunks::<2>();
         guard(|| {
             let marks = marks.iter().map(|[sides, molecule]| Mark { sides: *sides, molecule: *molecule });
-            self.engine_mut().set_exclusions(marks, between_molecules);
+            self.engine.set_exclusions(marks, between_molecules);
             Ok(())
         })
     }
 
-    fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> Result<bool, StyleError> {
-        let want = want_of(request);
-        let path = |domain| {
-            let domain = self.scale().domain(domain);
-            self.engine().path_for(Surroundings::Box(&domain), want)
-        };
-        guard(|| Ok(domain_of(extent).is_ok_and(|domain| matches!(path(domain), Path::Sweep | Path::Device))))
+    fn fits(&self, extent: &Extent, request: &Request) -> Result<bool, StyleError> {
+        guard(|| {
+            let Ok(domain) = self.scale.domain(extent) else { return Ok(false) };
+            let path = self.engine.path_for(Surroundings::Box(&domain), request.want());
+            Ok(matches!(path, Path::Sweep | Path::Device))
+        })
     }
 
     fn fetch_slopes(&mut self, all: usize) -> Result<(), StyleError> {
         guard(|| {
-            self.engine_mut().fetch_slopes(all);
+            self.engine.fetch_slopes(all);
             Ok(())
         })
     }
 
-    fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {
-        guard(|| Ok(self.excess()))
-    }
-
     fn energy_unit(&self) -> f64 {
-        self.scale().energy
+        self.scale.energy
     }
 
     fn velocity_unit(&self) -> f64 {
-        self.scale().velocity()
+        self.scale.velocity()
     }
 
     fn memory(&self) -> usize {
-        self.engine().memory()
+        self.engine.memory()
     }
 
     fn cutoff(&self) -> f64 {
-        self.scale().length * self.engine().plan().cutoff()
+        self.scale.length * self.engine.plan().cutoff
     }
 
     fn slope_width(&self) -> usize {
-        self.engine().plan().slope_width()
+        self.engine.plan().slope_width()
     }
 
     fn needs_velocities(&self) -> bool {
-        self.engine().plan().needs_velocities()
+        self.engine.plan().needs_velocities()
     }
 
     fn noise_range(&self) -> f64 {
-        self.scale().length * self.engine().plan().noise_range().unwrap_or(0.0)
+        self.scale.length * self.engine.plan().noise_range().unwrap_or(0.0)
     }
 
     fn particle_energy(&self) -> &[f64] {
-        self.engine().results().particle_energy
+        self.engine.results().particle_energy
     }
 
     fn particle_virial(&self) -> &[f64] {
-        self.engine().results().particle_virial.as_flattened()
+        self.engine.results().particle_virial.as_flattened()
     }
 }

@@ -2,14 +2,14 @@
 
 use crate::error::StyleError;
 use crate::units::Scale;
-use psidpd_core::engine::{EngineError, Particles, Request, Step};
+use psidpd_core::engine::{EngineError, Request};
 
 /// Positions and velocities in units of the model, and results in those of LAMMPS.
 #[derive(Debug, Default)]
 pub struct Converted {
-    x: Vec<f64>,
-    v: Vec<f64>,
-    forces: Vec<f64>,
+    pub x: Vec<f64>,
+    pub v: Vec<f64>,
+    pub forces: Vec<f64>,
     pub densities: Vec<f64>,
     pub excess: Vec<f64>,
 }
@@ -25,33 +25,13 @@ pub fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f6
     out
 }
 
-impl Converted {
-    /// Converts positions, velocities and the time step of LAMMPS to units of the model.
-    pub fn take<'a>(&'a mut self, scale: &Scale, request: &Request<'a>) -> Taken<'a> {
-        if scale.is_one() {
-            return Taken { request: *request, forces: &mut self.forces };
-        }
-        let Request { particles, v, step, want } = *request;
-        let x = times(particles.x.as_flattened(), 1.0 / scale.length, &mut self.x);
-        let v = times(v.as_flattened(), 1.0 / scale.velocity(), &mut self.v);
-        let step = step.map(|step| Step { dt: step.dt / scale.time, ..step });
-        let particles = Particles { x: triples(x), ..particles };
-        Taken { request: Request { particles, v: triples(v), step, want }, forces: &mut self.forces }
-    }
-}
-
 /// A request in units of the model, and room for forces.
 pub struct Taken<'a> {
-    request: Request<'a>,
-    forces: &'a mut Vec<f64>,
+    pub request: Request<'a>,
+    pub forces: &'a mut Vec<f64>,
 }
 
-impl<'a> Taken<'a> {
-    /// The particles in units of the model.
-    pub fn particles(&self) -> Particles<'a> {
-        self.request.particles
-    }
-
+impl Taken<'_> {
     /// Runs `evaluate` on forces in units of the model, and adds them to `f`.
     pub fn add_forces<R>(
         self,
@@ -65,9 +45,7 @@ impl<'a> Taken<'a> {
         self.forces.clear();
         self.forces.resize(f.len(), 0.0);
         let result = evaluate(&self.request, self.forces.as_chunks_mut::<3>().0)?;
-        for (f, force) in f.iter_mut().zip(&*self.forces) {
-            *f += scale.force() * force;
-        }
+        f.iter_mut().zip(&*self.forces).for_each(|(f, force)| *f += scale.force() * force);
         Ok(result)
     }
 }

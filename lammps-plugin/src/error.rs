@@ -1,20 +1,20 @@
 //! The error type of the styles.
 
-use psidpd_core::engine::{EngineError, ThreadCount};
+use std::error::Error;
+use std::fmt;
 
-/// An error, as the text that LAMMPS prints.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0}")]
+/// An error, as the text that LAMMPS prints. It is no [`Error`] itself: all errors become one.
+#[derive(Debug, Clone, PartialEq)]
 pub struct StyleError(pub(crate) String);
 
-impl From<EngineError> for StyleError {
-    fn from(error: EngineError) -> StyleError {
-        StyleError(error.to_string())
+impl fmt::Display for StyleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
     }
 }
 
-impl From<ThreadCount> for StyleError {
-    fn from(error: ThreadCount) -> StyleError {
+impl<E: Error> From<E> for StyleError {
+    fn from(error: E) -> StyleError {
         StyleError(error.to_string())
     }
 }

@@ -1,7 +1,7 @@
 //! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix style `dpd/splitting`. LAMMPS
 //! loads the entry, in `entry/`, which loads this.
 //!
-//! - [`style`]: one pair style's engine, in safe Rust;
+//! - [`style`]: one pair style's engine, in safe Rust; `evaluation`: its forces, in the units of LAMMPS;
 //! - [`thermostat`]: drag and noise for the fix; `motion`: its loops over atoms;
 //! - [`units`]: one unit of a model in those of LAMMPS; `converted`: conversion of positions,
 //!   velocities and forces;
@@ -15,6 +15,7 @@
 pub mod bridge;
 mod converted;
 mod error;
+mod evaluation;
 mod motion;
 pub mod style;
 pub mod thermostat;

@@ -19,7 +19,7 @@ impl Movers<'_> {
 impl Style {
     /// Calls `work` with the number of each of `things`, and with the thing.
     fn each<T: Send>(&self, things: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
-        let (pool, count) = (self.engine().pool(), things.len());
+        let (pool, count) = (self.engine.pool(), things.len());
         let mut rest = things;
         let of_thread = |t: usize| {
             let range = part(count, t, pool.threads());

@@ -7,10 +7,7 @@ use crate::converted::{Converted, times};
 use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::{Effort, PairThermostat};
-use psidpd_core::engine::{
-    Engine, Newton, Particles, Path as EnginePath, Pending, PeriodicBox, Pool, Precision, Reason, Request,
-    Settings, Surroundings, Tally, Want, at_once,
-};
+use psidpd_core::engine::{Engine, Path as EnginePath, Pending, Pool, Precision, Reason, Settings, at_once};
 use psidpd_core::model::Model;
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,22 +17,24 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Style {
     pub model: Model,
-    engine: Engine,
+    /// Computes in units of the model.
+    pub engine: Engine,
     /// The first half of an evaluation, until its second half.
-    pending: Option<Pending>,
+    pub(crate) pending: Option<Pending>,
     /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
-    thermostat: Option<PairThermostat>,
+    pub(crate) thermostat: Option<PairThermostat>,
     /// Iterations of the thermostat at earlier temperatures and settings.
-    effort_before: Effort,
+    pub(crate) effort_before: Effort,
     settings: Settings,
-    pool: Arc<Pool>,
+    pub(crate) pool: Arc<Pool>,
     kt: f64,
     /// Species of each type, from 0; entry 0 is unused, as LAMMPS counts types from 1.
-    kinds: Vec<i32>,
+    pub(crate) kinds: Vec<i32>,
     /// Meaning of the letters of pair_coeff, for the log.
     letters: Option<&'static str>,
-    scale: Scale,
-    converted: Converted,
+    /// One unit of the model in units of LAMMPS.
+    pub(crate) scale: Scale,
+    pub(crate) converted: Converted,
 }
 
 /// Runs `work` and turns a panic into an error: a panic must not unwind into LAMMPS.
@@ -104,10 +103,10 @@ impl Style {
     }
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
-        self.effort_before = self.effort();
+        self.effort_before = self.effort_so_far();
         let mut engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
         if let Some(mut device) = self.engine.use_device(None) {
-            device.set_fluid(&self.model.at(self.kt).map_err(|e| StyleError(e.to_string()))?)?;
+            device.set_fluid(&self.model.at(self.kt)?)?;
             engine.use_device(Some(device));
         }
         self.engine = engine;
@@ -136,34 +135,6 @@ impl Style {
         self.settings.threads.get()
     }
 
-    /// One unit of the model in units of LAMMPS.
-    pub fn scale(&self) -> Scale {
-        self.scale
-    }
-
-    /// The engine; it computes in units of the model.
-    pub fn engine(&self) -> &Engine {
-        &self.engine
-    }
-
-    pub fn engine_mut(&mut self) -> &mut Engine {
-        &mut self.engine
-    }
-
-    /// The thermostat apart from the forces, with the threads, the species of the types, and room for positions.
-    pub(crate) fn thermostat(&mut self) -> (Option<&mut PairThermostat>, &Pool, &[i32], &mut Converted) {
-        (self.thermostat.as_mut(), &self.pool, &self.kinds, &mut self.converted)
-    }
-
-    /// The thermostat apart from the forces, and the engine, whose forces list its pairs.
-    pub(crate) fn thermostat_beside_engine(&mut self) -> Option<(&mut PairThermostat, &mut Engine)> {
-        Some((self.thermostat.as_mut()?, &mut self.engine))
-    }
-
-    pub(crate) fn effort_before(&self) -> Effort {
-        self.effort_before
-    }
-
     /// Describes the computation, and the letters of the coefficients, for the log.
     ///
     /// `search` says where pairs come from, and whether LAMMPS lists them; `apart`, whether a fix has the thermostat.
@@ -181,10 +152,10 @@ impl Style {
                 "  units         the model's, whose length is {length:.6e} here, energy {energy:.6e}, time {time:.6e}"
             );
         }
-        for line in self.engine().plan().to_string().lines() {
+        for line in self.engine.plan().to_string().lines() {
             let _ = writeln!(text, "  {line}");
         }
-        if !self.engine().plan().is_conservative() {
+        if !self.engine.plan().conservative {
             text.push_str(
                 "  WARNING       this force law has no potential: it does work around closed loops and heats \
                  the fluid; the energy printed is not that of the forces\n",
@@ -223,54 +194,12 @@ impl Style {
         text
     }
 
-    /// Adds to `f` all forces on particles in a box that this rank has all of; the box is in units of the model.
-    pub fn evaluate(
-        &mut self,
-        domain: &PeriodicBox,
-        request: &Request,
-        f: &mut [f64],
-    ) -> Result<Tally, StyleError> {
-        guard(|| {
-            let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, request);
-            Ok(scale.tally(taken.add_forces(scale, f, |request, f| engine.forces(domain, request, f, true))?))
-        })
-    }
-
-    /// First half of an evaluation: adds to `f` all forces but those of the slopes of ghosts. With pairs that LAMMPS lists
-    /// all forces are added in the second half. Boxes are in units of the model.
-    pub fn densities(
-        &mut self,
-        surroundings: Surroundings,
-        request: &Request,
-        f: &mut [f64],
-    ) -> Result<(), StyleError> {
-        guard(|| {
-            let Style { engine, pending, scale, converted, .. } = self;
-            *pending = None;
-            let taken = converted.take(scale, request);
-            *pending = Some(taken.add_forces(scale, f, |request, f| engine.first(surroundings, request, f))?);
-            Ok(())
-        })
-    }
-
     /// `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         match &mut self.pending {
             Some(pending) => pending.slopes_mut(),
             None => self.engine.slopes_mut(),
         }
-    }
-
-    /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
-    pub fn sum_densities(&mut self, particles: &Particles) -> Result<(), StyleError> {
-        guard(|| {
-            let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, &at_rest(particles));
-            // LAMMPS has ghosts on all sides of its atoms, also across periods.
-            engine.sum_densities(Surroundings::ghosts(Newton::On), &taken.particles())?;
-            Ok(())
-        })
     }
 
     /// Local densities of owned particles, per unit volume of LAMMPS.
@@ -283,53 +212,12 @@ impl Style {
     }
 
     /// ψ of owned particles, in LAMMPS's units of energy.
-    pub fn excess(&mut self) -> &[f64] {
-        if self.scale.is_one() {
-            return self.engine.excess();
-        }
-        times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)
-    }
-
-    /// Energy of a pair of the given types at a distance, and the force along it. A many-body force
-    /// uses the slopes that the two particles had in the last evaluation.
-    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
-        guard(|| {
-            let r = r / self.scale.length;
-            let Scale { energy, .. } = self.scale;
-            let force = self.scale.force();
-            let here = |(e, f): (f64, f64)| (energy * e, force * f);
-            let width = self.engine().plan().slope_width();
-            if width == 0 {
-                return Ok(here(self.engine.single(kinds, r, [0, 0])));
-            }
-            let known = self.engine.slopes_mut().len() / width;
-            let known = |i: i32| usize::try_from(i).ok().filter(|i| *i < known);
-            match particles.map(known) {
-                [Some(i), Some(j)] => Ok(here(self.engine.single(kinds, r, [i, j]))),
-                _ => Err(StyleError(format!(
-                    "asked for the pair of particles {} and {}, which the last evaluation did not both contain",
-                    particles[0], particles[1]
-                ))),
-            }
+    pub fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {
+        guard(|| match self.scale.is_one() {
+            true => Ok(self.engine.excess()),
+            false => Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)),
         })
     }
-
-    /// Second half of an evaluation: adds the rest of the forces to `f`.
-    pub fn forces(&mut self, request: &Request, f: &mut [f64]) -> Result<Tally, StyleError> {
-        guard(|| {
-            let Style { engine, pending, scale, converted, .. } = self;
-            let pending = pending.take().ok_or_else(|| {
-                StyleError("the second half of an evaluation needs the first half before it".to_owned())
-            })?;
-            let taken = converted.take(scale, request);
-            Ok(scale.tally(taken.add_forces(scale, f, |request, f| pending.finish(engine, request, f))?))
-        })
-    }
-}
-
-/// A request for forces of these particles without drag and noise.
-pub(crate) fn at_rest<'a>(particles: &Particles<'a>) -> Request<'a> {
-    Request { particles: *particles, v: &[], step: None, want: Want::FORCES }
 }
 
 fn engine_at(
@@ -339,9 +227,7 @@ fn engine_at(
     settings: Settings,
     pool: &Arc<Pool>,
 ) -> Result<Engine, StyleError> {
-    let error = |e: &dyn std::error::Error| StyleError(e.to_string());
-    let fluid = model.at(kt).map_err(|e| error(&e))?;
-    let mut engine = Engine::with_pool(&fluid, settings, pool.clone()).map_err(|e| error(&e))?;
+    let mut engine = Engine::with_pool(&model.at(kt)?, settings, pool.clone())?;
     engine.map_kinds(kinds)?;
     Ok(engine)
 }

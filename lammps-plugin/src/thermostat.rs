@@ -1,29 +1,20 @@
 //! Drag and noise apart from the forces, for the fix that integrates: updates velocities of a
 //! rank's atoms by the midpoint rule.
 
+use crate::bridge::{Atoms, Effort, Extent, Heat, Round, Wants};
 use crate::error::StyleError;
-use crate::style::{Style, at_rest, guard};
+use crate::style::{Style, guard};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Effort, Need, Rank, Stream, Update};
+use psidpd_core::engine::thermostat::{self, Need, Rank, Stream, Update};
 use psidpd_core::engine::{Around, Particles};
 
-/// Parameters of the noise of one step.
-#[derive(Debug, Clone, Copy)]
-pub struct Noise {
-    /// Seed of the pair style.
-    pub seed: u64,
-    pub step: u64,
-    pub law: Law,
-}
-
 impl Style {
-    /// Announces that the thermostat will act for `dt` where the next forces are computed: these then list its pairs, if
+    /// Announces that the thermostat will act for a time where the next forces are computed: these then list its pairs, if
     /// they can.
-    pub fn expect_thermostat(&mut self, dt: f64, virial: bool) -> Result<(), StyleError> {
-        let dt = dt / self.scale().time;
+    pub fn expect_thermostat(&mut self, time: f64, virial: bool) -> Result<(), StyleError> {
         guard(|| {
-            if let Some((thermostat, engine)) = self.thermostat_beside_engine() {
-                thermostat.ask(engine, dt, virial);
+            if let Some(thermostat) = &mut self.thermostat {
+                thermostat.ask(&mut self.engine, time / self.scale.time, virial);
             }
             Ok(())
         })
@@ -32,35 +23,27 @@ impl Style {
     /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no
     /// thermostat. `mass` has the masses of owned atoms, infinite for atoms that keep their velocities.
     /// With `virial` pair distances are stored.
-    pub fn find_thermostat_pairs(
+    pub fn thermostat_pairs(
         &mut self,
-        around: Around,
-        particles: &Particles,
+        extent: &Extent,
+        images: &[bool],
+        atoms: &Atoms,
         mass: &[f64],
-        dt: f64,
-        virial: bool,
-        noise: Noise,
+        heat: &Heat,
     ) -> Result<bool, StyleError> {
         guard(|| {
-            let scale = self.scale();
-            if let Some((thermostat, engine)) = self.thermostat_beside_engine() {
-                thermostat.take(engine);
-            }
-            let (Some(thermostat), pool, kinds, converted) = self.thermostat() else { return Ok(false) };
-            let taken = converted.take(&scale, &at_rest(particles));
+            let Style { thermostat, engine, pool, kinds, scale, converted, .. } = self;
+            let Some(thermostat) = thermostat else { return Ok(false) };
+            thermostat.take(engine);
+            let around = Around { domain: &scale.domain(extent)?, images };
+            let taken = converted.take(scale, atoms, None);
             let unit = scale.velocity().powi(2) / scale.energy;
-            let scaled: Vec<f64>;
-            let mass = match scale.is_one() {
-                true => mass,
-                false => {
-                    scaled = mass.iter().map(|m| m * unit).collect();
-                    &scaled
-                }
-            };
-            let particles = Particles { owned: mass.len(), ..taken.particles() };
+            let mass: &[f64] = &mass.iter().map(|m| m * unit).collect::<Vec<_>>();
+            let particles = Particles { owned: mass.len(), ..taken.request.particles };
             let rank = Rank { around, particles, species_of_kind: kinds, mass };
-            thermostat.find_pairs_of_rank(pool, &rank, dt / scale.time, virial)?;
-            thermostat.draw(pool, noise.seed, noise.step, Stream(0), noise.law);
+            thermostat.find_pairs_of_rank(pool, &rank, heat.time / scale.time, heat.virial)?;
+            let law = if heat.uniform { Law::Uniform } else { Law::Gaussian };
+            thermostat.draw(pool, heat.seed, heat.step, Stream(0), law);
             Ok(true)
         })
     }
@@ -68,51 +51,64 @@ impl Style {
     /// Changes the velocities of all atoms of the last search for pairs, on one rank alone; returns the virial.
     pub fn act_alone(&mut self, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok([0.0; 6]) };
+            let Some(thermostat) = &mut self.thermostat else { return Ok([0.0; 6]) };
             let v = v.as_chunks_mut::<3>().0;
-            let virial = thermostat.act(pool, Update::Midpoint, v);
+            let virial = thermostat.act(&self.pool, Update::Midpoint, v);
             finite(v)?;
             Ok(virial)
         })
     }
 
     /// Begins the update on several ranks; `vectors` are the velocities of all atoms and ghosts, which become directions.
-    pub fn begin_rounds(&mut self, vectors: &mut [f64]) -> Result<Need, StyleError> {
+    pub fn thermostat_begin(&mut self, vectors: &mut [f64]) -> Result<Round, StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
-            Ok(thermostat.begin_midpoint(pool, vectors.as_chunks_mut::<3>().0)?)
+            let Some(thermostat) = &mut self.thermostat else { return Ok(round(Need::Nothing([0.0; 6]))) };
+            Ok(round(thermostat.begin_midpoint(&self.pool, vectors.as_chunks_mut::<3>().0)?))
         })
     }
 
     /// Continues with what the last round asked for; the last round changes the velocities `v` of the rank's atoms.
-    pub fn next_round(
+    pub fn thermostat_go_on(
         &mut self,
         totals: [f64; 3],
         vectors: &mut [f64],
         v: &mut [f64],
-    ) -> Result<Need, StyleError> {
+    ) -> Result<Round, StyleError> {
         guard(|| {
-            let (Some(thermostat), pool, ..) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
+            let Some(thermostat) = &mut self.thermostat else { return Ok(round(Need::Nothing([0.0; 6]))) };
             let (vectors, v) = (vectors.as_chunks_mut::<3>().0, v.as_chunks_mut::<3>().0);
-            let need = thermostat.go_on(pool, totals, vectors, v)?;
+            let need = thermostat.go_on(&self.pool, totals, vectors, v)?;
             if let Need::Nothing(_) = need {
                 finite(v)?;
             }
-            Ok(need)
+            Ok(round(need))
         })
     }
 
-    /// Number of iterations of the last update.
-    pub fn iterations(&mut self) -> usize {
-        self.thermostat().0.map_or(0, |thermostat| thermostat.iterations())
+    pub fn iterations(&self) -> usize {
+        self.thermostat.as_ref().map_or(0, |thermostat| thermostat.iterations())
     }
 
-    /// Iterations of all updates since the style was set up.
-    pub fn effort(&mut self) -> Effort {
-        let mut effort = self.thermostat().0.map_or(Effort::default(), |thermostat| thermostat.effort());
-        effort += self.effort_before();
+    pub(crate) fn effort_so_far(&self) -> thermostat::Effort {
+        let mut effort =
+            self.thermostat.as_ref().map_or(Default::default(), |thermostat| thermostat.effort());
+        effort += self.effort_before;
         effort
     }
+
+    pub fn effort(&self) -> Effort {
+        let thermostat::Effort { updates, iterations, most, listed, inaccurate } = self.effort_so_far();
+        Effort { updates, iterations, most, listed, inaccurate }
+    }
+}
+
+fn round(need: Need) -> Round {
+    let (wants, parts, virial) = match need {
+        Need::Nothing(virial) => (Wants::Nothing, [0.0; 3], virial),
+        Need::Totals(parts) => (Wants::Totals, parts, [0.0; 6]),
+        Need::Ghosts => (Wants::Ghosts, [0.0; 3], [0.0; 6]),
+    };
+    Round { wants, parts, virial }
 }
 
 fn finite(v: &[[f64; 3]]) -> Result<(), StyleError> {

@@ -1,6 +1,5 @@
 //! From the units of LAMMPS to those of a model.
 
-use psidpd_core::engine::{PeriodicBox, Tally};
 use psidpd_core::model::Units;
 
 /// One unit of the model in units of LAMMPS.
@@ -66,26 +65,6 @@ impl Scale {
 
     pub fn force(&self) -> f64 {
         self.energy / self.length
-    }
-
-    /// Converts energies and virials to units of LAMMPS.
-    pub fn tally(&self, mut tally: Tally) -> Tally {
-        tally.excess *= self.energy;
-        tally.pair *= self.energy;
-        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= self.energy);
-        tally
-    }
-
-    /// Converts the box of LAMMPS to units of the model.
-    pub fn domain(&self, domain: PeriodicBox) -> PeriodicBox {
-        if self.is_one() {
-            return domain;
-        }
-        let origin = domain.origin().map(|x| x / self.length);
-        let edges = [0, 1, 2].map(|k| domain.edge(k).map(|x| x / self.length));
-        let edges = nalgebra::Matrix3::from_fn(|row, column| edges[column][row]);
-        // A valid box stays valid in other units, unless its lengths leave the range of numbers.
-        PeriodicBox::new(origin, edges, domain.periodic()).unwrap_or(domain)
     }
 }
 

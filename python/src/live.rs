@@ -10,17 +10,17 @@ use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-type Vectors = OnceLock<Py<PyArray2<f64>>>;
 type Part = fn(&Simulation) -> &[[f64; 3]];
+
+/// What the arrays have, in their order.
+const PARTS: [Part; 3] = [Simulation::positions, Simulation::velocities, Simulation::forces];
 
 /// The compiled part of psidpd.Simulation.
 #[pyclass(frozen, module = "psidpd")]
 pub struct Steps {
     live: Mutex<Live>,
     /// Arrays that were asked for; their numbers are renewed after steps.
-    positions: Vectors,
-    velocities: Vectors,
-    forces: Vectors,
+    arrays: [OnceLock<Py<PyArray2<f64>>>; 3],
     process: u32,
 }
 
@@ -36,9 +36,9 @@ impl Steps {
     }
 
     /// An array of numpy that is the same at every call.
-    fn shown(&self, py: Python, array: &Vectors, of: Part) -> PyResult<Py<PyArray2<f64>>> {
-        let vectors = self.with(py, |live| by_tag(live, of))?;
-        let made = array.get_or_init(|| {
+    fn shown(&self, py: Python, part: usize) -> PyResult<Py<PyArray2<f64>>> {
+        let vectors = self.with(py, |live| by_tag(live, PARTS[part]))?;
+        let made = self.arrays[part].get_or_init(|| {
             let made = PyArray2::zeros(py, [vectors.len(), 3], false);
             fill(&made, &vectors);
             made.readwrite().make_nonwriteable();
@@ -48,12 +48,12 @@ impl Steps {
     }
 }
 
-/// Vectors of all particles, in the order of tags.
-fn by_tag(live: &Live, of: Part) -> Vec<[f64; 3]> {
+/// Values of all particles, in the order of tags.
+fn by_tag<T: Copy + Default>(live: &Live, of: fn(&Simulation) -> &[T]) -> Vec<T> {
     let simulation = live.simulation();
-    let mut sorted = vec![[0.0; 3]; simulation.len()];
-    for (vector, tag) in of(simulation).iter().zip(simulation.tags()) {
-        sorted[*tag as usize - 1] = *vector;
+    let mut sorted = vec![T::default(); simulation.len()];
+    for (value, tag) in of(simulation).iter().zip(simulation.tags()) {
+        sorted[*tag as usize - 1] = *value;
     }
     sorted
 }
@@ -85,13 +85,7 @@ impl Steps {
         if tags.iter().any(|tag| !(1..=tags.len() as i32).contains(tag)) {
             return Err(wrong("the tags of the particles must be 1 to their number"));
         }
-        Ok(Steps {
-            live: Mutex::new(live),
-            positions: OnceLock::new(),
-            velocities: OnceLock::new(),
-            forces: OnceLock::new(),
-            process: std::process::id(),
-        })
+        Ok(Steps { live: Mutex::new(live), arrays: Default::default(), process: std::process::id() })
     }
 
     /// Makes steps, up to the end of the scene if their number is left out. Ctrl-C ends them after the present one.
@@ -108,12 +102,7 @@ impl Steps {
                 raised.is_some()
             })
         })?;
-        let parts: [(&Vectors, Part); 3] = [
-            (&self.positions, Simulation::positions),
-            (&self.velocities, Simulation::velocities),
-            (&self.forces, Simulation::forces),
-        ];
-        for (array, of) in parts {
+        for (array, of) in self.arrays.iter().zip(PARTS) {
             if let Some(array) = array.get() {
                 fill(array.bind(py), &self.with(py, |live| by_tag(live, of))?);
             }
@@ -130,31 +119,23 @@ impl Steps {
 
     #[getter]
     fn positions(&self, py: Python) -> PyResult<Py<PyArray2<f64>>> {
-        self.shown(py, &self.positions, Simulation::positions)
+        self.shown(py, 0)
     }
 
     #[getter]
     fn velocities(&self, py: Python) -> PyResult<Py<PyArray2<f64>>> {
-        self.shown(py, &self.velocities, Simulation::velocities)
+        self.shown(py, 1)
     }
 
     #[getter]
     fn forces(&self, py: Python) -> PyResult<Py<PyArray2<f64>>> {
-        self.shown(py, &self.forces, Simulation::forces)
+        self.shown(py, 2)
     }
 
     /// The index of each particle's species, in the order of tags.
     #[getter]
     fn types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i32>>> {
-        let types = self.with(py, |live| {
-            let simulation = live.simulation();
-            let mut types = vec![0; simulation.len()];
-            for (species, tag) in simulation.species().iter().zip(simulation.tags()) {
-                types[*tag as usize - 1] = *species;
-            }
-            types
-        })?;
-        Ok(PyArray1::from_vec(py, types))
+        Ok(PyArray1::from_vec(py, self.with(py, |live| by_tag(live, Simulation::species))?))
     }
 
     /// The edge vectors of the box, as rows.

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p psidpd-core --example left_out`
 
-use psidpd_core::engine::{Particles, PeriodicBox, Precision, Settings, Step, Sweep, Want, noise};
+use psidpd_core::engine::{Particles, PeriodicBox, Precision, Request, Settings, Step, Sweep, Want, noise};
 use psidpd_core::model::Model;
 use std::time::Instant;
 
@@ -89,7 +89,12 @@ impl Case {
             }
             let particles = Particles { owned: COUNT, x: &self.x, tag: &self.tag, kind: &self.kind };
             self.sweep
-                .evaluate(&self.domain, &particles, &self.v, self.step, self.want, &mut self.force, false)
+                .evaluate(
+                    &self.domain,
+                    &Request { particles, v: &self.v, step: self.step, want: self.want },
+                    &mut self.force,
+                    false,
+                )
                 .expect("forces");
         }
         start.elapsed().as_secs_f64() * 1e9 / f64::from(EVALUATIONS) / COUNT as f64

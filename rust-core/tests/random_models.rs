@@ -1,7 +1,7 @@
 //! Compares the engine with the plain reference for random models, and both with the Hamiltonian.
 
 use proptest::prelude::*;
-use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Want};
+use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Request, Want};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use psidpd_core::truth::{self, Truth};
 use random_fluid::{Random, model_text};
@@ -264,8 +264,14 @@ fn run_sweep(
     if !ghosts {
         assert!(sweep.fits(&c.domain));
         let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-        let tally =
-            sweep.evaluate(&c.domain, &particles, &[], None, Want::TOTALS, &mut forces, false).unwrap();
+        let tally = sweep
+            .evaluate(
+                &c.domain,
+                &Request { particles, v: &[], step: None, want: Want::TOTALS },
+                &mut forces,
+                false,
+            )
+            .unwrap();
         return (tally.energy(), forces, tally.virial);
     }
     let mut images = Images::default();
@@ -276,11 +282,11 @@ fn run_sweep(
     let edges = nalgebra::Matrix3::from_columns(&[0, 1, 2].map(|k| c.domain.edge(k).into()));
     let open = PeriodicBox::new(c.domain.origin(), edges, [false; 3]).unwrap();
     let around = psidpd_core::engine::Around { domain: &open, images: &[] };
-    sweep.first(around, &particles, &[], None, Want::TOTALS, &mut forces).unwrap();
-    let width = sweep.slope_width();
-    let mut slopes = sweep.slopes()[..owned * width].to_vec();
+    sweep.first(around, &Request { particles, v: &[], step: None, want: Want::TOTALS }, &mut forces).unwrap();
+    let width = sweep.plan.slope_width();
+    let mut slopes = sweep.slopes[..owned * width].to_vec();
     images.forward(width, &mut slopes);
-    sweep.slopes_mut().copy_from_slice(&slopes);
+    sweep.slopes.copy_from_slice(&slopes);
     let tally = sweep.second(&particles, &mut forces).unwrap();
     (tally.energy(), forces, tally.virial)
 }

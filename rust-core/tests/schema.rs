@@ -2,13 +2,15 @@
 //! keys, and that the reader reads every key.
 
 use psidpd_core::model::Model;
-use psidpd_core::model::keys::{
-    CURVES, DENSITY, EXCESS, FORMS, LITERATURE, PAIR, PARAMETERS, REQUIRED, TABLES, THERMOSTAT, TOP, Table,
-    UNITS, ValueKind,
-};
+use psidpd_core::model::keys::{FORMS, REQUIRED, TABLES, Table, ValueKind};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+
+/// The keys in the braces of an excess free energy.
+fn curves() -> &'static Table {
+    &TABLES[5]
+}
 
 fn schema_of_value(kind: &ValueKind) -> Value {
     let number = json!({ "$ref": "#/definitions/number" });
@@ -33,7 +35,7 @@ fn schema_of_value(kind: &ValueKind) -> Value {
         ]}),
         ValueKind::Slopes => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
         ValueKind::Excess => {
-            let mut curve = object(&CURVES, None);
+            let mut curve = object(curves(), None);
             curve["oneOf"] = ["table", "pressure", "slopes"].map(|key| json!({ "required": [key] })).into();
             json!({ "anyOf": [{ "type": "string" }, curve] })
         }
@@ -81,23 +83,26 @@ fn object(table: &Table, form: Option<&str>) -> Value {
 }
 
 fn schema() -> String {
-    let mut root = object(&TOP, None);
+    let &[top, units, parameters, density, excess, _, pair, thermostat, literature] = TABLES else {
+        panic!()
+    };
+    let mut root = object(&top, None);
     root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
     root["title"] = json!("psidpd model file");
     root["definitions"] = json!({ "number": {
         "anyOf": [{ "type": "number" }, { "type": "string", "minLength": 1 }]
     }});
     let properties = &mut root["properties"];
-    properties["units"] = object(&UNITS, None);
-    properties["parameters"] = object(&PARAMETERS, None);
-    properties["density"] = json!({ "type": "object", "description": DENSITY.about, "additionalProperties": object(&DENSITY, None) });
-    properties["excess_free_energy"] = object(&EXCESS, None);
-    let forms: Vec<Value> = FORMS.iter().map(|form| object(&PAIR, Some(form))).collect();
-    properties["pair"] = json!({ "type": "array", "description": PAIR.about, "items": { "oneOf": forms } });
+    properties["units"] = object(&units, None);
+    properties["parameters"] = object(&parameters, None);
+    properties["density"] = json!({ "type": "object", "description": density.about, "additionalProperties": object(&density, None) });
+    properties["excess_free_energy"] = object(&excess, None);
+    let forms: Vec<Value> = FORMS.iter().map(|form| object(&pair, Some(form))).collect();
+    properties["pair"] = json!({ "type": "array", "description": pair.about, "items": { "oneOf": forms } });
     properties["thermostat"] =
-        json!({ "type": "array", "description": THERMOSTAT.about, "items": object(&THERMOSTAT, None) });
+        json!({ "type": "array", "description": thermostat.about, "items": object(&thermostat, None) });
     properties["literature"] =
-        json!({ "type": "array", "description": LITERATURE.about, "items": object(&LITERATURE, None) });
+        json!({ "type": "array", "description": literature.about, "items": object(&literature, None) });
     serde_json::to_string_pretty(&root).unwrap() + "\n"
 }
 
@@ -116,7 +121,7 @@ fn reference() -> String {
         let heading = match table.path {
             "" => "Top level".to_owned(),
             "pair" | "thermostat" | "literature" => format!("`[[{}]]`", table.path),
-            path if path == CURVES.path => "`SPECIES = { … }` in `[excess_free_energy]`".to_owned(),
+            path if path == curves().path => "`SPECIES = { … }` in `[excess_free_energy]`".to_owned(),
             path => format!("`[{path}]`"),
         };
         let _ = write!(text, "\n## {heading}\n\n{}", table.reference());

@@ -23,6 +23,7 @@ const CORE: &[&[&str]] = &[
         "engine::path",
         "engine::reach",
         "engine::request",
+        "engine::step",
         "engine::surroundings",
         "engine::vectors",
     ],

@@ -27,7 +27,7 @@ impl Style {
         use psidpd_core::engine::DevicePath;
         let failed = |error: psidpd_gpu::GpuError| StyleError(format!("device gpu: {error}"));
         let device = psidpd_gpu::Device::open(Some(number)).map_err(failed)?;
-        let fluid = self.model.at(self.kt).map_err(|error| StyleError(error.to_string()))?;
+        let fluid = self.model.at(self.kt)?;
         let mut forces = psidpd_gpu::GpuForces::new(&device, &fluid).map_err(failed)?;
         forces.map_kinds(&self.kinds);
         self.engine.use_device(Some(Box::new(forces)));

@@ -20,7 +20,7 @@ struct Members<T> {
 impl<T: Copy> Members<T> {
     fn new(pairs: &[Option<T>], types: usize) -> Result<Members<T>, StyleError> {
         if types.checked_mul(types) != Some(pairs.len()) {
-            return Err(StyleError(PresetError::Shape.to_string()));
+            return Err(PresetError::Shape.into());
         }
         let given = |a: usize, b: usize| pairs[a.min(b) * types + a.max(b)].is_some();
         let members: Vec<usize> = (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect();
@@ -34,8 +34,8 @@ impl<T: Copy> Members<T> {
 
     /// Converts an error of a preset, which counts species, to one that counts types.
     fn error(&self, error: PresetError) -> StyleError {
-        let PresetError::Missing(i, j) = error else { return StyleError(error.to_string()) };
-        StyleError(PresetError::Missing(self.types[i - 1] + 1, self.types[j - 1] + 1).to_string())
+        let PresetError::Missing(i, j) = error else { return error.into() };
+        PresetError::Missing(self.types[i - 1] + 1, self.types[j - 1] + 1).into()
     }
 }
 
@@ -55,8 +55,10 @@ impl Style {
         dimensions: usize,
     ) -> Result<Style, StyleError> {
         guard(|| {
-            let model = Model::parse(source, text).map_err(|e| StyleError(e.to_string()))?;
-            Style::in_units(model, units, kt, names, dimensions)
+            let model = Model::parse(source, text)?;
+            let scale = Scale::new(units, model.units())
+                .map_err(|text| StyleError(format!("{}: {text}", model.source().name())))?;
+            Ok(Style { scale, ..Style::new(model, kt / scale.energy, names, dimensions)? })
         })
     }
 
@@ -125,17 +127,5 @@ impl Style {
         let name = |t| if members.types.contains(&t) { name_of_type(t) } else { "NULL".to_owned() };
         let names: Vec<String> = (0..types).map(name).collect();
         Ok(Style { letters: Some(letters), ..Style::new(model, kt, &names, dimensions)? })
-    }
-
-    fn in_units(
-        model: Model,
-        units: &str,
-        kt: f64,
-        names: &[String],
-        dimensions: usize,
-    ) -> Result<Style, StyleError> {
-        let scale = Scale::new(units, model.units())
-            .map_err(|text| StyleError(format!("{}: {text}", model.source().name())))?;
-        Ok(Style { scale, ..Style::new(model, kt / scale.energy, names, dimensions)? })
     }
 }

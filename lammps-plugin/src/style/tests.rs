@@ -1,6 +1,5 @@
 use super::*;
-use crate::converted::triples;
-use psidpd_core::engine::{Around, PairsOfHost, Step};
+use crate::bridge::{Atoms, Extent, Listed, Request};
 use psidpd_core::model::WarrenPair;
 
 const MODEL: &str = "title = \"t\"\nspecies = [\"A\", \"B\"]\n[[pair]]\nbetween = [\"A\", \"B\"]\n\
@@ -12,17 +11,29 @@ fn style(names: &[&str], dimensions: usize) -> Result<Style, StyleError> {
     Style::new(Model::parse("m.toml", MODEL).unwrap(), 1.0, &names, dimensions)
 }
 
-/// A request for forces of atoms in the flat arrays of LAMMPS.
-fn request<'a>(
-    owned: usize,
-    x: &'a [f64],
-    v: &'a [f64],
-    tag: &'a [i32],
-    kind: &'a [i32],
-    step: Option<Step>,
-) -> Request<'a> {
-    let particles = Particles { owned, x: triples(x), tag, kind };
-    Request { particles, v: triples(v), step, want: Want::FORCES }
+/// Atoms in the flat arrays of LAMMPS.
+fn atoms<'a>(owned: usize, x: &'a [f64], v: &'a [f64], tag: &'a [i32], kind: &'a [i32]) -> Atoms<'a> {
+    Atoms { owned, x, v, tag, kind }
+}
+
+/// A request for forces, with drag and noise or without.
+fn request(thermostat: bool) -> Request {
+    let (seed, step, dt) = (1, 1, 0.01);
+    Request {
+        thermostat,
+        seed,
+        step,
+        dt,
+        energy: false,
+        virial: false,
+        particle_energy: false,
+        particle_virial: false,
+    }
+}
+
+/// A cube, periodic or open.
+fn cube(edge: f64, closed: bool) -> Extent {
+    Extent { origin: [0.0; 3], edges: [edge, edge, edge, 0.0, 0.0, 0.0], closed: [closed; 3] }
 }
 
 #[test]
@@ -30,16 +41,17 @@ fn types_map_to_species_by_name() {
     let mut s = style(&["B", "NULL", "A"], 3).unwrap();
     let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
     let mut f = [0.0; 6];
-    let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
-    let around = Surroundings::Ghosts(Around { domain: &open, images: &[] }, Newton::On);
-    s.densities(around, &request(2, &x, &[], &[1, 2], &[1, 2], None), &mut f).unwrap();
-    s.forces(&request(2, &x, &[], &[1, 2], &[1, 2], None), &mut f).unwrap();
+    let (open, still) = (cube(1.0, false), request(false));
+    let apart = atoms(2, &x, &[], &[1, 2], &[1, 2]);
+    s.densities(&open, &[], true, &apart, &still, &mut f).unwrap();
+    s.forces(&apart, &still, &mut f).unwrap();
     assert_eq!(f, [0.0; 6]);
-    s.densities(around, &request(2, &x, &[], &[1, 2], &[1, 3], None), &mut f).unwrap();
-    s.forces(&request(2, &x, &[], &[1, 2], &[1, 3], None), &mut f).unwrap();
+    let pair = atoms(2, &x, &[], &[1, 2], &[1, 3]);
+    s.densities(&open, &[], true, &pair, &still, &mut f).unwrap();
+    s.forces(&pair, &still, &mut f).unwrap();
     assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
     // Without ghosts, forces are added to those in `f`.
-    s.evaluate(&open, &request(2, &x, &[], &[1, 2], &[1, 3], None), &mut f).unwrap();
+    s.evaluate(&open, &pair, &still, &mut f).unwrap();
     assert_eq!(f, [-25.0, 0.0, 0.0, 25.0, 0.0, 0.0]);
 }
 
@@ -49,18 +61,19 @@ fn densities_of_one_step_leave_later_steps_to_the_sweep() {
     let text = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
         [density.m]\nkernel = \"linear\"\nrange = 1\n[excess_free_energy]\nA = \"n^2 + m\"\n";
     let mut s = Style::new(Model::parse("m.toml", text).unwrap(), 1.0, &["A".to_owned()], 3).unwrap();
-    let (x, tag, kind) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [1, 2], [1, 1]);
+    let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
+    let pair = atoms(2, &x, &[], &[1, 2], &[1, 1]);
     let w = 3.0 / std::f64::consts::PI * 0.5;
-    s.sum_densities(&request(2, &x, &[], &tag, &kind, None).particles).unwrap();
-    assert_eq!(s.engine().results().densities, [0.0; 4]);
+    s.sum_densities(&pair).unwrap();
+    assert_eq!(s.engine.results().densities, [0.0; 4]);
     for _ in 0..2 {
-        s.evaluate(&PeriodicBox::OPEN, &request(2, &x, &[], &tag, &kind, None), &mut [0.0; 6]).unwrap();
-        assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
-        s.sum_densities(&request(2, &x, &[], &tag, &kind, None).particles).unwrap();
-        let densities = s.engine().results().densities;
+        s.evaluate(&cube(1.0, false), &pair, &request(false), &mut [0.0; 6]).unwrap();
+        assert_eq!(s.engine.path(), Some(EnginePath::Sweep));
+        s.sum_densities(&pair).unwrap();
+        let densities = s.engine.results().densities;
         assert_eq!(densities.len(), 4);
         assert!((densities[1] - w).abs() < 1e-14 && densities[0] > 0.0, "{densities:?}");
-        assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
+        assert_eq!(s.engine.path(), Some(EnginePath::Sweep));
     }
     let text = [false, true].map(|listed| s.description("", listed, listed));
     assert!(text[0].contains("evaluation    cell sweep;"), "{}", text[0]);
@@ -108,8 +121,7 @@ fn hostile_arguments_are_errors() {
     let many = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
         [excess_free_energy]\nA = \"n^2\"\n[[thermostat]]\ngamma = 1\nrange = 1\n";
     let mut s = Style::new(Model::parse("m.toml", many).unwrap(), 1.0, &["A".to_owned()], 3).unwrap();
-    let open = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [false; 3]).unwrap();
-    let closed = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [true; 3]).unwrap();
+    let (open, closed) = (cube(3.0, false), cube(3.0, true));
     let extremes = [i32::MIN, -1, 0, 1, 2, 3, i32::MAX];
     for threads in [0, 1025, usize::MAX] {
         let error = s.configure(false, threads).unwrap_err().to_string();
@@ -118,55 +130,47 @@ fn hostile_arguments_are_errors() {
     // Before the first evaluation no particle is known.
     assert!(extremes.iter().all(|i| s.single([1, 1], 0.5, [*i, 0]).is_err()));
     let (x, v) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [0.0; 6]);
-    let step = Some(Step { seed: 1, number: 1, dt: 0.01 });
+    let (hot, still) = (request(true), request(false));
+    let pair = atoms(2, &x, &v, &[1, 2], &[1, 1]);
     let mut f = [0.0; 6];
-    s.evaluate(&closed, &request(2, &x, &v, &[1, 2], &[1, 1], step), &mut f).unwrap();
-    s.engine_mut().fetch_slopes(2);
-    assert!(s.single([1, 1], 0.5, [0, 1]).unwrap().1 > 0.0);
+    s.evaluate(&closed, &pair, &hot, &mut f).unwrap();
+    s.engine.fetch_slopes(2);
+    assert!(s.single([1, 1], 0.5, [0, 1]).unwrap()[1] > 0.0);
     for i in extremes {
         for pair in [[i, 0], [0, i], [i, i]] {
             assert_eq!(s.single([1, 1], 0.5, pair).is_ok(), pair.iter().all(|k| (0..2).contains(k)));
         }
     }
-    let around = Surroundings::Ghosts(Around { domain: &open, images: &[] }, Newton::On);
     for [i, kind] in extremes.into_iter().flat_map(|i| extremes.map(|kind| [i, kind])) {
         let _ = s.single([kind, i], f64::NAN, [0, 1]);
         let kinds = [1, kind];
-        let done = s.densities(around, &request(2, &x, &v, &[1, 2], &kinds, step), &mut f);
+        let done = s.densities(&open, &[], true, &atoms(2, &x, &v, &[1, 2], &kinds), &hot, &mut f);
         assert!(done.is_ok() == (kind == 1) || kind == 0);
     }
     // The pairs of half an evaluation are not known yet.
-    let whole = request(2, &x, &v, &[1, 2], &[1, 1], step);
-    s.densities(around, &whole, &mut f).unwrap();
+    s.densities(&open, &[], true, &pair, &hot, &mut f).unwrap();
     assert!(s.single([1, 1], 0.5, [0, 1]).is_err());
-    s.forces(&whole, &mut f).unwrap();
+    s.forces(&pair, &hot, &mut f).unwrap();
     assert!(s.single([1, 1], 0.5, [0, 1]).is_ok());
-    let around = Surroundings::Ghosts(Around { domain: &open, images: &[true] }, Newton::On);
     for owned in [0, 1, 2, 3, usize::MAX] {
         for (tags, kinds) in [(&[1, 2][..], &[1][..]), (&[1], &[1, 1]), (&[], &[])] {
-            let short = s.densities(around, &request(owned, &x, &v, tags, kinds, step), &mut f);
-            assert!(short.is_err());
-            assert!(s.forces(&request(owned, &x, &v, tags, kinds, step), &mut f).is_err());
+            let short = atoms(owned, &x, &v, tags, kinds);
+            assert!(s.densities(&open, &[true], true, &short, &hot, &mut f).is_err());
+            assert!(s.forces(&short, &hot, &mut f).is_err());
         }
         for (i, j, factor) in [(-1, 0, 1.0), (0, i32::MAX, 1.0), (7, 7, f64::NAN)] {
-            let listed = PairsOfHost { i: &[i], j: &[j], factor: &[factor] };
-            assert!(
-                s.densities(
-                    Surroundings::Listed(listed, Newton::On),
-                    &request(owned, &x, &[], &[1, 2], &[1, 1], None),
-                    &mut []
-                )
-                .is_err()
-            );
+            let listed = Listed { i: &[i], j: &[j], factor: &[factor] };
+            let all = atoms(owned, &x, &[], &[1, 2], &[1, 1]);
+            assert!(s.densities_of_pairs(&listed, true, &all, &still).is_err());
         }
     }
-    assert!(s.evaluate(&closed, &request(2, &x, &v, &[1, 2], &[1, 1], step), &mut f[..3]).is_err());
-    assert!(s.evaluate(&closed, &request(2, &x, &v[..3], &[1, 2], &[1, 1], step), &mut f).is_err());
-    assert!(s.evaluate(&closed, &request(2, &x, &v, &[0, -2], &[1, 1], step), &mut f).is_err());
     let wild = [f64::NAN, 0.0, 0.0, f64::INFINITY, 0.0, 1e300];
-    assert!(s.evaluate(&closed, &request(2, &wild, &v, &[1, 2], &[1, 1], step), &mut f).is_err());
+    assert!(s.evaluate(&closed, &pair, &hot, &mut f[..3]).is_err());
+    assert!(s.evaluate(&closed, &atoms(2, &x, &v[..3], &[1, 2], &[1, 1]), &hot, &mut f).is_err());
+    assert!(s.evaluate(&closed, &atoms(2, &x, &v, &[0, -2], &[1, 1]), &hot, &mut f).is_err());
+    assert!(s.evaluate(&closed, &atoms(2, &wild, &v, &[1, 2], &[1, 1]), &hot, &mut f).is_err());
     // The style still works after these errors.
-    s.evaluate(&closed, &request(2, &x, &v, &[1, 2], &[1, 1], step), &mut f).unwrap();
+    s.evaluate(&closed, &pair, &hot, &mut f).unwrap();
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Fluids and particles that micro-benchmarks and instruction counts share.
 
 use psidpd_core::engine::{
-    Around, Images, Instructions, Particles, PeriodicBox, Precision, Settings, Step, Sweep, Want, noise,
+    Around, Images, Instructions, Particles, PeriodicBox, Precision, Request, Settings, Step, Sweep, Want,
+    noise,
 };
 use psidpd_core::model::{Fluid, Model};
 
@@ -141,10 +142,7 @@ impl Cloud {
         sweep
             .evaluate(
                 &self.domain,
-                &particles,
-                &self.v,
-                Some(self.step),
-                Want::FORCES,
+                &Request { particles, v: &self.v, step: Some(self.step), want: Want::FORCES },
                 &mut self.force,
                 false,
             )
@@ -221,10 +219,10 @@ impl Rank {
         let (v, step, force) = (&self.v, Some(self.cloud.step), &mut self.cloud.force);
         // As hosts do, before every evaluation.
         force.fill([0.0; 3]);
-        sweep.first(around, &particles, v, step, Want::FORCES, force).expect("densities");
+        sweep.first(around, &Request { particles, v, step, want: Want::FORCES }, force).expect("densities");
         between();
-        let width = sweep.slope_width();
-        let slopes = sweep.slopes_mut();
+        let width = sweep.plan.slope_width();
+        let slopes = &mut sweep.slopes;
         slopes.truncate(width * owned);
         self.images.forward(width, slopes);
         between();

@@ -16,7 +16,6 @@
  * for results are left alone. Under "Safety" is what no function can check.
  */
 
-
 #ifndef PSIDPD_H
 #define PSIDPD_H
 
@@ -252,7 +251,8 @@ typedef struct psidpd_request {
 
 /// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
 ///
-/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are unspecified.
+/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz, so that `p = rho kT + tr W/(dV)`. Entries that were not asked
+/// for are unspecified.
 typedef struct psidpd_tally {
   /// Sum of psi over particles. The potential energy is `excess + pair`.
   double excess;

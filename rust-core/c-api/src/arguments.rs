@@ -3,14 +3,10 @@
 use crate::status::{Failure, Status, guard};
 use std::ffi::{CStr, c_char};
 
-fn null(name: &str) -> Failure {
-    Failure::new(Status::NullPointer, format!("{name} is NULL"))
-}
-
 /// Fails for pointers that are null or not aligned for a `T`.
 fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     if pointer.is_null() {
-        return Err(null(name));
+        return Err(Failure::new(Status::NullPointer, format!("{name} is NULL")));
     }
     if !pointer.is_aligned() {
         return Err(Failure::argument(format!("{name} is not aligned")));
@@ -56,6 +52,15 @@ pub(super) unsafe fn copied<T: Copy>(pointer: *const T, name: &str) -> Result<T,
     check(pointer, name)?;
     // SAFETY: `check` found it aligned and not null; the caller promises a `T` there, which is `Copy`.
     Ok(unsafe { pointer.read() })
+}
+
+/// Copies the `T` at `pointer`, if there is one.
+///
+/// # Safety
+/// `pointer` is null or at a `T`.
+pub(super) unsafe fn optional<T: Copy>(pointer: *const T, name: &str) -> Result<Option<T>, Failure> {
+    // SAFETY: the caller promises a `T` at a pointer that is not null.
+    (!pointer.is_null()).then(|| unsafe { copied(pointer, name) }).transpose()
 }
 
 /// A place for a result, which may be uninitialised.

@@ -1,10 +1,11 @@
 //! Engines, which compute forces.
 
-use crate::arguments::{Output, array, copied, exclusive, free, shared};
+use crate::arguments::{Output, array, exclusive, free, optional, shared};
 use crate::model::Model;
 use crate::settings::{Path, Settings};
 use crate::status::{Failure, Status, c_text, guard};
 use psidpd_core::engine;
+pub use psidpd_core::engine::{SpecialPair, Step, Tally};
 use std::ffi::{CString, c_char};
 
 /// The forces of one model at one temperature. One thread at a time may use an engine; different
@@ -47,34 +48,6 @@ pub struct Particles {
     pub kind: *const i32,
 }
 
-/// Seed, number and length of the time step, on which the thermostat depends.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct Step {
-    /// Seed of the pair noise.
-    pub seed: u64,
-    /// Number of the step.
-    pub number: u64,
-    /// Time step, positive.
-    pub dt: f64,
-}
-
-/// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
-///
-/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are unspecified.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct Tally {
-    /// Sum of psi over particles. The potential energy is `excess + pair`.
-    pub excess: f64,
-    /// Sum of phi over pairs.
-    pub pair: f64,
-    /// Virial of the conservative forces.
-    pub virial: [f64; 6],
-    /// Virial of the dissipative and random forces.
-    pub thermostat_virial: [f64; 6],
-}
-
 /// For `want`: compute the potential energy.
 pub const PSIDPD_WANT_ENERGY: u32 = 1;
 /// For `want`: compute the virials.
@@ -114,8 +87,7 @@ pub(super) fn want_of(bits: u32) -> Result<engine::Want, Failure> {
 pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::Particles<'a>, Failure> {
     let Particles { owned, all, .. } = *particles;
     if owned > all {
-        let text = format!("particles: {owned} are owned, but there are only {all}");
-        return Err(Failure::argument(text));
+        return Err(Failure::argument(format!("particles: {owned} are owned, but there are only {all}")));
     }
     // SAFETY: the caller promises null or arrays of these lengths that nobody writes to; a
     // vector is three consecutive numbers.
@@ -129,12 +101,11 @@ pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::P
     }
 }
 
-pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
-    if !(step.dt > 0.0 && step.dt.is_finite()) {
-        let text = format!("step.dt is {}, not a positive number", step.dt);
-        return Err(Failure::argument(text));
+pub(super) fn checked_step(step: Step) -> Result<Step, Failure> {
+    match step.dt > 0.0 && step.dt.is_finite() {
+        true => Ok(step),
+        false => Err(Failure::argument(format!("step.dt is {}, not a positive number", step.dt))),
     }
-    Ok(engine::Step { seed: step.seed, number: step.number, dt: step.dt })
 }
 
 /// Makes an engine for `model` at temperature `kt`, in the energy unit of the model, and puts it in
@@ -160,11 +131,8 @@ pub unsafe extern "C" fn psidpd_engine_new(
     guard(|| {
         // SAFETY: the caller promises that `model` is null or not freed and that `engine` can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(engine, "engine")?) };
-        let settings = match settings.is_null() {
-            true => Settings::DEFAULT,
-            // SAFETY: the caller promises that `settings`, which is not null here, is at settings.
-            false => unsafe { copied(settings, "settings")? },
-        };
+        // SAFETY: the caller promises that `settings` is null or at settings.
+        let settings = unsafe { optional(settings, "settings")? }.unwrap_or(Settings::DEFAULT);
         let engine = engine::Engine::new(&model.model.at(kt)?, settings.checked()?)?;
         let plan_text = c_text(&engine.plan().to_string());
         let path_text = CString::default();
@@ -218,7 +186,7 @@ pub unsafe extern "C" fn psidpd_engine_describe(engine: *const Engine, facts: *m
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(facts, "facts")?) };
         let plan = engine.engine.plan();
         out.put(EngineFacts {
-            cutoff: plan.cutoff(),
+            cutoff: plan.cutoff,
             noise_range: plan.noise_range().unwrap_or(0.0),
             slope_width: plan.slope_width(),
             needs_velocities: plan.needs_velocities().into(),
@@ -291,21 +259,6 @@ pub unsafe extern "C" fn psidpd_engine_map_kinds(
     })
 }
 
-/// A pair with reduced strength, for instance two bonded particles.
-///
-/// `factor` scales the conservative interaction: the density and the pair energy have it. Drag and noise act at full
-/// strength; only pairs with a factor of 0 do not interact at all.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct SpecialPair {
-    /// Array index, from 0, of the first particle, an owned one.
-    pub i: u32,
-    /// Array index of the second particle. If it is a ghost, the rank of its owner has the same pair too.
-    pub j: u32,
-    /// Factor of the conservative interaction.
-    pub factor: f64,
-}
-
 /// Sets the pairs with reduced strength, from the next evaluation on: `length` of them, which are copied; 0 for none.
 /// Two particles must meet in one image only within the cut-off. They do not apply to pairs that the host lists.
 ///
@@ -323,8 +276,7 @@ pub unsafe extern "C" fn psidpd_engine_set_special_pairs(
     guard(|| {
         // SAFETY: the caller promises that `engine` is null or not freed and that `pairs` has `length` entries.
         let (engine, pairs) = unsafe { (exclusive(engine, "engine")?, array(pairs, length, "pairs")?) };
-        let pairs = pairs.iter().map(|&SpecialPair { i, j, factor }| engine::SpecialPair { i, j, factor });
-        engine.engine.set_special_pairs(pairs);
+        engine.engine.set_special_pairs(pairs.iter().copied());
         Ok(())
     })
 }
@@ -357,17 +309,6 @@ pub unsafe extern "C" fn psidpd_engine_slopes(
         out.put(slopes.as_mut_ptr());
         Ok(())
     })
-}
-
-impl Tally {
-    pub(super) fn of(sums: &engine::Tally) -> Tally {
-        Tally {
-            excess: sums.excess,
-            pair: sums.pair,
-            virial: sums.virial,
-            thermostat_virial: sums.thermostat_virial,
-        }
-    }
 }
 
 /// Arrays of the last evaluation, of which an engine keeps those that were asked for; valid until the next evaluation

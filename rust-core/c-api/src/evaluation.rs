@@ -1,9 +1,9 @@
 //! Evaluations whose request states at once what to compute.
 
-use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive, flag};
-use crate::engine::{Engine, Particles, State, Step, Tally, not_before, particles_of, step_of, want_of};
+use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive, flag, optional};
+use crate::engine::{Engine, Particles, State, Step, Tally, checked_step, not_before, particles_of, want_of};
 use crate::status::{Failure, Status, guard};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use psidpd_core::engine::{self, Around, Newton, PairsOfHost, PeriodicBox, Surroundings};
 
 /// A box: a corner, the three edges from there, and which of them are periods.
@@ -51,12 +51,11 @@ pub struct Pairs {
 
 impl Domain {
     pub(super) fn domain(&self) -> Result<PeriodicBox, Failure> {
-        let [a, b, c] = [0, 3, 6].map(|k| Vector3::from_column_slice(&self.edges[k..k + 3]));
         let mut periodic = [false; 3];
         for (is, given) in periodic.iter_mut().zip(self.periodic) {
             *is = flag(given, "box.periodic")?;
         }
-        let edges = Matrix3::from_columns(&[a, b, c]);
+        let edges = Matrix3::from_column_slice(&self.edges);
         PeriodicBox::new(self.origin, edges, periodic).map_err(|error| Failure::argument(error.to_string()))
     }
 }
@@ -67,9 +66,11 @@ impl Request {
     /// # Safety
     /// The pointers are null or at arrays as long as they must be, which nobody writes to during `'a`.
     unsafe fn checked<'a>(&self, engine: &Engine) -> Result<engine::Request<'a>, Failure> {
-        let step = self.step()?;
-        // SAFETY: the caller promises that the pointers in `self.particles` are null or arrays of these lengths.
-        let particles = unsafe { particles_of(&self.particles)? };
+        // SAFETY: the caller promises that `self.step` is null or at a step, and that the pointers in `self.particles` are null
+        // or at arrays of these lengths.
+        let (step, particles) =
+            unsafe { (optional(self.step, "request.step")?, particles_of(&self.particles)?) };
+        let step = step.map(checked_step).transpose()?;
         let thermal = step.is_some() && engine.engine.plan().needs_velocities();
         let v = if self.v.is_null() && !thermal {
             &[]
@@ -78,14 +79,6 @@ impl Request {
             unsafe { array(self.v.cast::<[f64; 3]>(), self.particles.all, "request.v")? }
         };
         Ok(engine::Request { particles, v, step, want: want_of(self.want)? })
-    }
-
-    fn step(&self) -> Result<Option<engine::Step>, Failure> {
-        if self.step.is_null() {
-            return Ok(None);
-        }
-        // SAFETY: the callers of `step` and of `checked` promise that a pointer that is not null is at a step.
-        Ok(Some(step_of(unsafe { copied(self.step, "request.step")? })?))
     }
 }
 
@@ -153,12 +146,9 @@ pub unsafe extern "C" fn psidpd_engine_first(
     guard(|| {
         // SAFETY: the caller promises that `engine` is null or not freed and that `request` is null or a request.
         let (engine, given) = unsafe { (exclusive(engine, "engine")?, copied(request, "request")?) };
-        let domain = if r#box.is_null() {
-            PeriodicBox::OPEN
-        } else {
-            // SAFETY: the caller promises that `box`, which is not null here, is a box.
-            unsafe { copied(r#box, "box")? }.domain()?
-        };
+        // SAFETY: the caller promises that `box` is null or a box.
+        let domain =
+            unsafe { optional(r#box, "box")? }.map_or(Ok(PeriodicBox::OPEN), |domain| domain.domain())?;
         // SAFETY: the caller promises that the arrays of the request are as long as it says.
         let request = unsafe { given.checked(engine)? };
         let ghosts = if image.is_null() { 0 } else { given.particles.all - given.particles.owned };
@@ -258,8 +248,10 @@ unsafe fn complete(
         &mut [[f64; 3]],
     ) -> Result<engine::Tally, engine::EngineError>,
 ) -> Result<(), Failure> {
-    // SAFETY: the caller promises that the pointers are null or valid.
-    let (given, out) = unsafe { (copied(request, "request")?, optional(tally)?) };
+    // SAFETY: the caller promises that `request` is null or at a request.
+    let given = unsafe { copied(request, "request")? };
+    // SAFETY: the caller promises that `tally` can be written to if it is not null.
+    let out = (!tally.is_null()).then(|| unsafe { Output::new(tally, "tally") }).transpose()?;
     let all = given.particles.all;
     check_apart(force, given.particles.x, all, "force and particles.x")?;
     check_apart(force, given.v, all, "force and v")?;
@@ -271,7 +263,7 @@ unsafe fn complete(
     let sums = work(&mut engine.engine, state, &request, force)?;
     engine.state = State::Whole;
     if let Some(out) = out {
-        out.put(Tally::of(&sums));
+        out.put(sums);
     }
     Ok(())
 }
@@ -286,14 +278,4 @@ fn first(engine: &mut Engine, surroundings: Surroundings, request: &engine::Requ
 
 fn newton_of(newton: i32) -> Result<Newton, Failure> {
     Ok(if flag(newton, "newton")? { Newton::On } else { Newton::Off })
-}
-
-/// # Safety
-/// `tally` is null or can be written to.
-unsafe fn optional(tally: *mut Tally) -> Result<Option<Output<Tally>>, Failure> {
-    if tally.is_null() {
-        return Ok(None);
-    }
-    // SAFETY: the caller promises that `tally`, which is not null here, can be written to.
-    Ok(Some(unsafe { Output::new(tally, "tally")? }))
 }

@@ -10,6 +10,10 @@ use std::ptr::{null, null_mut};
 const SOURCES: [&str; 7] =
     ["version.rs", "status.rs", "model.rs", "settings.rs", "engine.rs", "evaluation.rs", "thermostat.rs"];
 
+/// Structures of the engine that the header has too.
+const STRUCTURES: [&str; 3] =
+    ["../src/engine/step.rs", "../src/engine/surroundings.rs", "../passes/src/tally.rs"];
+
 fn last_error() -> String {
     // SAFETY: the text is valid until the next failing call on this thread.
     unsafe { CStr::from_ptr(psidpd_last_error()) }.to_str().unwrap().to_owned()
@@ -19,10 +23,17 @@ fn header() -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).unwrap();
     let builder = cbindgen::Builder::new().with_config(config);
-    let builder = SOURCES.iter().fold(builder, |builder, file| builder.with_src(root.join("src").join(file)));
+    let sources = SOURCES.map(|file| root.join("src").join(file)).into_iter();
+    let builder =
+        sources.chain(STRUCTURES.map(|file| root.join(file))).fold(builder, cbindgen::Builder::with_src);
     let mut text = Vec::new();
     builder.generate().unwrap().write(&mut text);
-    String::from_utf8(text).unwrap()
+    let mut text = String::from_utf8(text).unwrap();
+    // Constants of structures that are left out leave empty lines.
+    while text.contains("\n\n\n") {
+        text = text.replace("\n\n\n", "\n\n");
+    }
+    text
 }
 
 /// The environment variable `PSIDPD_UPDATE_HEADER=1` writes the header.

@@ -1,7 +1,7 @@
 //! Drag and noise apart from the forces, as an operator on velocities.
 
 use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive, flag, free, shared};
-use crate::engine::{Engine, Step, step_of};
+use crate::engine::{Engine, Step, checked_step};
 use crate::evaluation::Domain;
 use crate::status::{Failure, Status, guard};
 use psidpd_core::engine;
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn psidpd_thermostat_new(
         let (plan, settings) = (engine.engine.plan(), engine.engine.settings());
         let thermostat = PairThermostat::new(plan, engine.kt, &settings)
             .ok_or_else(|| Failure::new(Status::Model, "the model has no thermostat with drag"))?;
-        let (pool, species) = (Arc::clone(engine.engine.pool()), plan.species().len());
+        let (pool, species) = (Arc::clone(engine.engine.pool()), plan.species.len());
         out.put(Box::into_raw(Box::new(Thermostat { thermostat, pool, species })));
         Ok(())
     })
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn psidpd_thermostat_act(
     guard(|| {
         // SAFETY: the caller promises null or valid pointers.
         let (this, domain, bodies, step) = unsafe {
-            let step = step_of(copied(step, "step")?)?;
+            let step = checked_step(copied(step, "step")?)?;
             let (domain, bodies) = (copied(r#box, "box")?.domain()?, copied(bodies, "bodies")?);
             (exclusive(thermostat, "thermostat")?, domain, bodies, step)
         };

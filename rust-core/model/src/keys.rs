@@ -22,14 +22,10 @@ fn continuations() -> Vec<&'static str> {
 /// Every table, in the order of the documentation.
 pub const TABLES: &[Table] = &[TOP, UNITS, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT, LITERATURE];
 
-/// Keys at the top level of the file.
-pub const TOP: Table = Table {
-    path: "",
-    title: "",
-    array: false,
-    forms: ("", &[]),
-    about: "The name of the model and its particles.",
-    keys: keys! {
+const TOP: Table = Table::new(
+    "",
+    "The name of the model and its particles.",
+    keys! {
         "title": ValueKind::Text, REQUIRED,
             "The name of the model."
             => "title = \"Warren 2003, set 6\"";
@@ -43,17 +39,13 @@ pub const TOP: Table = Table {
             "The species, 1 to 64. Their order is the order of every list of species in results."
             => "species = [\"A\", \"B\"]";
     },
-};
+);
 
-/// Keys of `[units]`.
-pub const UNITS: Table = Table {
-    path: "units",
-    title: "",
-    array: false,
-    forms: ("", &[]),
-    about: "What the numbers of the model stand for, in SI. LAMMPS's `dpd/psi` needs this table in units other \
-            than `lj`; nothing else uses it. The unit of time is `length sqrt(mass/energy)`.",
-    keys: keys! {
+const UNITS: Table = Table::new(
+    "units",
+    "What the numbers of the model stand for, in SI. LAMMPS's `dpd/psi` needs this table in units other \
+     than `lj`; nothing else uses it. The unit of time is `length sqrt(mass/energy)`.",
+    keys! {
         "length": ValueKind::Positive, REQUIRED,
             "The unit of length in metres."
             => "[units]\nlength = 7.11e-10\nmass = 1.5e-25\nenergy = 4.14e-21";
@@ -64,34 +56,26 @@ pub const UNITS: Table = Table {
             "The unit of energy in joules: `k_B` times 300 K, if one temperature of the model is 300 K."
             => "[units]\nlength = 1e-9\nmass = 3e-25\nenergy = 4.14e-21";
     },
-};
+);
 
-/// Keys of `[parameters]`.
-pub const PARAMETERS: Table = Table {
-    path: "parameters",
-    title: "",
-    array: false,
-    forms: ("", &[]),
-    about: "Constants, for every formula and every number of the file. They may refer to each other in any \
-            order. `kT` is not a parameter and cannot appear in formulas of parameters: the host gives the \
-            temperature, and all other formulas know it as `kT`.",
-    keys: keys! {
+const PARAMETERS: Table = Table::new(
+    "parameters",
+    "Constants, for every formula and every number of the file. They may refer to each other in any \
+     order. `kT` is not a parameter and cannot appear in formulas of parameters: the host gives the \
+     temperature, and all other formulas know it as `kT`.",
+    keys! {
         "NAME": ValueKind::Parameter, OPTIONAL,
             "A constant."
             => "[parameters]\nb = 0.0156\na = \"1.9*b\"";
     },
-};
+);
 
-/// Keys of `[density.NAME]`.
-pub const DENSITY: Table = Table {
-    path: "density.NAME",
-    title: "",
-    array: false,
-    forms: ("", &[]),
-    about: "A weighted local density `n_B(i) = sum over j of species B of w(r_ij)`, with `[w] = 1`. A density \
-            `n` of species A, B gives formulas the variables `n_A`, `n_B` and `n = n_A + n_B`. A model may have \
-            any number of densities.",
-    keys: keys! {
+const DENSITY: Table = Table::new(
+    "density.NAME",
+    "A weighted local density `n_B(i) = sum over j of species B of w(r_ij)`, with `[w] = 1`. A density \
+     `n` of species A, B gives formulas the variables `n_A`, `n_B` and `n = n_A + n_B`. A model may have \
+     any number of densities.",
+    keys! {
         "kernel": ValueKind::Choice(kernels), REQUIRED,
             "The weight function `w`."
             => "[density.n]\nkernel = \"wendland-c2\"\nrange = 1.0";
@@ -127,36 +111,28 @@ pub const DENSITY: Table = Table {
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.5, 20.0]\nbelow = \
              \"constant\"\n[excess_free_energy]\nA = \"kT*ln(n)\"";
     },
-};
+);
 
-/// Keys of `[excess_free_energy]`.
-pub const EXCESS: Table = Table {
-    path: "excess_free_energy",
-    title: "",
-    array: false,
-    forms: ("", &[]),
-    about: "`psi`, the excess free energy per particle, of every species, in units of energy; forces are \
-            `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, \
-            `pi`, `+ - * / ^` (or `**`), `ln` (or `log`: the natural logarithm), `log10`, `exp`, `sqrt`, `sin`, \
-            `cos`, `tanh`, `abs`, `min`, `max`. Without this table no species has a psi; if only some species \
-            have one, write `\"0\"` for the others.",
-    keys: keys! {
+const EXCESS: Table = Table::new(
+    "excess_free_energy",
+    "`psi`, the excess free energy per particle, of every species, in units of energy; forces are \
+     `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, \
+     `pi`, `+ - * / ^` (or `**`), `ln` (or `log`: the natural logarithm), `log10`, `exp`, `sqrt`, `sin`, \
+     `cos`, `tanh`, `abs`, `min`, `max`. Without this table no species has a psi; if only some species \
+     have one, write `\"0\"` for the others.",
+    keys! {
         "SPECIES": ValueKind::Excess, OPTIONAL,
             "psi of one species."
             => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = \
              1.0\n[excess_free_energy]\nA = \"n_B + 0.2*n_A\"\nB = \"n_A + 0.2*n_B\"";
     },
-};
+);
 
-/// Keys in the braces of an excess free energy.
-pub const CURVES: Table = Table {
-    path: "excess_free_energy.SPECIES",
-    title: "",
-    array: false,
-    forms: ("", &[]),
-    about: "Instead of a formula: psi as a function of the total of one density, from a table or from an \
-            equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
-    keys: keys! {
+const CURVES: Table = Table::new(
+    "excess_free_energy.SPECIES",
+    "Instead of a formula: psi as a function of the total of one density, from a table or from an \
+     equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
+    keys! {
         "table": ValueKind::TableFile, OPTIONAL,
             "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; a first row that is \
              not numeric is a header. psi is the cubic spline through the rows (not a knot), and psi' its exact \
@@ -185,18 +161,17 @@ pub const CURVES: Table = Table {
             "With `slopes`: the reported energy of a particle, 0 if left out. The force is not its gradient."
             => "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }";
     },
-};
+);
 
-/// Keys of `[[pair]]`.
-pub const PAIR: Table = Table {
-    path: "pair",
-    title: "",
-    array: true,
+const PAIR: Table = Table {
     forms: ("form", FORMS),
-    about: "A pair potential `phi(r)`, added to the many-body terms; a model may have any number of them. In a \
+    ..Table::array(
+        "pair",
+        "A pair potential `phi(r)`, added to the many-body terms; a model may have any number of them. In a \
             model with interactions every two species need an interaction, through psi or a pair potential; \
             write strength 0 if they do not interact.",
-    keys: &joined::<{ PAIR_KEYS.len() + count(FORM_KEYS) }>(PAIR_KEYS, FORM_KEYS),
+        &joined::<{ PAIR_KEYS.len() + count(FORM_KEYS) }>(PAIR_KEYS, FORM_KEYS),
+    )
 };
 
 const PAIR_KEYS: &[Key] = keys! {
@@ -209,16 +184,12 @@ const PAIR_KEYS: &[Key] = keys! {
          0.8\nrange_B = 1.0";
 };
 
-/// Keys of `[[thermostat]]`.
-pub const THERMOSTAT: Table = Table {
-    path: "thermostat",
-    title: "",
-    array: true,
-    forms: ("", &[]),
-    about: "Dissipative and random forces of a pair of species, `-gamma w_R^2 (e.v) e` and \
-            `sqrt(2 gamma kT) w_R xi dt^(-1/2) e` with `w_R = (1 - r/range)^exponent`. If any pair of species has one, \
-            all must.",
-    keys: keys! {
+const THERMOSTAT: Table = Table::array(
+    "thermostat",
+    "Dissipative and random forces of a pair of species, `-gamma w_R^2 (e.v) e` and \
+     `sqrt(2 gamma kT) w_R xi dt^(-1/2) e` with `w_R = (1 - r/range)^exponent`. If any pair of species has one, \
+     all must.",
+    keys! {
         "between": ValueKind::Between, OPTIONAL,
             "The two species. If left out, the thermostat acts on every pair without a thermostat of its own."
             => "species = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n[[thermostat]]\nbetween = \
@@ -233,17 +204,13 @@ pub const THERMOSTAT: Table = Table {
             "The exponent of `w_R`; 1 if left out."
             => "[[thermostat]]\ngamma = 4.5\nrange = 1.0\nexponent = 0.5";
     },
-};
+);
 
-/// Keys of `[[literature]]`.
-pub const LITERATURE: Table = Table {
-    path: "literature",
-    title: "",
-    array: true,
-    forms: ("", &[]),
-    about: "Published values of the fluid, by temperature, each with its error. They do not affect a run; \
-            `theory`, `run` and reports show them next to theory and measurements.",
-    keys: keys! {
+const LITERATURE: Table = Table::array(
+    "literature",
+    "Published values of the fluid, by temperature, each with its error. They do not affect a run; \
+     `theory`, `run` and reports show them next to theory and measurements.",
+    keys! {
         "kT": ValueKind::Positive, REQUIRED,
             "The temperature."
             => "[[literature]]\nkT = 1.0\ntension = [7.45, 0.04]";
@@ -266,6 +233,6 @@ pub const LITERATURE: Table = Table {
             "Width of the interface, `(rho_L - rho_V)/max|d rho/dz|`."
             => "[[literature]]\nkT = 1.0\nwidth = [0.66, 0.03]";
     },
-};
+);
 
 const ERROR: &str = "array of a number and its error, which is above 0";

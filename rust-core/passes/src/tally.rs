@@ -47,12 +47,14 @@ impl Want {
 
 /// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
 ///
-/// Virials are `Σ r_ij ⊗ F_ij` in the order xx, yy, zz, xy, xz, yz, so that `p = ρkT + tr W/(dV)`.
+/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz, so that `p = rho kT + tr W/(dV)`. Entries that were not asked
+/// for are unspecified.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
-    /// Sum of the excess free energies, `Σ_i ψ`.
+    /// Sum of psi over particles. The potential energy is `excess + pair`.
     pub excess: f64,
-    /// Sum of the pair energies, `Σ_{i<j} φ`.
+    /// Sum of phi over pairs.
     pub pair: f64,
     /// Virial of the conservative forces.
     pub virial: [f64; 6],

@@ -132,12 +132,11 @@ impl ExcessPlan {
         }
     }
 
-    /// Writes ψ and its slopes for every lane: ψ of lane `l` is `psi[l]`, slope `k` is `slopes[k *
+    /// Writes ψ and its slopes for each of the `lanes` of `psi`: ψ of lane `l` is `psi[l]`, slope `k` is `slopes[k *
     /// lanes + l]`, and variable `v` is `at[v * lanes + l]`. Returns the numbers of lanes with a
     /// variable below its bounds, and above.
     pub fn evaluate(
         &self,
-        lanes: usize,
         at: &[f64],
         psi: &mut [f64],
         slopes: &mut [f64],
@@ -150,8 +149,8 @@ impl ExcessPlan {
                 slopes.fill(0.0);
                 [0; 2]
             }
-            ExcessPlan::Formula(plan) => plan.evaluate(lanes, at, psi, slopes, work),
-            ExcessPlan::Curve(plan) => plan.evaluate(lanes, at, psi, slopes, work),
+            ExcessPlan::Formula(plan) => plan.evaluate(at, psi, slopes, work),
+            ExcessPlan::Curve(plan) => plan.evaluate(at, psi, slopes, work),
         }
     }
 }
@@ -179,14 +178,8 @@ impl ExcessWork {
 }
 
 impl CurvePlan {
-    fn evaluate(
-        &self,
-        lanes: usize,
-        at: &[f64],
-        psi: &mut [f64],
-        slopes: &mut [f64],
-        work: &mut ExcessWork,
-    ) -> [u64; 2] {
+    fn evaluate(&self, at: &[f64], psi: &mut [f64], slopes: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        let lanes = psi.len();
         let ExcessWork { totals, beyond, curve, .. } = work;
         totals.clear();
         totals.resize(lanes, 0.0);
@@ -231,14 +224,8 @@ impl FormulaPlan {
         self.stated.then(|| self.variables.iter().copied().zip(&self.outputs[1..]).filter(acting))
     }
 
-    fn evaluate(
-        &self,
-        lanes: usize,
-        at: &[f64],
-        psi: &mut [f64],
-        slopes: &mut [f64],
-        work: &mut ExcessWork,
-    ) -> [u64; 2] {
+    fn evaluate(&self, at: &[f64], psi: &mut [f64], slopes: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        let lanes = psi.len();
         let within = |b: &BoundedVariable| {
             let values = &at[b.variable * lanes..][..lanes];
             // The loop has no early return, so that it vectorises.
@@ -259,7 +246,7 @@ impl FormulaPlan {
             work.set,
             EvaluateBlock { program: &self.program, lanes, at: inside, outputs, registers },
         );
-        if moves { self.extend(lanes, at, psi, slopes, work) } else { [0; 2] }
+        if moves { self.extend(at, psi, slopes, work) } else { [0; 2] }
     }
 
     /// Replaces ψ and slopes in the moved lanes by the continuation from the bounds. Returns the numbers of lanes with a
@@ -268,14 +255,8 @@ impl FormulaPlan {
     /// With the operator `E_k ψ = ψ + δ_k ψ_k + ½ δ_k² ψ_kk` at the bound for each variable out of
     /// bounds, ψ becomes `E_1 E_2 … ψ`; these commute with each other and with the slopes along the
     /// other variables.
-    fn extend(
-        &self,
-        lanes: usize,
-        at: &[f64],
-        psi: &mut [f64],
-        slopes: &mut [f64],
-        work: &mut ExcessWork,
-    ) -> [u64; 2] {
+    fn extend(&self, at: &[f64], psi: &mut [f64], slopes: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        let lanes = psi.len();
         let ExcessWork { point, expansion, strays, moved, .. } = work;
         let mut count = [0; 2];
         for lane in 0..lanes {

@@ -191,7 +191,7 @@ impl ExcessPass {
             let psi = if psi_in_place { &mut rows.excess[first..][..n] } else { room(psi, n) };
             let slopes =
                 if slopes_in_place { &mut rows.slopes[first..][..n] } else { room(slopes, slope_width * n) };
-            let [low, high] = plan.excess[alpha].evaluate(n, at, psi, slopes, work);
+            let [low, high] = plan.excess[alpha].evaluate(at, psi, slopes, work);
             out_of_bounds[0] += low;
             out_of_bounds[1] += high;
             for (k, slope) in slopes.chunks_exact_mut(n).enumerate() {
@@ -259,7 +259,9 @@ fn sum(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Around, Images, Instructions, Particles, PeriodicBox, Settings, Sweep, Want};
+    use crate::engine::{
+        Around, Images, Instructions, Particles, PeriodicBox, Request, Settings, Sweep, Want,
+    };
     use crate::model::Model;
 
     /// Rows of `count` particles of a fluid, with different densities, and room for results.
@@ -434,7 +436,7 @@ mod tests {
                     let mut kind: Vec<i32> = (0..count).map(|k| k % 2).collect();
                     let (mut tag, mut images) = (tag.clone(), Images::default());
                     if ghosts {
-                        images.build(&domain, 3, plan.cutoff(), count as usize, &mut x);
+                        images.build(&domain, 3, plan.cutoff, count as usize, &mut x);
                         images.forward(1, &mut tag);
                         images.forward(1, &mut kind);
                     }
@@ -443,14 +445,25 @@ mod tests {
                     let open = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [false; 3]).unwrap();
                     let around = Around { domain: &open, images: &[] };
                     let tally = if ghosts {
-                        sweep.first(around, &particles, &[], None, Want::TOTALS, &mut force).unwrap();
-                        let mut slopes = sweep.slopes_mut()[..2 * count as usize].to_vec();
+                        sweep
+                            .first(
+                                around,
+                                &Request { particles, v: &[], step: None, want: Want::TOTALS },
+                                &mut force,
+                            )
+                            .unwrap();
+                        let mut slopes = sweep.slopes[..2 * count as usize].to_vec();
                         images.forward(2, &mut slopes);
-                        sweep.slopes_mut().copy_from_slice(&slopes);
+                        sweep.slopes.copy_from_slice(&slopes);
                         sweep.second(&particles, &mut force).unwrap()
                     } else {
                         sweep
-                            .evaluate(&domain, &particles, &[], None, Want::TOTALS, &mut force, false)
+                            .evaluate(
+                                &domain,
+                                &Request { particles, v: &[], step: None, want: Want::TOTALS },
+                                &mut force,
+                                false,
+                            )
                             .unwrap()
                     };
                     (force, tally.excess)

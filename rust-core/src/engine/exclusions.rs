@@ -11,10 +11,10 @@ pub struct Exclusions {
     start: Vec<u32>,
     partners: Vec<u32>,
     /// Marks of all particles; empty if no marks exclude pairs.
-    marks: Vec<Mark>,
-    between_molecules: bool,
+    pub marks: Vec<Mark>,
+    pub between_molecules: bool,
     /// Whether any mark has a side, and whether any has a molecule.
-    kinds: [bool; 2],
+    pub kinds: [bool; 2],
 }
 
 impl Exclusions {
@@ -24,20 +24,6 @@ impl Exclusions {
         self.marks.extend(marks);
         self.between_molecules = between_molecules;
         self.kinds = [self.marks.iter().any(|m| m.sides != 0), self.marks.iter().any(|m| m.molecule != 0)];
-    }
-
-    /// Whether some mark has a side, and whether some has a molecule.
-    pub fn kinds(&self) -> [bool; 2] {
-        self.kinds
-    }
-
-    /// The marks, and whether they exclude pairs between molecules.
-    pub fn marks(&self) -> &[Mark] {
-        &self.marks
-    }
-
-    pub fn between_molecules(&self) -> bool {
-        self.between_molecules
     }
 
     /// Whether marks exclude the pair of two particles.
@@ -71,9 +57,7 @@ impl Exclusions {
             self.start[pair.j as usize] += 1;
         }
         let mut sum = 0;
-        for start in &mut self.start {
-            sum += std::mem::replace(start, sum);
-        }
+        self.start.iter_mut().for_each(|start| sum += std::mem::replace(start, sum));
         self.partners.resize(sum as usize, 0);
         for pair in pairs {
             for (i, j) in [(pair.i, pair.j), (pair.j, pair.i)] {

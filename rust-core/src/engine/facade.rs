@@ -131,7 +131,7 @@ impl Engine {
 
     /// The plan of the fluid's passes.
     pub fn plan(&self) -> &Plan {
-        self.sweep.sweep.plan()
+        &self.sweep.sweep.plan
     }
 
     /// The sweep, which lists pairs for a thermostat.
@@ -141,12 +141,12 @@ impl Engine {
 
     /// The settings of the sweep, with the instruction set in use.
     pub fn settings(&self) -> Settings {
-        self.sweep.sweep.settings()
+        self.sweep.sweep.settings
     }
 
     /// The pool of threads.
     pub fn pool(&self) -> &Arc<Pool> {
-        self.sweep.sweep.pool()
+        &self.sweep.sweep.pool
     }
 
     /// Times and counts of the engine's work since it was made.
@@ -155,8 +155,8 @@ impl Engine {
         let (a, b) = (sums.out_of_bounds(), sweep.out_of_bounds());
         let c = self.device.as_ref().map_or([0; 2], |device| device.out_of_bounds());
         Statistics {
-            times: sweep.times(),
-            counts: sums.counts() + sweep.counts(),
+            times: sweep.times,
+            counts: sums.counts + sweep.counts(),
             out_of_bounds: [a[0] + b[0] + c[0], a[1] + b[1] + c[1]],
         }
     }
@@ -200,7 +200,7 @@ impl Engine {
     /// factor of 0: one mark for each particle and ghost, or none; see [`Mark::excludes`]. Marks do not
     /// apply to pairs that the host lists.
     pub fn set_exclusions(&mut self, marks: impl IntoIterator<Item = Mark>, between_molecules: bool) {
-        self.sweep.sweep.exclusions_mut().mark(marks, between_molecules);
+        self.sweep.sweep.exclusions.mark(marks, between_molecules);
     }
 
     /// Restricts all evaluations to sums over pairs, for tests and for measurements of the sweep's speed-up.
@@ -336,7 +336,7 @@ impl Engine {
 
     /// Gives the sums over pairs the special and excluded pairs.
     fn tell_pair_sums(&mut self) {
-        self.pair_sums.set_special_pairs(self.sweep.special(), self.sweep.sweep.exclusions());
+        self.pair_sums.set_special_pairs(&self.sweep.special, &self.sweep.sweep.exclusions);
     }
 
     /// Values of single particles in the last evaluation.
@@ -372,7 +372,7 @@ impl Engine {
                 self.sweep.densities_mut().extend_from_slice(all);
             }
             None => {
-                let variables = self.plan().densities().count() * self.plan().species().len();
+                let variables = self.plan().densities().count() * self.plan().species.len();
                 self.sweep.densities_mut().resize(particles.owned * variables, 0.0);
             }
         }

@@ -79,9 +79,7 @@ impl Images {
         let (own, ghosts) = forces.split_at_mut(self.owned);
         for (ghost, owner) in ghosts.iter().zip(&self.owner) {
             let force = &mut own[*owner as usize];
-            for k in 0..3 {
-                force[k] += ghost[k];
-            }
+            (0..3).for_each(|k| force[k] += ghost[k]);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The particles and the time step that a host passes.
+//! The particles that a host passes.
 
 use super::error::EngineError;
 
@@ -43,15 +43,4 @@ impl Particles<'_> {
         }
         Err(EngineError::Host("`images` must have one entry per ghost"))
     }
-}
-
-/// Seed, number and length of the time step, on which the thermostat depends.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
-    /// Seed of the pair noise.
-    pub seed: u64,
-    /// Number of the step.
-    pub number: u64,
-    /// Time step Δt.
-    pub dt: f64,
 }

@@ -3,7 +3,7 @@
 use super::error::EngineError;
 use super::excess::ExcessPlan;
 use super::fault::Fault;
-use super::particles::Step;
+use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
@@ -15,22 +15,27 @@ use std::fmt;
 ///
 /// A density in which every ψ is linear is no many-body term: its force is a pair force `−(c_αβ + c_βα)
 /// w′(r)`, `c_αβ = ∂ψ_α/∂n_β`, and needs no density pass.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Plan {
-    pub(super) species: Vec<String>,
-    pub(super) dimensions: usize,
-    pub(super) cutoff: f64,
+    /// The names of the species.
+    pub species: Vec<String>,
+    /// Number of dimensions, 2 or 3.
+    pub dimensions: usize,
+    /// Longest range of all forces; particles further apart do not interact.
+    pub cutoff: f64,
     pub(super) densities: Vec<WeightedDensity>,
     /// Indices of the densities in which some ψ is not linear; their order is that of the variables of `excess`.
-    pub(super) passes: Vec<usize>,
-    pub(super) linear: Vec<LinearTerm>,
+    pub passes: Vec<usize>,
+    /// The densities that act as pair potentials.
+    pub linear: Vec<LinearTerm>,
     pub(super) excess: Vec<ExcessPlan>,
     pub(super) pairs: Vec<PairTerm>,
     pub(super) thermostat: Option<ThermostatPlan>,
     /// Deliberate fault of the sweep, for tests.
     pub(super) fault: Option<Fault>,
     title: String,
-    conservative: bool,
+    /// Whether the forces have a potential.
+    pub conservative: bool,
 }
 
 /// A density that acts as a pair potential.
@@ -128,21 +133,6 @@ impl Plan {
         })
     }
 
-    /// Longest range of all forces; particles further apart do not interact.
-    pub fn cutoff(&self) -> f64 {
-        self.cutoff
-    }
-
-    /// Number of dimensions, 2 or 3.
-    pub fn dimensions(&self) -> usize {
-        self.dimensions
-    }
-
-    /// The names of the species.
-    pub fn species(&self) -> &[String] {
-        &self.species
-    }
-
     /// The names of the local densities.
     pub fn densities(&self) -> impl Iterator<Item = &str> {
         self.densities.iter().map(|d| d.name.as_str())
@@ -151,16 +141,6 @@ impl Plan {
     /// Number of slopes that a host copies from each owned particle to its ghosts.
     pub fn slope_width(&self) -> usize {
         self.passes.len() * self.species.len()
-    }
-
-    /// Indices of the densities with a pass: some ψ is not linear in them.
-    pub fn density_passes(&self) -> &[usize] {
-        &self.passes
-    }
-
-    /// The densities that act as pair potentials.
-    pub fn linear_terms(&self) -> &[LinearTerm] {
-        &self.linear
     }
 
     /// The formula `psi` of species `alpha` as a function of the densities with a pass alone.
@@ -196,6 +176,14 @@ impl Plan {
         self.thermostat.is_some()
     }
 
+    /// Fails for types that are mapped to a species out of range.
+    pub(super) fn check_kinds(&self, kinds: &[i32]) -> Result<(), EngineError> {
+        match kinds.iter().any(|s| *s >= self.species.len() as i32) {
+            true => Err(EngineError::Host("a type is mapped to a species the model does not have")),
+            false => Ok(()),
+        }
+    }
+
     /// The noise of a step and its `Δt^{−1/2}`, if drag and noise act in it.
     ///
     /// # Errors
@@ -216,11 +204,6 @@ impl Plan {
     /// Number of species with a ψ that depends on a density.
     pub(super) fn evaluated_species(&self) -> u64 {
         self.excess.iter().filter(|e| !matches!(e, ExcessPlan::Constant(_))).count() as u64
-    }
-
-    /// Whether the forces have a potential.
-    pub fn is_conservative(&self) -> bool {
-        self.conservative
     }
 }
 

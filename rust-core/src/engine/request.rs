@@ -1,6 +1,7 @@
 //! The input of an evaluation, and its results.
 
-use super::particles::{Particles, Step};
+use super::particles::Particles;
+use super::step::Step;
 use psidpd_passes::tally::Want;
 
 /// The input of an evaluation, and the results that it should compute.

@@ -44,13 +44,14 @@ pub enum Newton {
 
 /// A pair with reduced strength, for instance two bonded particles.
 ///
-/// `factor` scales the conservative interaction: `U = Σ ψ(n_i) + Σ s φ` with `n_i = Σ s w`. Drag and noise act at full
-/// strength, so that the thermostat keeps its temperature; only pairs with a factor of 0 do not interact at all.
+/// `factor` scales the conservative interaction: the density and the pair energy have it. Drag and noise act at full
+/// strength; only pairs with a factor of 0 do not interact at all.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpecialPair {
-    /// The host's number of the first particle, an owned one.
+    /// Array index, from 0, of the first particle, an owned one.
     pub i: u32,
-    /// The host's number of the second particle. If it is a ghost, the rank of its owner has the same pair too.
+    /// Array index of the second particle. If it is a ghost, the rank of its owner has the same pair too.
     pub j: u32,
     /// Factor of the conservative interaction.
     pub factor: f64,

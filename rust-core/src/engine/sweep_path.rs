@@ -14,7 +14,7 @@ use psidpd_passes::tally::{Tally, Want};
 #[derive(Debug, Clone)]
 pub struct SweepPath {
     pub sweep: Sweep,
-    special: Vec<SpecialPair>,
+    pub special: Vec<SpecialPair>,
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
     corrections: Corrections,
@@ -35,10 +35,6 @@ impl SweepPath {
         }
     }
 
-    pub fn special(&self) -> &[SpecialPair] {
-        &self.special
-    }
-
     /// Sets the pairs with reduced strength; those with a factor of 1 are ordinary pairs.
     pub fn set_special(&mut self, pairs: impl IntoIterator<Item = SpecialPair>) {
         self.special.clear();
@@ -48,7 +44,7 @@ impl SweepPath {
 
     /// Whether special or excluded pairs are set.
     pub fn leaves_out(&self) -> bool {
-        !(self.special.is_empty() && self.sweep.exclusions().marks().is_empty())
+        !(self.special.is_empty() && self.sweep.exclusions.marks.is_empty())
     }
 
     /// Discards ψ and densities of the last evaluation.
@@ -59,8 +55,8 @@ impl SweepPath {
 
     /// Whether forces need every density of the model.
     pub fn has_all_densities(&self) -> bool {
-        let plan = self.sweep.plan();
-        plan.density_passes().len() == plan.densities().count()
+        let plan = &self.sweep.plan;
+        plan.passes.len() == plan.densities().count()
     }
 
     /// Gets all densities of the last evaluation if it computed them; returns whether it did.
@@ -97,7 +93,7 @@ impl SweepPath {
 
     /// Adds the forces of special pairs to those of a sweep, whose slopes are complete.
     fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
-        self.corrections.add_forces(self.sweep.plan(), self.sweep.slopes(), request, force)
+        self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)
     }
 
     /// Stores the densities if the request includes them.
@@ -123,15 +119,14 @@ impl Evaluate for SweepPath {
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
-        let Request { particles, v, step, want } = request;
         self.begin(Around { domain, images: &[] }, request)?;
-        let mut tally = self.sweep.evaluate(domain, particles, v, *step, *want, force, add)?;
+        let mut tally = self.sweep.evaluate(domain, request, force, add)?;
         if !self.corrections.is_empty() {
-            self.sweep.fetch_slopes(particles.owned);
+            self.sweep.fetch_slopes(request.particles.owned);
             tally += self.correct(request, force)?;
         }
-        self.fetch(*want);
-        let factor = Fault::factor(Fault::Virial, self.sweep.plan().fault);
+        self.fetch(request.want);
+        let factor = Fault::factor(Fault::Virial, self.sweep.plan.fault);
         tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= factor);
         Ok(tally)
     }
@@ -147,9 +142,8 @@ impl Evaluate for SweepPath {
             Surroundings::Box(domain) => Around { domain, images: &[] },
             Surroundings::Listed(..) => return Err(EngineError::Host("a sweep finds its pairs itself")),
         };
-        let Request { particles, v, step, want } = request;
         self.begin(around, request)?;
-        self.sweep.first(around, particles, v, *step, *want, force)
+        self.sweep.first(around, request, force)
     }
 
     fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
@@ -162,11 +156,11 @@ impl Evaluate for SweepPath {
     }
 
     fn slopes(&self) -> &[f64] {
-        self.sweep.slopes()
+        &self.sweep.slopes
     }
 
     fn slopes_mut(&mut self) -> &mut Vec<f64> {
-        self.sweep.slopes_mut()
+        &mut self.sweep.slopes
     }
 
     fn fetch_slopes(&mut self, all: usize) {

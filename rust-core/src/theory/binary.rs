@@ -60,12 +60,8 @@ impl<'a> CompositionLine<'a> {
             let near = line.solve_density(grid[i], line.followed[from], pressure);
             near.unwrap_or_else(|| densest(grid[i]))
         };
-        for i in middle + 1..=STEPS {
-            line.followed[i] = towards(i - 1, i, &line);
-        }
-        for i in (0..middle).rev() {
-            line.followed[i] = towards(i + 1, i, &line);
-        }
+        (middle + 1..=STEPS).for_each(|i| line.followed[i] = towards(i - 1, i, &line));
+        (0..middle).rev().for_each(|i| line.followed[i] = towards(i + 1, i, &line));
         line
     }
 

@@ -1,5 +1,6 @@
 use super::binary::CompositionLine;
 use super::line::Line;
+use super::mean_field::add_symmetric;
 use super::one_component::DensityLine;
 use super::radial::{gauss_legendre, integral};
 use super::search::spaced;
@@ -57,17 +58,11 @@ impl MeanField {
                 if densities[alpha] == 0.0 {
                     continue;
                 }
-                for v in 0..n {
-                    add(s, v % count, m[d] * densities[alpha] * psi.hessian[u * n + v]);
-                }
+                (0..n).for_each(|v| add(s, v % count, m[d] * densities[alpha] * psi.hessian[u * n + v]));
             }
         }
-        for ([a, b], phi) in &self.pairs {
-            let pair = phi.moment(2) / twice_d;
-            kappa[a * count + b] -= pair;
-            if a != b {
-                kappa[b * count + a] -= pair;
-            }
+        for (between, phi) in &self.pairs {
+            add_symmetric(&mut kappa, count, *between, -(phi.moment(2) / twice_d));
         }
         kappa
     }

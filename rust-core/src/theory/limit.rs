@@ -1,3 +1,4 @@
+use super::mean_field::add_symmetric;
 use super::search::spaced;
 use super::{MeanField, TheoryError};
 use crate::model::Fluid;
@@ -104,8 +105,8 @@ impl Search<'_> {
         // A φ that is infinite at r = 0 keeps particles apart: no site takes two.
         let soft = self.fluid.pairs.iter().all(|p| p.potential.at(0.0).0.is_finite());
         let uniform = Sums {
-            pairs: theory.pair_integrals().to_vec(),
-            size: theory.pair_integrals().iter().map(|x| x.abs()).sum::<f64>().max(self.absolute_integral()),
+            pairs: theory.pair_integrals.to_vec(),
+            size: theory.pair_integrals.iter().map(|x| x.abs()).sum::<f64>().max(self.absolute_integral()),
             densities: vec![1.0; self.fluid.densities.len()],
         };
         let unit = theory.ranges[0].powi(-(theory.dimensions as i32));
@@ -152,12 +153,8 @@ impl Search<'_> {
         };
         for r in distances(structure, self.theory.dimensions, self.theory.ranges[0]) {
             for pair in self.fluid.pairs.iter().filter(|p| r < p.potential.range()) {
-                let [a, b] = pair.between;
                 let phi = pair.potential.at(r).0;
-                sums.pairs[a * count + b] += phi;
-                if a != b {
-                    sums.pairs[b * count + a] += phi;
-                }
+                add_symmetric(&mut sums.pairs, count, pair.between, phi);
                 sums.size += phi.abs();
             }
             for (sum, density) in sums.densities.iter_mut().zip(&self.fluid.densities) {
@@ -173,9 +170,7 @@ impl Search<'_> {
         compositions(&sums.pairs, count).into_iter().find_map(|x| {
             let mut pair = 0.0;
             for a in 0..count {
-                for b in 0..count {
-                    pair += 0.5 * x[a] * x[b] * sums.pairs[a * count + b];
-                }
+                (0..count).for_each(|b| pair += 0.5 * x[a] * x[b] * sums.pairs[a * count + b]);
             }
             if pair.abs() < 1e-12 * sums.size {
                 pair = 0.0;
@@ -250,15 +245,11 @@ fn compositions(pairs: &[f64], count: usize) -> Vec<Vec<f64>> {
             }
         }
         let matrix = DMatrix::from_fn(size, size, |i, j| pairs[face[i] * count + face[j]]);
-        let Some(y) = matrix.lu().solve(&DVector::from_element(size, 1.0)) else {
-            continue;
-        };
+        let Some(y) = matrix.lu().solve(&DVector::from_element(size, 1.0)) else { continue };
         let total = y.sum();
         if total.is_finite() && total != 0.0 && y.iter().all(|y| y / total > 0.0) {
             let mut x = vec![0.0; count];
-            for (s, y) in face.iter().zip(y.iter()) {
-                x[*s] = y / total;
-            }
+            face.iter().zip(y.iter()).for_each(|(s, y)| x[*s] = y / total);
             all.push(x);
         }
     }

@@ -2,7 +2,7 @@ use super::TheoryError;
 use super::radial::Radial;
 use crate::free_energy::{FreeEnergy, Psi};
 use crate::model::pair::PairForm;
-use crate::model::{ExcessFreeEnergy, Fluid};
+use crate::model::{ExcessFreeEnergy, Fluid, Polynomial};
 
 /// The mean-field theory of a fluid at one temperature.
 ///
@@ -10,9 +10,12 @@ use crate::model::{ExcessFreeEnergy, Fluid};
 /// result is NaN or infinite.
 #[derive(Debug, Clone)]
 pub struct MeanField {
-    pub(super) dimensions: usize,
-    pub(super) kt: f64,
-    pub(super) species: Vec<String>,
+    /// Number of dimensions, 2 or 3.
+    pub dimensions: usize,
+    /// Temperature kT.
+    pub kt: f64,
+    /// The names of the species.
+    pub species: Vec<String>,
     pub(super) free_energy: FreeEnergy,
     /// Self term that is added to the bulk density in variable `v` of `ψ_α`.
     pub(super) shift: Vec<Vec<f64>>,
@@ -23,7 +26,7 @@ pub struct MeanField {
     /// Pair potentials `φ`, and the species that they act between.
     pub(super) pairs: Vec<([usize; 2], Radial)>,
     /// Integrals `[φ_αβ]`, row-major and symmetric.
-    pub(super) pair_integrals: Vec<f64>,
+    pub pair_integrals: Vec<f64>,
     /// The longest range of a density or a pair potential, and the shortest.
     pub(super) ranges: [f64; 2],
     /// Whether a density is calibrated so that its mean is the bulk density.
@@ -57,40 +60,22 @@ impl MeanField {
                 .ok_or_else(|| {
                     TheoryError::NotIntegrable(fluid.species[a].clone(), fluid.species[b].clone())
                 })?;
-            pair_integrals[a * count + b] += radial.moment(0);
-            if a != b {
-                pair_integrals[b * count + a] += radial.moment(0);
-            }
+            add_symmetric(&mut pair_integrals, count, [a, b], radial.moment(0));
             pairs.push((term.between, radial));
         }
-        let shift = (0..count)
-            .map(|alpha| {
-                let mut shift = vec![0.0; fluid.variables()];
-                for (i, density) in fluid.densities.iter().enumerate() {
-                    // A corrected density has the mean ⟨ρ̃⟩ = ρ, with or without self term.
-                    let identity =
-                        density.correction[alpha * count + alpha] == crate::model::Polynomial::identity();
-                    if density.includes_self && identity {
-                        shift[i * count + alpha] = density.kernel.value(0.0);
-                    }
-                }
-                shift
-            })
-            .collect();
-        let isolated = (0..count)
-            .map(|alpha| {
-                let of = |v: usize| {
-                    let density = &fluid.densities[v / count];
-                    let own = if density.includes_self && v % count == alpha {
-                        density.kernel.value(0.0)
-                    } else {
-                        0.0
-                    };
-                    density.correction[alpha * count + v % count].at(own).0
-                };
-                (0..fluid.variables()).map(of).collect()
-            })
-            .collect();
+        // For each species and variable, from the self term and the correction.
+        let of_variables = |of: fn(f64, &Polynomial) -> f64| -> Vec<Vec<f64>> {
+            let at = |alpha: usize, v: usize| {
+                let density = &fluid.densities[v / count];
+                let has_own = density.includes_self && v % count == alpha;
+                let own = if has_own { density.kernel.value(0.0) } else { 0.0 };
+                of(own, &density.correction[alpha * count + v % count])
+            };
+            (0..count).map(|alpha| (0..fluid.variables()).map(|v| at(alpha, v)).collect()).collect()
+        };
+        // A corrected density has the mean ⟨ρ̃⟩ = ρ, with or without self term.
+        let shift = of_variables(|own, correction| if correction.is_identity() { own } else { 0.0 });
+        let isolated = of_variables(|own, correction| correction.at(own).0);
         let mut ranges = [0.0f64, f64::INFINITY];
         let lengths = fluid.densities.iter().map(|d| d.kernel.range());
         for range in lengths.chain(fluid.pairs.iter().map(|p| p.potential.range())) {
@@ -110,31 +95,8 @@ impl MeanField {
             pairs,
             pair_integrals,
             ranges,
-            calibrated: fluid
-                .densities
-                .iter()
-                .any(|d| d.correction.iter().any(|c| *c != crate::model::Polynomial::identity())),
+            calibrated: fluid.densities.iter().any(|d| d.correction.iter().any(|c| !c.is_identity())),
         })
-    }
-
-    /// Temperature kT.
-    pub fn kt(&self) -> f64 {
-        self.kt
-    }
-
-    /// Number of dimensions, 2 or 3.
-    pub fn dimensions(&self) -> usize {
-        self.dimensions
-    }
-
-    /// The names of the species.
-    pub fn species(&self) -> &[String] {
-        &self.species
-    }
-
-    /// The integrals `[φ_αβ] = ∫ φ_αβ d^dr`, row-major and symmetric; 0 without a pair potential.
-    pub fn pair_integrals(&self) -> &[f64] {
-        &self.pair_integrals
     }
 
     /// `ψ_α` and its derivatives in the bulk; NaN outside its domain.
@@ -209,9 +171,7 @@ impl MeanField {
     /// Chemical potentials `μ_s = kT ln ρ_s + ∂f_ex/∂ρ_s`.
     pub fn chemical_potentials(&self, densities: &[f64]) -> Vec<f64> {
         let mut mu = self.excess_chemical_potentials(densities);
-        for (mu, rho) in mu.iter_mut().zip(densities) {
-            *mu += self.kt * rho.ln();
-        }
+        mu.iter_mut().zip(densities).for_each(|(mu, rho)| *mu += self.kt * rho.ln());
         mu
     }
 
@@ -244,9 +204,7 @@ impl MeanField {
     pub fn second_derivatives(&self, densities: &[f64]) -> Vec<f64> {
         let count = self.species.len();
         let mut f = self.excess_second_derivatives(densities);
-        for (s, rho) in densities.iter().enumerate() {
-            f[s * count + s] += self.kt / rho;
-        }
+        densities.iter().enumerate().for_each(|(s, rho)| f[s * count + s] += self.kt / rho);
         f
     }
 
@@ -275,6 +233,14 @@ impl MeanField {
 
 /// Most operations of all second derivatives of one ψ: more take seconds for each state.
 const MOST_OPERATIONS: usize = 20_000;
+
+/// Adds to the entries of two species in a symmetric matrix of `count` rows.
+pub(super) fn add_symmetric(matrix: &mut [f64], count: usize, [a, b]: [usize; 2], number: f64) {
+    matrix[a * count + b] += number;
+    if a != b {
+        matrix[b * count + a] += number;
+    }
+}
 
 fn free_energy_of(fluid: &Fluid) -> Result<FreeEnergy, TheoryError> {
     let name = |alpha: usize| fluid.species[alpha].clone();

@@ -100,9 +100,7 @@ impl Radial {
         let breaks = super::search::spaced(0.0, range, 16);
         let mut nodes = Vec::new();
         adaptive(&|r| f(r) * measure(r), &breaks, &mut nodes, 40, 1e-14)?;
-        for (r, weight) in &mut nodes {
-            *weight *= f(*r) * measure(*r);
-        }
+        nodes.iter_mut().for_each(|(r, weight)| *weight *= f(*r) * measure(*r));
         Some(Radial { dimensions, nodes })
     }
 

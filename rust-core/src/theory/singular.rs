@@ -53,9 +53,7 @@ impl MeanField {
         let (low, high) = ((1e-6 * unit).ln(), (1e6 * unit).ln());
         let all: Vec<f64> = spaced(low, high, 1200).into_iter().map(f64::exp).collect();
         let pole = first_along(self, composition, &all);
-        let Some(pole) = pole else {
-            return all;
-        };
+        let Some(pole) = pole else { return all };
         let mut grid: Vec<f64> = all.into_iter().filter(|rho| *rho < 0.5 * pole).collect();
         grid.extend((0..240).map(|i| pole * (1.0 - 0.5 * 2f64.powf(-(i as f64) / 8.0))));
         grid

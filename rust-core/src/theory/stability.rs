@@ -1,4 +1,5 @@
 use super::MeanField;
+use super::mean_field::add_symmetric;
 use super::search::{minimum, spaced};
 use nalgebra::DMatrix;
 
@@ -44,12 +45,8 @@ impl MeanField {
                 }
             }
         }
-        for ([a, b], phi) in &self.pairs {
-            let transform = phi.transform(k);
-            c[a * count + b] += transform;
-            if a != b {
-                c[b * count + a] += transform;
-            }
+        for (between, phi) in &self.pairs {
+            add_symmetric(&mut c, count, *between, phi.transform(k));
         }
         c
     }

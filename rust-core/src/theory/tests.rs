@@ -159,8 +159,8 @@ fn warrens_equation_of_state() {
         }
     }
     // Standard DPD has α = π/30, and π/24 in the plane.
-    close(theory(&warren(1.0, 0.0, 3), 1.0).pair_integrals()[0] / 2.0, PI / 30.0, 1e-13);
-    close(theory(&warren(1.0, 0.0, 2), 1.0).pair_integrals()[0] / 2.0, PI / 24.0, 1e-13);
+    close(theory(&warren(1.0, 0.0, 3), 1.0).pair_integrals[0] / 2.0, PI / 30.0, 1e-13);
+    close(theory(&warren(1.0, 0.0, 2), 1.0).pair_integrals[0] / 2.0, PI / 24.0, 1e-13);
     let phases = theory(&warren(-40.0, 25.0, 3), 1.0).binodal().unwrap();
     assert!(phases.liquid > 2.0 && phases.vapour < 0.1, "{phases:?}");
 }
@@ -581,7 +581,7 @@ fn an_integral_above_zero_is_not_enough() {
          phi = '4*max(0, 1 - 2*r)^2 - 6*max(0, 1 - 25*(r - 0.75)^2) + 5*max(0, 1 - 25*(r - 1.0)^2)'\nrange = 1.2\n",
     );
     let fluid = shell.at(1.0).unwrap();
-    assert!(MeanField::new(&fluid).unwrap().pair_integrals()[0] > 0.0);
+    assert!(MeanField::new(&fluid).unwrap().pair_integrals[0] > 0.0);
     let collapse = thermodynamic_limit(&fluid).unwrap().unwrap_err();
     assert_ne!(collapse.structure, Structure::Uniform);
 }

@@ -3,13 +3,13 @@
 mod pressure;
 pub mod pressure_table;
 mod primitive;
-mod read;
 mod spline;
 
 pub use pressure::Pressure;
-pub(crate) use read::read_spline;
 pub use spline::{Spline, SplineError};
 
+use crate::document::{Columns, FileError, Value};
+use std::path::Path;
 use std::sync::Arc;
 
 /// `ψ(n)` of the total of one density, `n = Σ_β ñ_β`.
@@ -43,18 +43,12 @@ pub struct CurveBlock {
     out: Vec<f64>,
 }
 
-impl CurveBlock {
-    fn resize(&mut self, lanes: usize) {
-        for list in [&mut self.psi, &mut self.slope, &mut self.curvature] {
-            list.resize(lanes, 0.0);
-        }
-    }
-}
-
 impl Curve {
     /// `ψ`, `ψ′` and `ψ″` at every `n`; where ψ is singular they are infinite or NaN.
     pub fn block(&self, n: &[f64], to: &mut CurveBlock) {
-        to.resize(n.len());
+        for list in [&mut to.psi, &mut to.slope, &mut to.curvature] {
+            list.resize(n.len(), 0.0);
+        }
         match &self.form {
             CurveForm::Table(spline) => {
                 for (lane, n) in n.iter().enumerate() {
@@ -82,4 +76,17 @@ impl Curve {
             CurveForm::Pressure(pressure) => format!("from the pressure {}", pressure.text()),
         }
     }
+}
+
+/// The spline through the rows of the file that `value` names.
+pub(crate) fn read_spline(value: &Value, directory: &Path, names: [&str; 2]) -> Result<Spline, FileError> {
+    let mut table = Columns::read(value, directory, names)?;
+    let [x, y] = std::mem::take(&mut table.columns);
+    Spline::new(x, y).map_err(|error| {
+        let row = match error {
+            SplineError::NotMonotone(row) => row,
+            _ => usize::MAX,
+        };
+        table.error(row, &error.to_string())
+    })
 }

@@ -82,9 +82,7 @@ impl Columns {
             };
             let row = [number(at[0])?, number(at[1])?];
             table.rows.push(span);
-            for (column, x) in table.columns.iter_mut().zip(row) {
-                column.push(x);
-            }
+            table.columns.iter_mut().zip(row).for_each(|(column, x)| column.push(x));
         }
         Ok(table)
     }

@@ -83,62 +83,36 @@ pub const fn form_key(
     Key { forms, ..key(name, value, need, about, example) }
 }
 
-/// The types of values.
+/// The types of values, which [`ValueKind::describe`] describes in words.
+#[allow(missing_docs, reason = "the descriptions say what each is")]
 #[derive(Debug, Clone, Copy)]
 pub enum ValueKind {
-    /// The value may be any string.
     Text,
-    /// A string with the name of a file, relative to the file that contains the key.
     File,
-    /// A string with the name of a table file, which must lie in the folder of the file or below.
     TableFile,
-    /// An integer or a decimal number.
     Number,
-    /// A number, or a string with a formula of the parameters and kT.
     NumberOrFormula,
-    /// A number, or a string with a formula of other parameters.
     Parameter,
-    /// A number above zero.
     Positive,
-    /// A whole number from 0.
     Count,
-    /// A number of dimensions, 2 or 3.
     Dimensions,
-    /// A truth value, true or false.
     Flag,
-    /// Two numbers or formulas, the lower first.
     Bounds,
-    /// A number for each direction.
     Point,
-    /// One length, or one for each direction.
     Lengths,
-    /// One length, one for each direction, or the table `[box]`.
     Box,
-    /// One name of a list.
     Choice(fn() -> Vec<&'static str>),
-    /// One name of a list, for all directions or for each.
     EachOf(fn() -> Vec<&'static str>),
-    /// A temperature, or the two ends of a ramp.
     Temperature,
-    /// An array with the names of all species.
     Species,
-    /// An array with the names of two species.
     Between,
-    /// An array of names.
     Names,
-    /// A table of fractions by species.
     Fractions,
-    /// The first and the last id of a range.
     Ids,
-    /// A string with a formula.
     Formula,
-    /// A polynomial, or a table of polynomials by pairs of species.
     Correction,
-    /// A formula, or a table that replaces one.
     Excess,
-    /// A table of formulas by the names of density variables.
     Slopes,
-    /// Any other type, described in these words.
     Words(&'static str),
 }
 
@@ -188,6 +162,16 @@ impl ValueKind {
 }
 
 impl Table {
+    /// A table that a file has once, without forms.
+    pub const fn new(path: &'static str, about: &'static str, keys: &'static [Key]) -> Table {
+        Table { path, title: "", array: false, about, forms: ("", &[]), keys }
+    }
+
+    /// A table that a file may have several times, without forms.
+    pub const fn array(path: &'static str, about: &'static str, keys: &'static [Key]) -> Table {
+        Table { array: true, ..Table::new(path, about, keys) }
+    }
+
     /// The keys that a table of this form has; all keys if `form` is `None`.
     pub fn keys_of<'a>(&self, form: Option<&'a str>) -> impl Iterator<Item = &'static Key> + use<'a> {
         self.keys.iter().filter(move |k| k.forms.is_empty() || form.is_none_or(|f| k.forms.contains(&f)))

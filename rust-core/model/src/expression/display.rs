@@ -73,38 +73,27 @@ impl Named<'_> {
         let mut stack = pieces(nodes, nodes[root]).1;
         stack.reverse();
         while let Some(piece) = stack.pop() {
-            let (id, least) = match piece {
-                Piece::Text(text) => {
-                    f.write_str(text)?;
-                    continue;
-                }
-                Piece::Number(value) => {
-                    number(f, value)?;
-                    continue;
-                }
-                Piece::Exponent(n) => {
-                    write!(f, "{n}")?;
-                    continue;
-                }
-                Piece::Variable(index) => {
-                    match self.names.get(index as usize) {
-                        Some(name) => f.write_str(name)?,
-                        None => write!(f, "x{index}")?,
+            match piece {
+                Piece::Text(text) => f.write_str(text)?,
+                Piece::Number(value) => number(f, value)?,
+                Piece::Exponent(n) => write!(f, "{n}")?,
+                Piece::Variable(index) => match self.names.get(index as usize) {
+                    Some(name) => f.write_str(name)?,
+                    None => write!(f, "x{index}")?,
+                },
+                Piece::Node(id, least) => {
+                    if let Some(number) = shared[id.index()] {
+                        write!(f, "t{number}")?;
+                        continue;
                     }
-                    continue;
+                    let (strength, mut inner) = pieces(nodes, nodes[id.index()]);
+                    if strength < least {
+                        inner.insert(0, Piece::Text("("));
+                        inner.push(Piece::Text(")"));
+                    }
+                    stack.extend(inner.into_iter().rev());
                 }
-                Piece::Node(id, least) => (id, least),
-            };
-            if let Some(number) = shared[id.index()] {
-                write!(f, "t{number}")?;
-                continue;
             }
-            let (strength, mut inner) = pieces(nodes, nodes[id.index()]);
-            if strength < least {
-                inner.insert(0, Piece::Text("("));
-                inner.push(Piece::Text(")"));
-            }
-            stack.extend(inner.into_iter().rev());
         }
         Ok(())
     }
@@ -115,10 +104,6 @@ fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
     use Piece::{Exponent, Node as Operand, Number, Text, Variable};
     use Strength::{Atom, Factor, Product, Sum};
 
-    let constant = |id: Id| match nodes[id.index()] {
-        Node::Constant(bits) => Some(bits.value()),
-        _ => None,
-    };
     let power = |base, n| match n {
         1 => vec![Operand(base, Factor)],
         _ => vec![Operand(base, Atom), Text("^"), Exponent(n)],
@@ -135,15 +120,15 @@ fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
             (strength, vec![Number(bits.value())])
         }
         Node::Variable(index) => (Atom, vec![Variable(index)]),
-        Node::Add(a, b) => match constant(a) {
+        Node::Add(a, b) => match nodes[a.index()].constant() {
             Some(c) if c < 0.0 => (Sum, vec![Operand(b, Sum), Text(" - "), Number(-c)]),
             _ => (Sum, vec![Operand(a, Sum), Text(" + "), Operand(b, Product)]),
         },
         Node::Subtract(a, b) => (Sum, vec![Operand(a, Sum), Text(" - "), Operand(b, Product)]),
         Node::Multiply(a, b) => {
             // A coefficient in front reads the same with and without parentheses.
-            let is_coefficient = constant(a).is_some()
-                && !matches!(nodes[b.index()], Node::Multiply(c, _) if constant(c).is_some());
+            let is_coefficient = nodes[a.index()].constant().is_some()
+                && !matches!(nodes[b.index()], Node::Multiply(c, _) if nodes[c.index()].constant().is_some());
             let right = if is_coefficient { Product } else { Factor };
             (Product, vec![Operand(a, Product), Text(" * "), Operand(b, right)])
         }
@@ -155,7 +140,7 @@ fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
             (Product, text)
         }
         Node::IntegerPower(base, n) => (Factor, power(base, n)),
-        Node::Power(a, b) => match constant(b) {
+        Node::Power(a, b) => match nodes[b.index()].constant() {
             Some(exponent) => (Factor, vec![Operand(a, Atom), Text("^"), Number(exponent)]),
             None => (Factor, vec![Operand(a, Atom), Text("^"), Operand(b, Factor)]),
         },

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::limits::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
+use super::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
 
 /// A range of the text, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

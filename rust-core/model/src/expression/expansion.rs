@@ -91,9 +91,7 @@ impl Expansion {
 }
 
 fn combine(out: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
-    for (out, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
-        *out = f(*a, *b);
-    }
+    out.iter_mut().zip(a.iter().zip(b)).for_each(|(out, (a, b))| *out = f(*a, *b));
 }
 
 /// All pairs of monomials whose product has no power above the second, and the product.
@@ -225,9 +223,7 @@ impl Algebra<'_> {
 
 fn multiply(products: &[[u16; 3]], a: &[f64], b: &[f64], out: &mut [f64]) {
     out.fill(0.0);
-    for &[i, j, k] in products {
-        out[k as usize] += a[i as usize] * b[j as usize];
-    }
+    products.iter().for_each(|&[i, j, k]| out[k as usize] += a[i as usize] * b[j as usize]);
 }
 
 /// The series `t_j = value · rateʲ / j!`.

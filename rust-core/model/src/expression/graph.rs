@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use super::MAX_NODES;
 use super::error::TooLarge;
 use super::function::Unary;
-use super::limits::MAX_NODES;
 
 /// Index of a node in its graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -55,6 +55,10 @@ impl Bits {
 }
 
 impl Node {
+    pub fn constant(self) -> Option<f64> {
+        if let Node::Constant(bits) = self { Some(bits.value()) } else { None }
+    }
+
     /// The nodes that this operation works on.
     pub fn operands(self) -> impl Iterator<Item = Id> {
         let operands = match self {
@@ -95,9 +99,7 @@ impl Node {
 ///
 /// Returns c, x and n. All code that evaluates or prints a graph calls this function, so that all of it agrees.
 pub(super) fn as_quotient(nodes: &[Node], node: Node) -> Option<(f64, Id, i32)> {
-    let Node::Multiply(factor, power) = node else {
-        return None;
-    };
+    let Node::Multiply(factor, power) = node else { return None };
     match (nodes[factor.index()], nodes[power.index()]) {
         (Node::Constant(c), Node::IntegerPower(base, n)) if n < 0 => Some((c.value(), base, -n)),
         _ => None,
@@ -178,19 +180,13 @@ impl Graph {
 
     /// Orders operands so that a + b and b + a are one node, constants first.
     fn in_order(&self, node: Node) -> Node {
-        let sorted = |a: Id, b: Id| {
-            let key = |id: Id| (!matches!(self.node(id), Node::Constant(_)), id);
-            if key(b) < key(a) { (b, a) } else { (a, b) }
+        let sorted = |of: fn(Id, Id) -> Node, a: Id, b: Id| {
+            let key = |id: Id| (self.node(id).constant().is_none(), id);
+            if key(b) < key(a) { of(b, a) } else { of(a, b) }
         };
         match node {
-            Node::Add(a, b) => {
-                let (a, b) = sorted(a, b);
-                Node::Add(a, b)
-            }
-            Node::Multiply(a, b) => {
-                let (a, b) = sorted(a, b);
-                Node::Multiply(a, b)
-            }
+            Node::Add(a, b) => sorted(Node::Add, a, b),
+            Node::Multiply(a, b) => sorted(Node::Multiply, a, b),
             _ => node,
         }
     }

@@ -25,9 +25,7 @@ impl<'a> Lexer<'a> {
     pub fn next(&mut self) -> Result<Option<(Token<'a>, Span)>, ExpressionError> {
         self.at += leading(self.rest(), |c| c.is_ascii_whitespace());
         let rest = self.rest();
-        let Some(first) = rest.chars().next() else {
-            return Ok(None);
-        };
+        let Some(first) = rest.chars().next() else { return Ok(None) };
         let (token, length) = match first {
             // `**` is a power, as in Fortran and Python.
             '*' if rest.starts_with("**") => (Token::Symbol('^'), 2),

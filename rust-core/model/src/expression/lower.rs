@@ -10,28 +10,24 @@ use super::program::{Instruction, Operation, Output, Program};
 impl Program {
     /// Compiles `outputs`, whose values keep this order.
     pub fn new(outputs: &[&Formula]) -> Self {
-        lower(outputs)
+        let mut graph = Graph::with_limit(usize::MAX);
+        let mut roots = Vec::with_capacity(outputs.len());
+        for formula in outputs {
+            let places = graph.import(formula.nodes());
+            // The limit cannot be reached: so many nodes do not fit in memory.
+            let places = places.expect("formulas that fit in memory");
+            roots.push(places[places.len() - 1]);
+        }
+        let values = Values::new(graph.nodes());
+        let outputs = roots
+            .iter()
+            .map(|root| match graph.node(*root) {
+                Node::Constant(bits) => Output::Constant(bits.value()),
+                _ => Output::Place(values.places[root.index()].unwrap_or_default()),
+            })
+            .collect();
+        allocate(values.variables, &values.code, outputs)
     }
-}
-
-fn lower(outputs: &[&Formula]) -> Program {
-    let mut graph = Graph::with_limit(usize::MAX);
-    let mut roots = Vec::with_capacity(outputs.len());
-    for formula in outputs {
-        let places = graph.import(formula.nodes());
-        // The limit cannot be reached: so many nodes do not fit in memory.
-        let places = places.expect("formulas that fit in memory");
-        roots.push(places[places.len() - 1]);
-    }
-    let values = Values::new(graph.nodes());
-    let outputs = roots
-        .iter()
-        .map(|root| match graph.node(*root) {
-            Node::Constant(bits) => Output::Constant(bits.value()),
-            _ => Output::Place(values.places[root.index()].unwrap_or_default()),
-        })
-        .collect();
-    allocate(values.variables, &values.code, outputs)
 }
 
 /// Instructions that each write a new place: variables first, then one place for each instruction.
@@ -117,9 +113,7 @@ impl<'a> Values<'a> {
 
     fn of(&mut self, operation: Operation, operands: &[Id]) -> usize {
         let mut places = [0; 4];
-        for (place, &id) in places.iter_mut().zip(operands) {
-            *place = self.place(id);
-        }
+        places.iter_mut().zip(operands).for_each(|(place, &id)| *place = self.place(id));
         if matches!(operation, Operation::Add | Operation::Multiply) {
             places[..2].sort_unstable();
         }
@@ -152,10 +146,7 @@ impl<'a> Values<'a> {
     }
 
     fn constant(&self, id: Id) -> Option<f64> {
-        match self.nodes[id.index()] {
-            Node::Constant(bits) => Some(bits.value()),
-            _ => None,
-        }
+        self.nodes[id.index()].constant()
     }
 }
 

@@ -35,7 +35,6 @@ mod formula;
 mod function;
 mod graph;
 mod lexer;
-mod limits;
 mod lower;
 mod parser;
 mod program;
@@ -51,6 +50,14 @@ pub use display::Named;
 pub use error::{ErrorKind, ExpressionError, TooLarge};
 pub use expansion::Expansion;
 pub use formula::Formula;
-pub use limits::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
 pub use program::Program;
 pub use wgsl::Wgsl;
+
+/// The longest text that is parsed, in bytes.
+pub const MAX_LENGTH: usize = 4096;
+
+/// The deepest nesting of parentheses, signs and powers that is parsed.
+pub const MAX_DEPTH: usize = 64;
+
+/// The most operations a formula may have, and a derivative may need on the way.
+pub const MAX_NODES: usize = 50_000;

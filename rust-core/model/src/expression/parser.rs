@@ -6,8 +6,8 @@ use super::ast::{Action, Ast, Binary, Step};
 use super::error::{ErrorKind, ExpressionError, Span};
 use super::function::Function;
 use super::lexer::{Lexer, Token};
-use super::limits::{MAX_DEPTH, MAX_LENGTH};
 use super::suggest::closest;
+use super::{MAX_DEPTH, MAX_LENGTH};
 
 impl Ast {
     /// Parses an expression.
@@ -15,30 +15,27 @@ impl Ast {
     /// The text may be anything: a text longer than [`MAX_LENGTH`] or nested deeper than
     /// [`MAX_DEPTH`] is an error like any other.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
-        parse(text).map(|steps| Self { steps })
-    }
-}
-
-fn parse(text: &str) -> Result<Vec<Step>, ExpressionError> {
-    if text.len() > MAX_LENGTH {
-        let mut offset = MAX_LENGTH;
-        while !text.is_char_boundary(offset) {
-            offset -= 1;
+        if text.len() > MAX_LENGTH {
+            let mut offset = MAX_LENGTH;
+            while !text.is_char_boundary(offset) {
+                offset -= 1;
+            }
+            return Err(Span::new(offset, text.len() - offset).error(ErrorKind::TooLong));
         }
-        return Err(Span::new(offset, text.len() - offset).error(ErrorKind::TooLong));
+        let mut parser =
+            Parser { text, steps: Vec::new(), operands: Vec::new(), waiting: Vec::new(), depth: 0 };
+        let mut lexer = Lexer::new(text);
+        // An operand (after signs and openings) and an operator alternate.
+        let mut wants_operand = true;
+        while let Some((token, span)) = lexer.next()? {
+            wants_operand =
+                if wants_operand { parser.operand(token, span)? } else { parser.operator(token, span)? };
+        }
+        if wants_operand {
+            return Err(Span::new(text.len(), 0).error(ErrorKind::UnexpectedEnd));
+        }
+        parser.finish().map(|steps| Self { steps })
     }
-    let mut parser = Parser { text, steps: Vec::new(), operands: Vec::new(), waiting: Vec::new(), depth: 0 };
-    let mut lexer = Lexer::new(text);
-    // An operand (after signs and openings) and an operator alternate.
-    let mut wants_operand = true;
-    while let Some((token, span)) = lexer.next()? {
-        wants_operand =
-            if wants_operand { parser.operand(token, span)? } else { parser.operator(token, span)? };
-    }
-    if wants_operand {
-        return Err(Span::new(text.len(), 0).error(ErrorKind::UnexpectedEnd));
-    }
-    parser.finish()
 }
 
 /// An operator or an opening that was read and is not in the output yet.
@@ -199,9 +196,7 @@ impl Parser<'_> {
             && waiting.strength() >= at_least
         {
             self.pop();
-            let Some(right) = self.operands.pop() else {
-                return;
-            };
+            let Some(right) = self.operands.pop() else { return };
             match waiting {
                 Waiting::Sign(sign) => self.leaf(Action::Negate, sign.to(right)),
                 Waiting::Binary(binary) => {
@@ -295,7 +290,7 @@ mod tests {
             Action::Binary(Binary::Power) => "^".into(),
             Action::Call(function) => function.name().into(),
         };
-        let steps = parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let Ast { steps } = Ast::parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
         steps.iter().map(word).collect::<Vec<_>>().join(" ")
     }
 
@@ -365,7 +360,7 @@ mod tests {
             ("a + ψ", 4, 2, "unexpected character 'ψ'"),
             ("2 * 1e999", 4, 5, "no finite value"),
         ] {
-            let error = parse(text).expect_err(text);
+            let error = Ast::parse(text).expect_err(text);
             assert_eq!((error.offset, error.length), (offset, length), "{text}");
             let found = error.to_string();
             assert!(found.contains(message), "{text}: {found}");
@@ -376,23 +371,23 @@ mod tests {
     fn depth_is_limited() {
         let nested = |open: &str, close: &str, n| open.repeat(n) + "x" + &close.repeat(n);
         for (open, close) in [("(", ")"), ("-", ""), ("x^", ""), ("exp(", ")"), ("2*(1+", ")")] {
-            assert!(parse(&nested(open, close, MAX_DEPTH)).is_ok(), "{open}");
+            assert!(Ast::parse(&nested(open, close, MAX_DEPTH)).is_ok(), "{open}");
             for n in [MAX_DEPTH + 1, 500] {
-                let error = parse(&nested(open, close, n)).unwrap_err();
+                let error = Ast::parse(&nested(open, close, n)).unwrap_err();
                 assert_eq!(error.kind, ErrorKind::TooDeep, "{open}");
             }
         }
-        let error = parse(&"(".repeat(MAX_LENGTH)).unwrap_err();
+        let error = Ast::parse(&"(".repeat(MAX_LENGTH)).unwrap_err();
         assert_eq!((error.offset, error.length), (MAX_DEPTH, 1));
     }
 
     #[test]
     fn length_is_limited() {
         // A long sum does not nest.
-        assert!(parse(&("1+".repeat(MAX_LENGTH / 2 - 1) + "1")).is_ok());
-        assert!(parse(&"9".repeat(300)).is_ok());
+        assert!(Ast::parse(&("1+".repeat(MAX_LENGTH / 2 - 1) + "1")).is_ok());
+        assert!(Ast::parse(&"9".repeat(300)).is_ok());
         for text in ["1+".repeat(MAX_LENGTH), "ψ".repeat(MAX_LENGTH) + "x"] {
-            let error = parse(&text).unwrap_err();
+            let error = Ast::parse(&text).unwrap_err();
             assert_eq!(error.kind, ErrorKind::TooLong);
             assert_eq!(error.offset + error.length, text.len());
         }

@@ -33,15 +33,10 @@ pub(super) struct Instruction {
 pub(super) enum Operation {
     /// Sets the constant c.
     Set,
-    /// Computes a + b.
     Add,
-    /// Computes a − b.
     Subtract,
-    /// Computes a · b.
     Multiply,
-    /// Computes a / b.
     Divide,
-    /// Computes −a.
     Negate,
     /// Computes c + a.
     Shift,
@@ -51,11 +46,9 @@ pub(super) enum Operation {
     Scale,
     /// Computes c / a.
     DivideInto,
-    /// Computes a ^ b.
     Power,
     /// Computes a ^ c.
     PowerConstant,
-    /// Computes a function f(a).
     Unary(Unary),
     /// Selects c if a ≤ b, and d otherwise.
     Select,

@@ -23,10 +23,7 @@ impl Graph {
     }
 
     pub fn as_constant(&self, id: Id) -> Option<f64> {
-        match self.node(id) {
-            Node::Constant(bits) => Some(bits.value()),
-            _ => None,
-        }
+        self.node(id).constant()
     }
 
     pub fn add(&mut self, a: Id, b: Id) -> Built {
@@ -66,9 +63,7 @@ impl Graph {
 
     pub fn multiply(&mut self, a: Id, b: Id) -> Built {
         let ((ca, ra), (cb, rb)) = (self.term(a), self.term(b));
-        let Some(c) = self.folded(a, b, ca * cb) else {
-            return self.add_node(Node::Multiply(a, b));
-        };
+        let Some(c) = self.folded(a, b, ca * cb) else { return self.add_node(Node::Multiply(a, b)) };
         let rest = match (ra, rb) {
             (Some(ra), Some(rb)) => Some(self.product(ra, rb)?),
             (rest, None) | (None, rest) => rest,
@@ -78,9 +73,7 @@ impl Graph {
 
     pub fn divide(&mut self, a: Id, b: Id) -> Built {
         let ((ca, ra), (cb, rb)) = (self.term(a), self.term(b));
-        let Some(c) = self.folded(a, b, ca / cb) else {
-            return self.add_node(Node::Divide(a, b));
-        };
+        let Some(c) = self.folded(a, b, ca / cb) else { return self.add_node(Node::Divide(a, b)) };
         let rest = match (ra, rb) {
             (rest, None) => rest,
             (None, Some(rb)) => Some(self.integer_power(rb, -1)?),
@@ -96,9 +89,7 @@ impl Graph {
     }
 
     pub fn power(&mut self, a: Id, b: Id) -> Built {
-        let Some(exponent) = self.as_constant(b) else {
-            return self.add_node(Node::Power(a, b));
-        };
+        let Some(exponent) = self.as_constant(b) else { return self.add_node(Node::Power(a, b)) };
         if exponent.fract() == 0.0 && exponent.abs() <= f64::from(LARGEST_CHAIN) {
             return self.integer_power(a, exponent as i32);
         }
@@ -193,9 +184,7 @@ impl Graph {
 
     /// The node of `coefficient · rest`.
     fn scale(&mut self, c: f64, rest: Option<Id>) -> Built {
-        let Some(rest) = rest else {
-            return self.constant(c);
-        };
+        let Some(rest) = rest else { return self.constant(c) };
         if c == 0.0 {
             return self.constant(0.0);
         }

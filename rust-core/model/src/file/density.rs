@@ -29,9 +29,7 @@ pub fn read(
     species: &[String],
     parameters: &BTreeMap<String, f64>,
 ) -> Result<Vec<DensityEntry>, FileError> {
-    let Some(value) = root.get("density") else {
-        return Ok(Vec::new());
-    };
+    let Some(value) = root.get("density") else { return Ok(Vec::new()) };
     let section = value.section()?;
     let mut densities: Vec<DensityEntry> = Vec::new();
     let entries = section.entries();

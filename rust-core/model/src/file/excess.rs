@@ -32,9 +32,7 @@ pub fn read(
     directory: &Path,
 ) -> Result<Vec<ExcessEntry>, FileError> {
     let mut all = vec![ExcessEntry::None; species.value.len()];
-    let Some(value) = root.get("excess_free_energy") else {
-        return Ok(all);
-    };
+    let Some(value) = root.get("excess_free_energy") else { return Ok(all) };
     let section = value.section()?;
     for (name, value) in section.entries() {
         let index = species_index(&species.value, &name)?;

@@ -42,9 +42,7 @@ pub fn read_pairs(root: &Section, species: &[String], directory: &Path) -> Resul
 
 /// Reads every `[[thermostat]]`.
 pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<ThermostatEntry>, FileError> {
-    let Some(value) = root.get("thermostat") else {
-        return Ok(Vec::new());
-    };
+    let Some(value) = root.get("thermostat") else { return Ok(Vec::new()) };
     let mut entries: Vec<ThermostatEntry> = Vec::new();
     for item in value.array()? {
         let table = item.section()?;

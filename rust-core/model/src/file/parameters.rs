@@ -11,9 +11,7 @@ const MOST_PARAMETERS: usize = 1000;
 /// The `[parameters]` table: numbers, or formulas of other parameters, in any order.
 pub fn read(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
     let mut known = BTreeMap::new();
-    let Some(value) = root.get("parameters") else {
-        return Ok(known);
-    };
+    let Some(value) = root.get("parameters") else { return Ok(known) };
     let section = value.section()?;
     let mut waiting: Vec<(String, Number)> = Vec::new();
     let entries = section.entries();

@@ -15,9 +15,7 @@ pub struct Units {
 
 /// Reads `[units]`, if it is there.
 pub fn read(root: &Section) -> Result<Option<Units>, FileError> {
-    let Some(value) = root.get("units") else {
-        return Ok(None);
-    };
+    let Some(value) = root.get("units") else { return Ok(None) };
     let table = value.section()?;
     let positive = |key: &str| table.require(key)?.positive();
     Ok(Some(Units { length: positive("length")?, mass: positive("mass")?, energy: positive("energy")? }))

@@ -10,7 +10,7 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 pub struct ExpressionPair {
     /// Program for `φ` and `φ'` of the one variable `r`.
-    program: Program,
+    pub program: Program,
     /// Program for `φ` alone.
     energy: Program,
     range: f64,
@@ -24,11 +24,6 @@ impl ExpressionPair {
     pub fn new(phi: &Formula, range: f64) -> Result<ExpressionPair, TooLarge> {
         let slope = phi.derivative(0)?;
         Ok(ExpressionPair { program: Program::new(&[phi, &slope]), energy: Program::new(&[phi]), range })
-    }
-
-    /// Computes `φ` and `φ'` from the one variable `r`.
-    pub fn program(&self) -> &Program {
-        &self.program
     }
 }
 

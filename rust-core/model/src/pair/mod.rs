@@ -46,9 +46,7 @@ pub trait PairForm {
 
     /// Computes `φ` and `φ'` at every `r` of a block; all `r < range`. The slices have one length.
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
-        for ((r, phi), slope) in r.iter().zip(phi).zip(slope) {
-            (*phi, *slope) = self.at(*r);
-        }
+        r.iter().zip(phi).zip(slope).for_each(|((r, phi), slope)| (*phi, *slope) = self.at(*r));
     }
 }
 

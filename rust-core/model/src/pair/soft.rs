@@ -10,7 +10,8 @@ use std::path::Path;
 /// The form is that of Groot and Warren; Warren eq. (3)–(4), with the range written out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Soft {
-    strength: f64,
+    /// The strength `a`: the force at contact.
+    pub strength: f64,
     range: f64,
 }
 
@@ -18,11 +19,6 @@ impl Soft {
     /// Takes the strength `a` (energy over length; negative attracts) and the range `R > 0`.
     pub fn new(strength: f64, range: f64) -> Soft {
         Soft { strength, range }
-    }
-
-    /// The strength `a`: the force at contact.
-    pub fn strength(&self) -> f64 {
-        self.strength
     }
 }
 

@@ -11,10 +11,14 @@ use std::path::Path;
 /// not normalised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SplineAttractive {
-    repulsion: f64,
-    attraction: f64,
-    repulsion_range: f64,
-    attraction_range: f64,
+    /// The factor `aA` of the repulsive spline.
+    pub repulsion: f64,
+    /// The factor `aB` of the attractive spline.
+    pub attraction: f64,
+    /// The range `R_A` of the repulsion.
+    pub repulsion_range: f64,
+    /// The range `R_B` of the attraction.
+    pub attraction_range: f64,
 }
 
 /// The shape `W(r, R)` and `∂W/∂r`; zero at and beyond `R`.
@@ -39,26 +43,6 @@ impl SplineAttractive {
             repulsion_range,
             attraction_range,
         }
-    }
-
-    /// The factor `aA` of the repulsive spline.
-    pub fn repulsion(&self) -> f64 {
-        self.repulsion
-    }
-
-    /// The factor `aB` of the attractive spline.
-    pub fn attraction(&self) -> f64 {
-        self.attraction
-    }
-
-    /// The range `R_A` of the repulsion.
-    pub fn repulsion_range(&self) -> f64 {
-        self.repulsion_range
-    }
-
-    /// The range `R_B` of the attraction.
-    pub fn attraction_range(&self) -> f64 {
-        self.attraction_range
     }
 }
 

@@ -11,7 +11,8 @@ use std::sync::Arc;
 /// the table should end at zero. Below the first row φ′ continues linearly.
 #[derive(Debug, Clone)]
 pub struct TablePair {
-    spline: Arc<Spline>,
+    /// The spline through the rows.
+    pub spline: Arc<Spline>,
     range: f64,
 }
 
@@ -19,11 +20,6 @@ impl TablePair {
     /// Takes the spline, and cuts it at `range`.
     pub fn new(spline: Arc<Spline>, range: f64) -> TablePair {
         TablePair { spline, range }
-    }
-
-    /// The spline through the rows.
-    pub fn spline(&self) -> &Spline {
-        &self.spline
     }
 }
 

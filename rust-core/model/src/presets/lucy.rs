@@ -12,15 +12,10 @@ use super::coefficients::{PresetError, WarrenPair, pair_text, quoted, upper_tria
 use crate::file::Model;
 use std::fmt::Write;
 
-/// Writes the model file of the law for species `species` of masses `masses`, with `pairs` a row-major
-/// table of the coefficients (the upper triangle is read). `A`, `B`, `γ`, `r_c` and `r_d` may all
-/// differ by pair.
+/// Writes the model file of [`lucy_mdpd`].
 ///
 /// The reported energy `Σ_i Σ_β c r_d^{d+1} B n_β ρ_i`, `c_3 = π/30`, `c_2 = π/24`, is that of Warren's
 /// ψ, `c r_d^{d+1} B n²`, where all coefficients are equal; the force is not its gradient.
-///
-/// # Errors
-/// Fails for a pair without coefficients, and if the number of masses differs from that of species.
 pub(super) fn lucy_mdpd_text(
     species: &[String],
     pairs: &[Option<WarrenPair>],

@@ -29,7 +29,7 @@ impl Block {
 /// Cells at least as wide as the range; along open directions the outer cells extend to infinity.
 #[derive(Debug, Clone)]
 pub struct Cells {
-    domain: PeriodicBox,
+    pub domain: PeriodicBox,
     edges: [[f64; 3]; 3],
     periodic: [bool; 3],
     dimensions: usize,
@@ -93,10 +93,6 @@ impl Cells {
             filled: vec![0; total],
             place: Vec::new(),
         }
-    }
-
-    pub fn domain(&self) -> &PeriodicBox {
-        &self.domain
     }
 
     /// Sorts particles at `x`, which are inside along periodic directions, into cells.
@@ -234,9 +230,7 @@ fn inside(mut cell: i32, count: i32) -> (usize, f64) {
 fn moved(mut points: [[f64; 3]; 2], edge: &[f64; 3], boxes: f64) -> [[f64; 3]; 2] {
     if boxes != 0.0 {
         for point in &mut points {
-            for c in 0..3 {
-                point[c] -= boxes * edge[c];
-            }
+            (0..3).for_each(|c| point[c] -= boxes * edge[c]);
         }
     }
     points

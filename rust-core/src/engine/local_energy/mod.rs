@@ -43,7 +43,8 @@ pub enum NoEnergy {
 #[derive(Debug, Clone)]
 pub struct LocalEnergy {
     plan: Plan,
-    range: f64,
+    /// The longest range of the interactions; 0 for an ideal gas.
+    pub range: f64,
     set: InstructionSet,
     cells: Option<Cells>,
     x: Vec<[f64; 3]>,
@@ -54,6 +55,7 @@ pub struct LocalEnergy {
     /// Each particle's contribution to its own density, by density: `w(0)`, and its own images.
     own: Vec<f64>,
     near: Near,
+    excess: ExcessWork,
     work: Work,
     moved: Moved,
 }
@@ -70,7 +72,7 @@ struct Moved {
 }
 
 /// Scratch arrays for one move.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Work {
     /// Changes of densities, neighbour by neighbour, for each density.
     change: Vec<f64>,
@@ -81,7 +83,6 @@ struct Work {
     lanes: Vec<f64>,
     members: Vec<u32>,
     registers: Vec<f64>,
-    excess: ExcessWork,
     /// Index of each particle among those whose ψ changes, used if a particle may occur more than once.
     slot: Vec<u32>,
 }
@@ -111,25 +112,10 @@ impl LocalEnergy {
             psi: Vec::new(),
             own: Vec::new(),
             near: Near::default(),
-            work: Work {
-                change: Vec::new(),
-                weights: Default::default(),
-                r: Vec::new(),
-                phi: Vec::new(),
-                at: Vec::new(),
-                lanes: Vec::new(),
-                members: Vec::new(),
-                registers: Vec::new(),
-                excess: ExcessWork::new(set),
-                slot: Vec::new(),
-            },
+            excess: ExcessWork::new(set),
+            work: Work::default(),
             moved: Moved::default(),
         })
-    }
-
-    /// The longest range of the interactions; 0 for an ideal gas.
-    pub fn range(&self) -> f64 {
-        self.range
     }
 
     /// Replaces all particles, wraps them into the box, and computes all densities and energies.
@@ -145,7 +131,7 @@ impl LocalEnergy {
         self.x.extend_from_slice(x);
         self.species.clear();
         self.species.extend_from_slice(kind);
-        let fits = |cells: &Cells| cells.domain() == domain && self.psi.len() == x.len();
+        let fits = |cells: &Cells| cells.domain == *domain && self.psi.len() == x.len();
         if !self.cells.as_ref().is_some_and(fits) {
             self.cells = Some(Cells::new(domain, self.plan.dimensions, self.range, x.len()));
             self.own = own_densities(&self.plan, domain);
@@ -187,7 +173,7 @@ impl LocalEnergy {
         &self.x
     }
 
-    /// Densities that ψ depends on nonlinearly, particle by particle; [`Plan::density_passes`] lists them.
+    /// Densities that ψ depends on nonlinearly, particle by particle; [`Plan::passes`] lists them.
     pub fn densities(&self) -> &[f64] {
         &self.n
     }
@@ -256,7 +242,7 @@ impl LocalEnergy {
         let Some(cells) = &mut self.cells else { return };
         let Moved { particle, to, ids, n, psi } = &self.moved;
         let mut x = *to;
-        cells.domain().wrap(&mut x, image);
+        cells.domain.wrap(&mut x, image);
         cells.change(*particle, x);
         self.x[*particle] = x;
         let width = self.plan.slope_width();
@@ -368,9 +354,7 @@ impl LocalEnergy {
             if near.repeats {
                 work.slot[id as usize] = row as u32;
             }
-            for p in 0..passes {
-                moved.n[row * width + p * count + kind] += changes(p);
-            }
+            (0..passes).for_each(|p| moved.n[row * width + p * count + kind] += changes(p));
         }
         if near.repeats {
             moved.ids.iter().for_each(|id| work.slot[*id as usize] = u32::MAX);
@@ -379,14 +363,14 @@ impl LocalEnergy {
 
     /// Evaluates ψ of the particles of `moved` at their new densities.
     fn evaluate_psi(&mut self) {
-        let LocalEnergy { plan, work, species, moved, .. } = self;
+        let LocalEnergy { plan, work, species, moved, excess: excess_work, .. } = self;
         let (count, width, all) = (plan.species.len(), plan.slope_width(), moved.ids.len());
         moved.psi.clear();
         moved.psi.resize(all, 0.0);
         let variables = plan.densities.len() * count;
         for (alpha, excess) in plan.excess.iter().enumerate() {
             if count == 1 && variables == 1 && width == 1 && plan.densities[0].correction[0].is_identity() {
-                excess.evaluate(all, &moved.n, &mut moved.psi, &mut [], &mut work.excess);
+                excess.evaluate(&moved.n, &mut moved.psi, &mut [], excess_work);
                 continue;
             }
             work.members.clear();
@@ -411,10 +395,8 @@ impl LocalEnergy {
                 }
             }
             work.lanes.resize(lanes, 0.0);
-            excess.evaluate(lanes, &work.at, &mut work.lanes, &mut [], &mut work.excess);
-            for (row, psi) in work.members.iter().zip(&work.lanes) {
-                moved.psi[*row as usize] = *psi;
-            }
+            excess.evaluate(&work.at, &mut work.lanes, &mut [], excess_work);
+            work.members.iter().zip(&work.lanes).for_each(|(row, psi)| moved.psi[*row as usize] = *psi);
         }
     }
 }

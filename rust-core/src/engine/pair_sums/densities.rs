@@ -20,7 +20,7 @@ pub fn sum_densities(
     for d in which {
         let density = &plan.densities[d];
         let owned = n.len() / width;
-        for list in [pairs.force(), pairs.density_only()] {
+        for list in [&pairs.force, &pairs.density_only] {
             add_density(list, &density.kernel, owned, n, width, d * count);
         }
         sums += 1;

@@ -19,7 +19,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Evaluates configurations of one fluid at one temperature.
 #[derive(Debug)]
 pub struct Evaluator {
-    fluid: Fluid,
+    /// The fluid that is evaluated.
+    pub fluid: Fluid,
     /// A plan with a pass for every density.
     plan: Plan,
     free_energies: FreeEnergies,
@@ -63,11 +64,6 @@ impl Evaluator {
         Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energies, work, fluid })
     }
 
-    /// The fluid that is evaluated.
-    pub fn fluid(&self) -> &Fluid {
-        &self.fluid
-    }
-
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
     /// are not finite do not interact.
     pub fn evaluate(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
@@ -105,7 +101,7 @@ impl Evaluator {
                 pairs.push_in_box(i, j, d, species);
             });
         }
-        pair_forces.resize(pairs.force().len(), 0.0);
+        pair_forces.resize(pairs.force.len(), 0.0);
         (pairs, pair_forces)
     }
 
@@ -128,13 +124,11 @@ impl Evaluator {
             pair_force: &mut pair_forces,
             tally: Tally::default(),
         };
-        let input = ForceInput::conservative(&self.plan, pairs.force(), owned, &psi.slopes);
+        let input = ForceInput::conservative(&self.plan, &pairs.force, owned, &psi.slopes);
         add_forces(&input, &mut output);
         let tally = output.tally;
         let mut excess = vec![0.0; self.fluid.species.len()];
-        for (value, s) in psi.value.iter().zip(species) {
-            excess[*s as usize] += value;
-        }
+        psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
         let energy = excess.iter().sum::<f64>() + tally.pair;
         Evaluation { energy, densities, forces, virial: tally.virial, psi, excess, pairs, pair_forces }
     }
@@ -142,7 +136,7 @@ impl Evaluator {
 
 /// The sum `Σ φ` over each pair term of a fluid.
 fn pair_energies(pairs: &Pairs, fluid: &Fluid) -> Vec<f64> {
-    let list = pairs.force();
+    let list = &pairs.force;
     let energy_of = |term: &PairTerm| {
         let acting = (0..list.len())
             .filter(|k| term.acts(list.species_i[*k] as usize, list.species_j[*k] as usize, list.r[*k]));
@@ -170,7 +164,7 @@ impl Evaluation {
 
     /// Pairs in the range of the conservative interactions.
     pub fn pairs(&self) -> impl Iterator<Item = Pair> {
-        let list = self.pairs.force();
+        let list = &self.pairs.force;
         (0..list.len()).map(|k| Pair {
             i: list.i[k] as usize,
             j: list.j[k] as usize,
@@ -313,8 +307,8 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             let (evaluator, x, species, domain) = random(model, 11);
             let found = evaluator.evaluate(&x, &species, &domain);
             let indices: Vec<usize> = species.iter().map(|s| *s as usize).collect();
-            let truth = crate::truth::conservative(evaluator.fluid(), &x, &indices, &domain).unwrap();
-            let energies = found.excess.iter().chain(&found.pair_energies(evaluator.fluid())).sum::<f64>();
+            let truth = crate::truth::conservative(&evaluator.fluid, &x, &indices, &domain).unwrap();
+            let energies = found.excess.iter().chain(&found.pair_energies(&evaluator.fluid)).sum::<f64>();
             let alone = evaluator.energy(&x, &species, &domain);
             assert!((alone - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             assert!((energies - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
@@ -357,8 +351,8 @@ range = 1.0
     fn laplacians_are_divergences_of_forces() {
         for model in MODELS {
             let (evaluator, x, species, domain) = random(model, 12);
-            let found = evaluator.evaluate(&x, &species, &domain).laplacians(evaluator.fluid(), &species);
-            let dimensions = evaluator.fluid().dimensions;
+            let found = evaluator.evaluate(&x, &species, &domain).laplacians(&evaluator.fluid, &species);
+            let dimensions = evaluator.fluid.dimensions;
             for k in [0, 17, 44] {
                 let h = 1e-6;
                 let mut divergence = 0.0;

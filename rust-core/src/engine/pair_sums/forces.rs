@@ -9,6 +9,7 @@ use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
+use std::ops::Range;
 
 /// Number of pairs in a block, whose scalars stay in the first-level cache.
 const BLOCK: usize = 256;
@@ -73,22 +74,22 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
     let mut block = Block::<BLOCK>::new();
     let energies = input.want.energy || input.want.particle_energy;
     for begin in (0..input.list.len()).step_by(BLOCK) {
-        let end = (begin + BLOCK).min(input.list.len());
-        block.conserve(input, begin, end, energies);
-        if let Some(forces) = output.pair_force.get_mut(begin..end) {
-            forces.copy_from_slice(&block.conservative[..end - begin]);
+        let pairs = begin..(begin + BLOCK).min(input.list.len());
+        block.conserve(input, pairs.clone(), energies);
+        if let Some(forces) = output.pair_force.get_mut(pairs.clone()) {
+            forces.copy_from_slice(&block.conservative[..pairs.len()]);
         }
         if let (Some((noise, inverse_root_dt)), Some(plan)) = (&input.thermostat, &input.plan.thermostat) {
-            add_thermostat(input, plan, noise, *inverse_root_dt, begin, end, &mut block.thermostat);
+            add_thermostat(input, plan, noise, *inverse_root_dt, pairs.clone(), &mut block.thermostat);
         } else {
             block.thermostat.fill(0.0);
         }
-        scatter(input, output, begin, end, &block);
+        scatter(input, output, pairs.clone(), &block);
         if input.want.virial || input.want.particle_virial {
-            tally_virial(input, output, begin, end, &block);
+            tally_virial(input, output, pairs.clone(), &block);
         }
         if energies {
-            tally_energy(input, output, begin, end, &block);
+            tally_energy(input, output, pairs, &block);
         }
     }
 }
@@ -108,8 +109,8 @@ impl<const N: usize> Block<N> {
         }
     }
 
-    /// Computes the conservative forces of the pairs `begin` to `end`, at most `N`, and their energies if asked for.
-    pub fn conserve(&mut self, input: &ForceInput, begin: usize, end: usize, energies: bool) {
+    /// Computes the conservative forces of some pairs, at most `N`, and their energies if asked for.
+    pub fn conserve(&mut self, input: &ForceInput, pairs: Range<usize>, energies: bool) {
         self.conservative.fill(0.0);
         if energies {
             self.excess_i.fill(0.0);
@@ -119,24 +120,24 @@ impl<const N: usize> Block<N> {
         for (k, density) in input.plan.passes.iter().enumerate() {
             let kernel = &input.plan.densities[*density].force_kernel;
             let out = &mut self.conservative;
-            kernel.kind().visit(ManyBody { input, kernel, offset: k, begin, end, out });
+            kernel.kind().visit(ManyBody { input, kernel, offset: k, pairs: pairs.clone(), out });
         }
         for term in &input.plan.linear {
-            term.kernel.kind().visit(Linear { input, term, energies, begin, end, block: self });
+            term.kernel.kind().visit(Linear { input, term, energies, pairs: pairs.clone(), block: self });
         }
         for term in &input.plan.pairs {
-            add_pair_term(input, term, begin, end, energies, self);
+            add_pair_term(input, term, pairs.clone(), energies, self);
         }
-        scale(input.list, begin, end, energies, self);
+        scale(input.list, pairs, energies, self);
     }
 }
 
 /// Scales conservative forces and energies of pairs with reduced strength.
-fn scale<const N: usize>(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut Block<N>) {
+fn scale<const N: usize>(list: &PairList, pairs: Range<usize>, energies: bool, block: &mut Block<N>) {
     if list.factor.is_empty() {
         return;
     }
-    for (at, factor) in list.factor[begin..end].iter().enumerate() {
+    for (at, factor) in list.factor[pairs].iter().enumerate() {
         block.conservative[at] *= factor;
         if energies {
             block.excess_i[at] *= factor;
@@ -151,8 +152,7 @@ struct ManyBody<'a, 'b, const N: usize> {
     input: &'a ForceInput<'b>,
     kernel: &'a Kernel,
     offset: usize,
-    begin: usize,
-    end: usize,
+    pairs: Range<usize>,
     out: &'a mut [f64; N],
 }
 
@@ -166,14 +166,14 @@ impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
         let (width, offset) = (self.input.plan.slope_width(), self.offset * species);
         let inverse_range = 1.0 / self.kernel.range();
         let factor = self.kernel.slope_factor();
-        for k in self.begin..self.end {
+        for k in self.pairs.clone() {
             // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
             let s = list.r[k] * inverse_range;
             let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
             let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
             let force = (slopes[here] + slopes[there]) * (factor * S::slope(s));
             // A slope of ψ may be infinite if no particle is in range.
-            self.out[k - self.begin] -= if s < 1.0 { force } else { 0.0 };
+            self.out[k - self.pairs.start] -= if s < 1.0 { force } else { 0.0 };
         }
     }
 }
@@ -183,8 +183,7 @@ struct Linear<'a, 'b, const N: usize> {
     input: &'a ForceInput<'b>,
     term: &'a LinearTerm,
     energies: bool,
-    begin: usize,
-    end: usize,
+    pairs: Range<usize>,
     block: &'a mut Block<N>,
 }
 
@@ -200,7 +199,7 @@ impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
         let slope_factor = self.term.kernel.slope_factor();
         // Only a law without potential has another kernel in the force; its speed does not matter.
         let foreign = (self.term.force_kernel != self.term.kernel).then_some(self.term.force_kernel);
-        for k in self.begin..self.end {
+        for k in self.pairs.clone() {
             let s = list.r[k] * inverse_range;
             if s < 1.0 {
                 let (a, b) = (list.species_i[k] as usize, list.species_j[k] as usize);
@@ -209,7 +208,7 @@ impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
                     None => slope_factor * S::slope(s),
                     Some(kernel) => kernel.slope(list.r[k]),
                 };
-                let at = k - self.begin;
+                let at = k - self.pairs.start;
                 self.block.conservative[at] -= (ab + ba) * slope;
                 if self.energies {
                     let w = value_factor * S::value(s);
@@ -225,8 +224,7 @@ impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
 fn add_pair_term<const N: usize>(
     input: &ForceInput,
     term: &PairTerm,
-    begin: usize,
-    end: usize,
+    pairs: Range<usize>,
     energies: bool,
     block: &mut Block<N>,
 ) {
@@ -234,11 +232,11 @@ fn add_pair_term<const N: usize>(
     let [a, b] = term.between.map(|s| s as u8);
     let range = term.potential.range();
     let mut count = 0;
-    for k in begin..end {
+    for k in pairs.clone() {
         let (si, sj) = (list.species_i[k], list.species_j[k]);
         let takes_part = ((si == a && sj == b) || (si == b && sj == a)) && list.r[k] < range;
         block.r[count] = list.r[k];
-        block.place[count] = (k - begin) as u16;
+        block.place[count] = (k - pairs.start) as u16;
         count += takes_part as usize;
     }
     term.potential.block(&block.r[..count], &mut block.phi[..count], &mut block.slope[..count]);
@@ -257,16 +255,15 @@ fn add_thermostat(
     plan: &ThermostatPlan,
     noise: &PairNoise,
     inverse_root_dt: f64,
-    begin: usize,
-    end: usize,
+    pairs: Range<usize>,
     out: &mut [f64; BLOCK],
 ) {
     let list = input.list;
     let count = input.plan.species.len();
-    for k in begin..end {
+    for k in pairs.clone() {
         let pair = list.species_i[k] as usize * count + list.species_j[k] as usize;
         let (r, range) = (list.r[k], plan.range[pair]);
-        out[k - begin] = 0.0;
+        out[k - pairs.start] = 0.0;
         let strength = list.thermostat_factor.get(k).copied().unwrap_or(1.0);
         // A pair at zero distance has no direction.
         if r < range && r > 0.0 && strength != 0.0 {
@@ -280,20 +277,20 @@ fn add_thermostat(
                 + list.d[2][k] * (vi[2] - vj[2]);
             let xi = noise.xi(input.tag[i] as u32, input.tag[j] as u32);
             let force = w * (plan.sigma[pair] * xi * inverse_root_dt - plan.gamma[pair] * w * dot / r);
-            out[k - begin] = strength * force;
+            out[k - pairs.start] = strength * force;
         }
     }
 }
 
-fn scatter(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usize, block: &Block<BLOCK>) {
+fn scatter(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, block: &Block<BLOCK>) {
     let list = input.list;
     let both = input.newton == Newton::On;
-    for k in begin..end {
+    for k in pairs.clone() {
         let r = list.r[k];
         if r == 0.0 {
             continue;
         }
-        let scale = (block.conservative[k - begin] + block.thermostat[k - begin]) / r;
+        let scale = (block.conservative[k - pairs.start] + block.thermostat[k - pairs.start]) / r;
         let (i, j) = (list.i[k] as usize, list.j[k] as usize);
         let f = [scale * list.d[0][k], scale * list.d[1][k], scale * list.d[2][k]];
         let fi = &mut output.force[i];
@@ -315,16 +312,10 @@ fn share(input: &ForceInput, j: usize) -> f64 {
     if input.newton == Newton::On || j < input.owned { 1.0 } else { 0.5 }
 }
 
-fn tally_virial(
-    input: &ForceInput,
-    output: &mut ForceOutput,
-    begin: usize,
-    end: usize,
-    block: &Block<BLOCK>,
-) {
+fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, block: &Block<BLOCK>) {
     let list = input.list;
     let mut virials = [[0.0; 6]; 2];
-    for k in begin..end {
+    for k in pairs.clone() {
         let r = list.r[k];
         if r == 0.0 {
             continue;
@@ -333,8 +324,8 @@ fn tally_virial(
         let d = [list.d[0][k], list.d[1][k], list.d[2][k]];
         let dyad = [d[0] * d[0], d[1] * d[1], d[2] * d[2], d[0] * d[1], d[0] * d[2], d[1] * d[2]];
         let (inverse, share) = (1.0 / r, share(input, j));
-        let conservative = block.conservative[k - begin] * inverse;
-        let thermostat = block.thermostat[k - begin] * inverse;
+        let conservative = block.conservative[k - pairs.start] * inverse;
+        let thermostat = block.thermostat[k - pairs.start] * inverse;
         for c in 0..6 {
             virials[0][c] += share * conservative * dyad[c];
             virials[1][c] += share * thermostat * dyad[c];
@@ -358,18 +349,12 @@ fn tally_virial(
     }
 }
 
-fn tally_energy(
-    input: &ForceInput,
-    output: &mut ForceOutput,
-    begin: usize,
-    end: usize,
-    block: &Block<BLOCK>,
-) {
+fn tally_energy(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, block: &Block<BLOCK>) {
     let list = input.list;
     let (mut excess, mut pair) = (0.0, 0.0);
-    for k in begin..end {
+    for k in pairs.clone() {
         let (i, j) = (list.i[k] as usize, list.j[k] as usize);
-        let at = k - begin;
+        let at = k - pairs.start;
         let both = input.newton == Newton::On || j < input.owned;
         let excess_j = if both { block.excess_j[at] } else { 0.0 };
         excess += block.excess_i[at] + excess_j;

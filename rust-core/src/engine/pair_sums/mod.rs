@@ -21,7 +21,6 @@ mod forces;
 mod free_energy;
 mod in_box;
 mod listed;
-mod memory;
 mod pairs;
 mod search;
 mod single;
@@ -56,7 +55,7 @@ use special::scale;
 
 /// The forces of one fluid over a list of pairs, with all results that a host may ask for, and
 /// the arrays of the computation.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct PairSums {
     plan: Plan,
     kinds: Vec<i32>,
@@ -76,7 +75,8 @@ pub struct PairSums {
     particle_energy: Vec<f64>,
     particle_virial: Vec<[f64; 6]>,
     excess_pass: ExcessPass,
-    counts: PassCounts,
+    /// Number of runs of each pass.
+    pub counts: PassCounts,
     owned: usize,
 }
 
@@ -84,30 +84,7 @@ impl PairSums {
     /// Creates the sums of a given plan; types are species indices unless [`PairSums::map_kinds`] maps them.
     pub fn of_plan(plan: Plan) -> PairSums {
         let kinds = (0..plan.species.len() as i32).collect();
-        PairSums {
-            plan,
-            kinds,
-            search: CellSearch::default(),
-            box_search: BoxSearch::default(),
-            pairs: Pairs::default(),
-            special: Vec::new(),
-            exclusions: Exclusions::default(),
-            species: Vec::new(),
-            densities: Vec::new(),
-            has_all_densities: false,
-            excess: Vec::new(),
-            slopes: Vec::new(),
-            particle_energy: Vec::new(),
-            particle_virial: Vec::new(),
-            excess_pass: ExcessPass::default(),
-            counts: PassCounts::default(),
-            owned: 0,
-        }
-    }
-
-    /// Number of runs of each pass.
-    pub fn counts(&self) -> PassCounts {
-        self.counts
+        PairSums { plan, kinds, ..PairSums::default() }
     }
 
     /// Numbers of evaluations of ψ with a density below its bounds, and above, since the sums were
@@ -122,9 +99,7 @@ impl PairSums {
     /// # Errors
     /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        if kinds.iter().any(|s| *s >= self.plan.species.len() as i32) {
-            return Err(EngineError::Host("a type is mapped to a species the model does not have"));
-        }
+        self.plan.check_kinds(kinds)?;
         self.kinds = kinds.to_vec();
         Ok(())
     }
@@ -133,10 +108,22 @@ impl PairSums {
     /// cut-off two particles must meet in one image only. The marks of `exclusions` exclude further
     /// pairs. Pairs that a host lists have their factors in its list.
     pub(super) fn set_special_pairs(&mut self, special: &[SpecialPair], exclusions: &Exclusions) {
-        let marks = exclusions.marks().iter().copied();
-        self.exclusions.mark(marks, exclusions.between_molecules());
+        let marks = exclusions.marks.iter().copied();
+        self.exclusions.mark(marks, exclusions.between_molecules);
         self.special.clear();
         self.special.extend_from_slice(special);
+    }
+
+    /// Size in bytes of the arrays over particles and pairs, without the cells of the search.
+    pub fn memory(&self) -> usize {
+        let PairSums { pairs, species, densities, excess, slopes, particle_energy, particle_virial, .. } =
+            self;
+        let numbers = [densities, excess, slopes, particle_energy].map(Vec::capacity).iter().sum::<usize>();
+        pairs.force.bytes()
+            + pairs.density_only.bytes()
+            + species.capacity() * size_of::<i32>()
+            + numbers * size_of::<f64>()
+            + particle_virial.capacity() * size_of::<[f64; 6]>()
     }
 
     /// Finds the pairs of another configuration.
@@ -178,7 +165,7 @@ impl PairSums {
                 add_listed(&listed, particles, species, dimensions, cutoff, pairs)?;
             }
         }
-        if !self.special.is_empty() || !self.exclusions.marks().is_empty() {
+        if !self.special.is_empty() || !self.exclusions.marks.is_empty() {
             self.exclusions.check(species.len())?;
             let domain = match surroundings {
                 Surroundings::Box(domain) => domain,
@@ -198,9 +185,7 @@ impl PairSums {
         self.species.clear();
         for ((kind, tag), x) in particles.kind.iter().zip(particles.tag).zip(particles.x) {
             let species = usize::try_from(*kind).ok().and_then(|k| self.kinds.get(k));
-            let Some(species) = species else {
-                return Err(EngineError::Kind { tag: *tag, kind: *kind });
-            };
+            let Some(species) = species else { return Err(EngineError::Kind { tag: *tag, kind: *kind }) };
             if *tag < 1 {
                 return Err(EngineError::Tag { tag: *tag });
             }
@@ -298,7 +283,7 @@ impl Evaluate for PairSums {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
         let thermostat = self.plan.noise_of(step, v, all)?;
-        let newton = self.pairs.newton();
+        let newton = self.pairs.newton;
         if force.len() < (if newton == Newton::On { all } else { self.owned }) {
             return Err(EngineError::Host("the force array is too short"));
         }
@@ -314,7 +299,7 @@ impl Evaluate for PairSums {
         self.counts.virial += (want.virial || want.particle_virial) as u64;
         let input = ForceInput {
             plan: &self.plan,
-            list: self.pairs.force(),
+            list: &self.pairs.force,
             newton,
             owned: self.owned,
             slopes: &self.slopes,

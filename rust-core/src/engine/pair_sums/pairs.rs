@@ -6,11 +6,11 @@ use crate::engine::surroundings::Newton;
 #[derive(Debug, Clone, Default)]
 pub struct Pairs {
     owned: usize,
-    newton: Newton,
+    pub newton: Newton,
     /// Pairs whose force is computed here.
-    force: PairList,
+    pub force: PairList,
     /// Pairs that only contribute to the density of the owned particle.
-    density_only: PairList,
+    pub density_only: PairList,
 }
 
 /// Parallel arrays over pairs. `d = r_i − r_j`.
@@ -72,9 +72,7 @@ impl PairList {
         self.j.push(j as u32);
         self.species_i.push(a as u8);
         self.species_j.push(b as u8);
-        for c in 0..3 {
-            self.d[c].push(d[c]);
-        }
+        (0..3).for_each(|c| self.d[c].push(d[c]));
         self.r.push((d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
     }
 }
@@ -118,23 +116,9 @@ impl Pairs {
         list.factor.push(factor);
     }
 
-    /// The pairs whose force is computed here.
-    pub fn force(&self) -> &PairList {
-        &self.force
-    }
-
-    /// The pairs whose force another rank, or another image, computes.
-    pub fn density_only(&self) -> &PairList {
-        &self.density_only
-    }
-
     /// Both lists, for factors that are set after all pairs are found.
     pub fn lists_mut(&mut self) -> [&mut PairList; 2] {
         [&mut self.force, &mut self.density_only]
-    }
-
-    pub fn newton(&self) -> Newton {
-        self.newton
     }
 }
 

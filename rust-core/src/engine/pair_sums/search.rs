@@ -98,9 +98,7 @@ impl CellSearch {
             self.cell_of.push(cell as u32);
             self.start[cell + 1] += 1;
         }
-        for cell in 0..total {
-            self.start[cell + 1] += self.start[cell];
-        }
+        (0..total).for_each(|cell| self.start[cell + 1] += self.start[cell]);
         self.order.clear();
         self.order.resize(count, 0);
         for c in 0..3 {

@@ -26,7 +26,7 @@ impl PairSums {
         list.push(0, 1, [r, 0.0, 0.0], &[a, b]);
         let input = ForceInput::conservative(&self.plan, &list, 2, &both);
         let mut pair = Block::<1>::new();
-        pair.conserve(&input, 0, 1, true);
+        pair.conserve(&input, 0..1, true);
         (pair.excess_i[0] + pair.excess_j[0] + pair.pair[0], pair.conservative[0])
     }
 }

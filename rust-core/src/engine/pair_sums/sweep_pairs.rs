@@ -74,7 +74,7 @@ impl SweepPairs {
             return false;
         }
         let places = Places::new(*dimensions, domain, x, lists.order());
-        let images = places.images();
+        let images = places.images;
         for PlanePairs { own, lists, .. } in planes {
             for (i, of_i) in pairs_of_each(&lists.own.start) {
                 for pair in &lists.own.pairs[of_i] {
@@ -137,7 +137,7 @@ mod tests {
             let mut pairs = Pairs::default();
             pairs.clear(x.len(), Newton::On);
             assert!(SweepPairs::new(&fluid).find(&x, &species, &domain, &mut pairs));
-            let list = pairs.force();
+            let list = pairs.force;
             let signed =
                 |i: usize, j: usize, d: [f64; 3]| if i < j { (i, j, d) } else { (j, i, d.map(|c| -c)) };
             let d = |k: usize| list.d.each_ref().map(|d| d[k]);
@@ -162,6 +162,6 @@ mod tests {
         let narrow = PeriodicBox::orthogonal([0.0; 3], [1.7, 4.0, 4.0], [true; 3]).unwrap();
         assert!(!search.find(&[[0.5; 3]], &[0], &narrow, &mut pairs));
         assert!(!search.find(&[[f64::NAN, 0.5, 0.5]], &[0], &wide, &mut pairs));
-        assert!(search.find(&[], &[], &wide, &mut pairs) && pairs.force().len() == 0);
+        assert!(search.find(&[], &[], &wide, &mut pairs) && pairs.force.len() == 0);
     }
 }

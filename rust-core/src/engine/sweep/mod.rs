@@ -26,8 +26,9 @@ pub use times::Times;
 use super::counts::PassCounts;
 use super::error::EngineError;
 use super::exclusions::Exclusions;
-use super::particles::{Particles, Step};
+use super::particles::Particles;
 use super::plan::Plan;
+use super::request::Request;
 use super::surroundings::Around;
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -36,10 +37,9 @@ use psidpd_passes::ground::arithmetic::{Double, Mixed};
 use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::noise::PairNoise;
 use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
-use psidpd_passes::tally::{Tally, Want};
+use psidpd_passes::tally::Tally;
 use region::{can_stretch, is_open, region};
 use std::sync::Arc;
 use std::time::Instant;
@@ -49,23 +49,27 @@ use workspace::{ForceSink, Input, Workspace};
 /// The forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. With ghosts a host
 /// calls [`Sweep::first`], copies slopes from owners to ghosts, and calls [`Sweep::second`].
 pub struct Sweep {
-    plan: Plan,
-    settings: Settings,
+    /// The plan of the fluid's passes.
+    pub plan: Plan,
+    /// The settings, with the instruction set in use.
+    pub settings: Settings,
     set: InstructionSet,
-    pool: Arc<Pool>,
+    /// The pool of threads.
+    pub pool: Arc<Pool>,
     workspace: EitherPrecision,
     species_of_type: Vec<i32>,
     /// Additions to the densities of owned particles in the next evaluation: a row of
     /// [`Plan::slope_width`] for each, or an empty list.
     added_densities: Vec<f64>,
     /// Pairs that do not interact.
-    exclusions: Exclusions,
-    /// Slopes in the host's order, if it has ghosts.
-    slopes: Vec<f64>,
+    pub(super) exclusions: Exclusions,
+    /// Slopes `∂ψ/∂n` of owned particles, [`Plan::slope_width`] each, followed by those of ghosts, which the host writes after
+    /// [`Sweep::first`]; empty after [`Sweep::evaluate`].
+    pub slopes: Vec<f64>,
     owned: usize,
     all: usize,
-    want: Want,
-    times: Times,
+    /// Times of the parts of evaluations.
+    pub times: Times,
     ready: bool,
     /// The pairs that the next evaluation is asked to list.
     asked: Option<ListTerms>,
@@ -135,32 +139,11 @@ impl Sweep {
             slopes: Vec::new(),
             owned: 0,
             all: 0,
-            want: Want::FORCES,
             times: Times::default(),
             ready: false,
             asked: None,
             has_listed: false,
         }
-    }
-
-    /// The plan of the fluid's passes.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
-    /// The settings, with the instruction set in use.
-    pub fn settings(&self) -> Settings {
-        self.settings
-    }
-
-    /// Times of the parts of evaluations.
-    pub fn times(&self) -> Times {
-        self.times
-    }
-
-    /// The pool of threads.
-    pub fn pool(&self) -> &Arc<Pool> {
-        &self.pool
     }
 
     /// Counts of the passes since the sweep was created: search groups, batches of pairs (for each
@@ -181,9 +164,7 @@ impl Sweep {
     /// # Errors
     /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, species_of_type: &[i32]) -> Result<(), EngineError> {
-        if species_of_type.iter().any(|s| *s >= self.plan.species.len() as i32) {
-            return Err(EngineError::Host("a type is mapped to a species the model does not have"));
-        }
+        self.plan.check_kinds(species_of_type)?;
         self.species_of_type = species_of_type.to_vec();
         Ok(())
     }
@@ -192,16 +173,6 @@ impl Sweep {
     /// owned particles, a row of [`Plan::slope_width`] for each, or an empty list.
     pub(super) fn beside_mut(&mut self) -> (&Plan, &[i32], &mut Exclusions, &mut Vec<f64>) {
         (&self.plan, &self.species_of_type, &mut self.exclusions, &mut self.added_densities)
-    }
-
-    /// The excluded pairs.
-    pub(super) fn exclusions(&self) -> &Exclusions {
-        &self.exclusions
-    }
-
-    /// The excluded pairs, for changes.
-    pub(super) fn exclusions_mut(&mut self) -> &mut Exclusions {
-        &mut self.exclusions
     }
 
     /// Whether particles in `domain` are near at most one image of each other, as a sweep without
@@ -219,26 +190,21 @@ impl Sweep {
     /// returns the requested totals. Only densities and ψ are stored for all particles: each plane of
     /// cells passes through all steps in turn.
     ///
-    /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative
-    /// forces are computed. Of `want` the sweep computes the totals only;
+    /// Of what the request wants the sweep computes the totals only;
     /// [the sums over pairs](super::pair_sums) computes energies and virials of single particles.
     ///
     /// # Errors
     /// Fails for a position, ψ or force that is not finite, when some forces may have been written; also for
     /// a tag or type out of range, arrays of different lengths, ghosts, and a box that does not fit.
-    #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
         domain: &PeriodicBox,
-        particles: &Particles,
-        v: &[[f64; 3]],
-        step: Option<Step>,
-        want: Want,
+        request: &Request,
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
-        particles.check_no_ghosts()?;
-        self.run(Around { domain, images: &[] }, particles, v, step, want, force, add)?;
+        request.particles.check_no_ghosts()?;
+        self.run(Around { domain, images: &[] }, request, force, add)?;
         self.slopes.clear();
         Ok(with!(&self.workspace, m => m.tally()))
     }
@@ -248,17 +214,13 @@ impl Sweep {
     ///
     /// # Errors
     /// Fails as [`Sweep::evaluate`], except that there may be ghosts.
-    #[allow(clippy::too_many_arguments)]
     pub fn first(
         &mut self,
         around: Around,
-        particles: &Particles,
-        v: &[[f64; 3]],
-        step: Option<Step>,
-        want: Want,
+        request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<(), EngineError> {
-        self.run(around, particles, v, step, want, force, true)?;
+        self.run(around, request, force, true)?;
         let mut since = Instant::now();
         with!(&self.workspace, m => m.slopes_to_host(&self.pool, &mut self.slopes));
         lap(&mut since, &mut self.times.excess);
@@ -267,24 +229,25 @@ impl Sweep {
     }
 
     /// Sorts the particles, and runs all passes.
-    #[allow(clippy::too_many_arguments)]
     fn run(
         &mut self,
         Around { domain, images }: Around,
-        particles: &Particles,
-        v: &[[f64; 3]],
-        step: Option<Step>,
-        want: Want,
+        request: &Request,
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<(), EngineError> {
-        let thermostat = self.begin(particles, v, step, want)?;
+        let Request { particles, v, step, want } = *request;
+        self.ready = false;
+        // Thirty-two times an index must fit into a word; copies of a plane have indices too.
+        particles.check(26)?;
+        (self.owned, self.all) = (particles.owned, particles.x.len());
+        let thermostat = self.plan.noise_of(step, v, self.all)?;
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
         }
         particles.check_images(images)?;
         let input =
-            Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
+            Input::new(&particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
                 .excluding(&self.exclusions);
         let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
         let listed = self.asked.take().filter(|_| can_list);
@@ -322,7 +285,7 @@ impl Sweep {
         let has_listed = std::mem::take(&mut self.has_listed);
         if has_listed {
             with!(&mut self.workspace, m => {
-                let cells = m.sorted();
+                let cells = &m.order;
                 planes.resize_with(cells.grid.planes, PlanePairs::default);
                 planes.iter_mut().enumerate().for_each(|(k, plane)| plane.lie_in(cells, k));
                 lists.follow(cells);
@@ -332,44 +295,11 @@ impl Sweep {
         has_listed
     }
 
-    /// Checks the input of an evaluation, and stores its sizes; returns the thermostat, if it acts.
-    fn begin(
-        &mut self,
-        particles: &Particles,
-        v: &[[f64; 3]],
-        step: Option<Step>,
-        want: Want,
-    ) -> Result<Option<(PairNoise, f64)>, EngineError> {
-        self.ready = false;
-        // Thirty-two times an index must fit into a word; copies of a plane have indices too.
-        particles.check(26)?;
-        let all = particles.x.len();
-        let thermostat = self.plan.noise_of(step, v, all)?;
-        (self.owned, self.all, self.want) = (particles.owned, all, want);
-        Ok(thermostat)
-    }
-
-    /// Number of slopes per particle that a host copies to ghosts: [`Plan::slope_width`].
-    pub fn slope_width(&self) -> usize {
-        self.plan.slope_width()
-    }
-
-    /// Slopes `∂ψ/∂n` of owned particles, followed by those of ghosts, after [`Sweep::first`];
-    /// empty after [`Sweep::evaluate`].
-    pub fn slopes(&self) -> &[f64] {
-        &self.slopes
-    }
-
     /// Copies the slopes of owned particles after [`Sweep::evaluate`], with room for `all`, for the
     /// energies and forces of single pairs.
     pub fn fetch_slopes(&mut self, all: usize) {
         with!(&self.workspace, m => m.slopes_to_host(&self.pool, &mut self.slopes));
-        self.slopes.resize(self.slope_width() * all, 0.0);
-    }
-
-    /// The slopes, for the host to write those of ghosts.
-    pub fn slopes_mut(&mut self) -> &mut Vec<f64> {
-        &mut self.slopes
+        self.slopes.resize(self.plan.slope_width() * all, 0.0);
     }
 
     /// Adds to `force`, which [`Sweep::first`] has added to, the many-body forces of pairs with ghosts, and

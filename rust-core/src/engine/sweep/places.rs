@@ -15,7 +15,8 @@ pub struct Places<'a> {
     dimensions: usize,
     x: &'a [[f64; 3]],
     order: &'a [u32],
-    images: Images,
+    /// The periods of the box.
+    pub images: Images,
 }
 
 /// The periods of a box at least twice as wide as the range.
@@ -56,11 +57,6 @@ impl Places<'_> {
     pub fn host(&self, k: usize) -> usize {
         let n = self.order.len();
         self.order[if k < n { k } else { k - n }] as usize
-    }
-
-    /// The periods of the box.
-    pub fn images(&self) -> Images {
-        self.images
     }
 }
 

@@ -109,9 +109,9 @@ fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm, factor: f64) {
                 terms.soft.len() - 1
             });
             for p in entries {
-                terms.soft[at].strength[p] = T::of(factor * form.strength());
+                terms.soft[at].strength[p] = T::of(factor * form.strength);
                 terms.soft[at].inverse_range[p] = T::of(inverse(form.range()));
-                terms.soft[at].energy[p] = T::of(0.5 * form.strength() * form.range());
+                terms.soft[at].energy[p] = T::of(0.5 * form.strength * form.range());
             }
         }
         PairPotential::Spline(form) => {
@@ -135,9 +135,9 @@ fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm, factor: f64) {
 
 fn set_spline<T: Scalar>(table: &mut Spline<T>, form: &SplineAttractive, entries: [usize; 2]) {
     for p in entries {
-        table.repulsion[p] = T::of(form.repulsion());
-        table.attraction[p] = T::of(form.attraction());
-        table.repulsion_inverse_range[p] = T::of(inverse(form.repulsion_range()));
-        table.attraction_inverse_range[p] = T::of(inverse(form.attraction_range()));
+        table.repulsion[p] = T::of(form.repulsion);
+        table.attraction[p] = T::of(form.attraction);
+        table.repulsion_inverse_range[p] = T::of(inverse(form.repulsion_range));
+        table.attraction_inverse_range[p] = T::of(inverse(form.attraction_range));
     }
 }

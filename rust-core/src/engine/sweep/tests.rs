@@ -1,5 +1,5 @@
 use super::*;
-use crate::engine::{Engine, Images, Instructions, Request};
+use crate::engine::{Engine, Images, Instructions, Step, Want};
 use crate::maximum::largest;
 use crate::model::Model;
 use nalgebra::Matrix3;
@@ -84,8 +84,14 @@ fn every() -> impl Iterator<Item = (Precision, Instructions)> {
 fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
-    let tally =
-        sweep.evaluate(&cloud.domain, &particles, &cloud.v, Some(STEP), want, &mut force, false).unwrap();
+    let tally = sweep
+        .evaluate(
+            &cloud.domain,
+            &Request { particles, v: &cloud.v, step: Some(STEP), want },
+            &mut force,
+            false,
+        )
+        .unwrap();
     (force, tally)
 }
 
@@ -366,7 +372,7 @@ fn avx512_gives_the_same_bits_with_vbmi2_and_without() {
         let forces: Vec<_> = sets
             .map(|i| {
                 let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, i, 1)).unwrap();
-                assert_eq!(sweep.settings().instructions, i);
+                assert_eq!(sweep.settings.instructions, i);
                 swept(&mut sweep, &cloud, Want::TOTALS)
             })
             .collect();
@@ -401,7 +407,7 @@ fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
             assert!(off < tolerance(Precision::Double), "{planes} planes, periodic {periodic}: {off:.1e}");
             for sweep in &mut engines {
                 let (here, totals) = swept(sweep, &cloud, Want::TOTALS);
-                assert!(here == first && totals == first_tally, "{planes} planes, {:?}", sweep.settings());
+                assert!(here == first && totals == first_tally, "{planes} planes, {:?}", sweep.settings);
             }
         }
     }
@@ -533,10 +539,12 @@ fn what_cannot_be_computed_is_named() {
         let mut fails = |cloud: &Cloud, domain: Option<&PeriodicBox>| {
             let (particles, v, want) = (cloud.particles(), &cloud.v, Want::FORCES);
             let error = match domain {
-                Some(domain) => {
-                    sweep.evaluate(domain, &particles, v, Some(STEP), want, &mut force, false).unwrap_err()
-                }
-                None => sweep.first(open, &particles, v, Some(STEP), want, &mut force).unwrap_err(),
+                Some(domain) => sweep
+                    .evaluate(domain, &Request { particles, v, step: Some(STEP), want }, &mut force, false)
+                    .unwrap_err(),
+                None => sweep
+                    .first(open, &Request { particles, v, step: Some(STEP), want }, &mut force)
+                    .unwrap_err(),
             };
             assert!(sweep.second(&particles, &mut force).is_err());
             error
@@ -565,7 +573,12 @@ fn what_cannot_be_computed_is_named() {
         cloud.x[4] = cloud.x[3].map(|x| x + 0.01);
         let particles = cloud.particles();
         let error = sweep
-            .evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force, false)
+            .evaluate(
+                &domain,
+                &Request { particles, v: &cloud.v, step: Some(STEP), want: Want::FORCES },
+                &mut force,
+                false,
+            )
             .unwrap_err();
         assert!(matches!(error, EngineError::Force { .. }), "{error}");
     }
@@ -585,7 +598,12 @@ fn faults_of_the_passes_name_their_particles() {
             let particles = cloud.particles();
             let mut force = vec![[0.0; 3]; cloud.x.len()];
             sweep
-                .evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force, false)
+                .evaluate(
+                    &domain,
+                    &Request { particles, v: &cloud.v, step: Some(STEP), want: Want::FORCES },
+                    &mut force,
+                    false,
+                )
                 .unwrap_err()
         };
         for plane in 0..9 {
@@ -622,7 +640,14 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     assert!(first.search > 0 && first.force > 0 && first.noise > 0);
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; 300];
-    sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force, false).unwrap();
+    sweep
+        .evaluate(
+            &cloud.domain,
+            &Request { particles, v: &[], step: None, want: Want::TOTALS },
+            &mut force,
+            false,
+        )
+        .unwrap();
     let second = sweep.counts();
     assert_eq!((second.search, second.force), (2 * first.search, 2 * first.force));
     // The energy of every batch is summed, and no noise drawn.

@@ -48,7 +48,8 @@ use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 /// Arrays in the order of cells, and scratch arrays of the passes.
 pub struct Workspace<P: PairPrecision> {
     fluid: FluidConstants<P::Scalar>,
-    order: CellOrder,
+    /// The order of the particles.
+    pub order: CellOrder,
     particles: SortedParticles<P::PackedParticle>,
     excluded: ExcludedPairs,
     accumulators: AccumulatorArrays,
@@ -190,11 +191,6 @@ impl<P: PairPrecision> Workspace<P> {
         let mut slabs = results.split(order, units, fluid.width(), threads);
         let scheduler = &Scheduler { fluid, passes, order, data, particles, slopes, sums };
         work(scheduler, &mut slabs);
-    }
-
-    /// The order of the particles.
-    pub fn sorted(&self) -> &CellOrder {
-        &self.order
     }
 
     /// Gives lists, in the order of planes, to the threads that will need their memory.

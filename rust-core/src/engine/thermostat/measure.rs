@@ -47,7 +47,7 @@ impl PairThermostat {
         pool.each(planes, |PlanePairs { own, next, lists: Listed { own: list, with_ghosts } }| {
             let mut block = Block::new(&laws);
             let weigh = |block: &mut Block| {
-                vectors::run(set, Weigh { block, images: places.images(), laws: &laws });
+                vectors::run(set, Weigh { block, images: places.images, laws: &laws });
             };
             if is_exact && list.exact.is_empty() {
                 // Each is read often.

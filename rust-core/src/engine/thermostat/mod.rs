@@ -115,11 +115,11 @@ impl PairThermostat {
         let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
         Some(PairThermostat {
             plan: plan.thermostat.clone()?,
-            dimensions: plan.dimensions(),
+            dimensions: plan.dimensions,
             kt,
             dt: 0.0,
             set,
-            lists: PairLists::new(set, plan.dimensions()),
+            lists: PairLists::new(set, plan.dimensions),
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
             masses: Masses::default(),

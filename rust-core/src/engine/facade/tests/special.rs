@@ -206,7 +206,7 @@ fn marked_particles_act_as_those_of_a_list_without_their_pairs() {
                     &expected,
                 );
             }
-            let too_few = engine.plan().species().len();
+            let too_few = engine.plan().species.len();
             engine.set_exclusions((0..too_few).map(mark), between);
             let mut force = vec![[0.0; 3]; count];
             for pair_sums_only in [false, true] {

@@ -37,7 +37,8 @@ fn cloud(fluid: &Fluid) -> Cloud {
 fn evaluated(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
     let (particles, mut force) = (cloud.particles(), vec![[0.0; 3]; cloud.x.len()]);
     let (step, want) = (Some(STEP), Want::TOTALS);
-    let totals = sweep.evaluate(&cloud.domain, &particles, &cloud.v, step, want, &mut force, false);
+    let totals =
+        sweep.evaluate(&cloud.domain, &Request { particles, v: &cloud.v, step, want }, &mut force, false);
     (force, totals.unwrap())
 }
 

@@ -64,19 +64,25 @@ pub fn on_ranks(
     let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| cloud.domain.edge(k).into()));
     let domain = PeriodicBox::new(cloud.domain.origin(), edges, closed).unwrap();
     let count = sweeps.len();
-    let width = sweeps[0].slope_width();
+    let width = sweeps[0].plan.slope_width();
     let mut slopes = vec![0.0; n * width];
     let mut ranks = Vec::new();
     for (r, sweep) in sweeps.iter_mut().enumerate() {
-        let (dimensions, cutoff) = (sweep.plan().dimensions(), sweep.plan().cutoff());
+        let (dimensions, cutoff) = (sweep.plan.dimensions, sweep.plan.cutoff);
         let rank = Rank::new(cloud, dimensions, cutoff, [r, count, axis], closed);
         // Without images the array of flags is empty.
         let images = if closed == [false; 3] { &[] } else { &rank.images[..] };
         let around = Around { domain: &domain, images };
         let mut out = vec![[1.0; 3]; rank.owned];
-        sweep.first(around, &rank.particles(), &rank.v, Some(STEP), Want::TOTALS, &mut out).unwrap();
+        sweep
+            .first(
+                around,
+                &Request { particles: rank.particles(), v: &rank.v, step: Some(STEP), want: Want::TOTALS },
+                &mut out,
+            )
+            .unwrap();
         for k in 0..rank.owned {
-            slopes[width * rank.number[k]..][..width].copy_from_slice(&sweep.slopes()[width * k..][..width]);
+            slopes[width * rank.number[k]..][..width].copy_from_slice(&sweep.slopes[width * k..][..width]);
         }
         ranks.push((rank, out));
     }
@@ -84,7 +90,7 @@ pub fn on_ranks(
     let mut tally = Tally::default();
     for (sweep, (rank, mut out)) in sweeps.iter_mut().zip(ranks) {
         for (k, number) in rank.number.iter().enumerate() {
-            sweep.slopes_mut()[width * k..][..width].copy_from_slice(&slopes[width * number..][..width]);
+            sweep.slopes[width * k..][..width].copy_from_slice(&slopes[width * number..][..width]);
         }
         tally += sweep.second(&rank.particles(), &mut out).unwrap();
         for (number, f) in rank.number.iter().zip(out) {
@@ -154,8 +160,13 @@ fn what_is_around_a_rank_has_to_fit() {
     assert!(difference(&force, &here).max(tally_difference(&tally, &totals)) < tolerance(Precision::Mixed));
     let around = |domain, images| Around { domain, images };
     let mut force = vec![[0.0; 3]; cloud.x.len()];
-    let mut first =
-        |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES, &mut force);
+    let mut first = |around| {
+        sweep.first(
+            around,
+            &Request { particles: cloud.particles(), v: &cloud.v, step: Some(STEP), want: Want::FORCES },
+            &mut force,
+        )
+    };
     assert!(matches!(first(around(&half, &[])), Err(EngineError::Host(_))));
     assert!(matches!(first(around(&cloud.domain, &[true])), Err(EngineError::Host(_))));
     assert!(first(around(&cloud.domain, &[])).is_ok());

@@ -31,9 +31,9 @@ impl ExcludedPairs {
         if exclusions.has_partners() {
             self.fill_partners(order, exclusions);
         }
-        self.between_molecules = exclusions.between_molecules();
-        let marks = exclusions.marks();
-        let [by_rule, by_molecule] = exclusions.kinds();
+        self.between_molecules = exclusions.between_molecules;
+        let marks = &exclusions.marks;
+        let [by_rule, by_molecule] = exclusions.kinds;
         for (wanted, to, of) in [
             (by_rule, &mut self.sides, (|mark| mark.sides) as fn(&Mark) -> u32),
             (by_molecule, &mut self.molecules, |mark| mark.molecule),

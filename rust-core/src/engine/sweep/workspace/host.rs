@@ -14,7 +14,7 @@ impl<P: PairPrecision> Workspace<P> {
 
     /// Copies the slopes of owned particles to the order of the host; entries of ghosts are unspecified.
     pub fn slopes_to_host(&self, pool: &Pool, out: &mut Vec<f64>) {
-        let (width, slopes, order) = (self.fluid.width(), self.slopes.rows(), &self.order);
+        let (width, slopes, order) = (self.fluid.width(), &self.slopes.rows[..], &self.order);
         out.resize(width * order.all, 0.0);
         if width == 0 {
             return;

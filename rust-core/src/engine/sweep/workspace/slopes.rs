@@ -13,7 +13,7 @@ pub struct SlopeArrays<T> {
     /// Number of slopes of each particle.
     width: usize,
     /// A row for each particle.
-    rows: Vec<f64>,
+    pub rows: Vec<f64>,
     /// Copies in the precision of pairs, for the full pair cache: rows of eight slopes for all particles, then rows of the
     /// next eight …
     packed: Vec<T>,
@@ -37,11 +37,6 @@ impl<T: Scalar> SlopeArrays<T> {
         self.stride = SLOPES_PER_BLOCK * (total + VECTOR_PADDING);
         self.packed
             .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
-    }
-
-    /// The slopes, a row for each particle.
-    pub fn rows(&self) -> &[f64] {
-        &self.rows
     }
 
     /// Lends the slopes to the passes.

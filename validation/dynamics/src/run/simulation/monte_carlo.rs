@@ -70,7 +70,7 @@ impl Simulation {
             Some(energy) => energy,
             None => Box::new(LocalEnergy::new(&self.model().at(self.kt())?)?),
         };
-        let start = if energy.range() > 0.0 { 0.1 * energy.range() } else { longest };
+        let start = if energy.range > 0.0 { 0.1 * energy.range } else { longest };
         let most = max_move.or(self.monte_carlo.found).unwrap_or(start).min(longest);
         let (number, kt) = (self.number, self.kt());
         let failed = |source| RunError::Engine { step: number, source };

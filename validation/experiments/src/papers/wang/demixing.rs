@@ -71,7 +71,7 @@ mod tests {
         for first in [17.0, 19.0] {
             let text = SPLINE.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
             let fluid = Model::parse("model.toml", &text).unwrap().at(0.5).unwrap();
-            let found = psidpd_core::theory::MeanField::new(&fluid).unwrap().pair_integrals()[0];
+            let found = psidpd_core::theory::MeanField::new(&fluid).unwrap().pair_integrals[0];
             let integral = std::f64::consts::PI / 8.0 * (first * 0.8f64.powi(3) - 9.5);
             assert!((found - integral).abs() < 1e-9, "{found} {integral}");
         }
