@@ -146,8 +146,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
             .collect::<Result<Vec<_>, Failure>>()?;
         write_atomically(&out, &Image::to_gif(&images, DELAY).map_err(request)?)?;
         say!("{}", out.display());
-        write_json(json, &json!({"film": out, "frames": images.len(), "colours": ends}))?;
-        return Ok(Verdict::Good);
+        return conclude(json, &json!({"film": out, "frames": images.len(), "colours": ends}), true);
     }
     let configuration = open(a.frame.map_or(Which::Last, Which::Number))?;
     let values = values(a, model.as_ref(), &configuration)?;
@@ -159,11 +158,9 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     say!("{}", out.display());
     let particles = configuration.x.len();
     let colours = values.map(|_| ends);
-    write_json(
-        json,
-        &json!({"picture": out, "particles": particles, "step": configuration.step, "colours": colours}),
-    )?;
-    Ok(Verdict::Good)
+    let told =
+        json!({"picture": out, "particles": particles, "step": configuration.step, "colours": colours});
+    conclude(json, &told, true)
 }
 
 /// The lowest and the highest value.

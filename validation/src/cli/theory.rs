@@ -126,10 +126,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         say!("report: {}", path.display());
     }
     match all.as_slice() {
-        [single] => write_json(json, single)?,
-        several => write_json(json, &json!({"title": model.title(), "temperatures": several}))?,
+        [single] => conclude(json, single, defined),
+        several => conclude(json, &json!({"title": model.title(), "temperatures": several}), defined),
     }
-    Ok(if defined { Verdict::Good } else { Verdict::CheckFailed })
 }
 
 /// The answers at one temperature, and whether the pressure is defined.
