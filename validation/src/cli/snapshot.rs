@@ -2,7 +2,7 @@ use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_formats::{Configuration, FormatError, Frame, Which};
+use psidpd_formats::{Configuration, FormatError, Frame};
 use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
 use psidpd_report::Figure;
 
@@ -116,8 +116,8 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         return Err(request(format!("--offset must be a number, is {}", a.offset)));
     }
     let model = a.model.as_deref().map(Model::open).transpose()?;
-    let open = |which| -> Result<Configuration, Failure> {
-        let mut configuration = Configuration::open(&a.file, which)?;
+    let open = |number| -> Result<Configuration, Failure> {
+        let mut configuration = Configuration::open(&a.file, number)?;
         if let Some(model) = &model {
             configuration.name_species(model.species(), model.dimensions());
         }
@@ -128,7 +128,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let most = usize::from(a.frames).min(last + 1);
         // The last frame is always chosen.
         let chosen = (0..most).map(|k| (k * last) / (most - 1).max(1));
-        let frames = chosen.map(|k| open(Which::Number(k))).collect::<Result<Vec<_>, _>>()?;
+        let frames = chosen.map(|k| open(Some(k))).collect::<Result<Vec<_>, _>>()?;
         let values = frames.iter().map(|f| values(a, model.as_ref(), f)).collect::<Result<Vec<_>, _>>()?;
         let ends = ends(values.iter().flatten().flatten());
         let images = frames
@@ -148,7 +148,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         say!("{}", out.display());
         return conclude(json, &json!({"film": out, "frames": images.len(), "colours": ends}), true);
     }
-    let configuration = open(a.frame.map_or(Which::Last, Which::Number))?;
+    let configuration = open(a.frame)?;
     let values = values(a, model.as_ref(), &configuration)?;
     let ends = ends(values.iter().flatten());
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
