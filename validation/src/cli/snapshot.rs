@@ -1,4 +1,5 @@
 use super::*;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use psidpd_core::engine::check_reach;
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
@@ -22,8 +23,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// From where; two-dimensional systems are seen along z.
-    #[arg(long, value_enum, default_value_t = Eye::Oblique)]
-    view: Eye,
+    #[arg(long, default_value = "oblique", value_parser = view())]
+    view: View,
     /// Shows only particles in a slice of this thickness through the middle of the box, across the line of sight.
     #[arg(long, value_name = "LENGTH")]
     slice: Option<f64>,
@@ -68,23 +69,13 @@ enum Colour {
     Psi,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Eye {
-    Oblique,
-    X,
-    Y,
-    Z,
-}
-
-impl From<Eye> for View {
-    fn from(eye: Eye) -> View {
-        match eye {
-            Eye::Oblique => View::Oblique,
-            Eye::X => View::X,
-            Eye::Y => View::Y,
-            Eye::Z => View::Z,
-        }
-    }
+fn view() -> impl TypedValueParser<Value = View> {
+    PossibleValuesParser::new(["oblique", "x", "y", "z"]).map(|name| match name.as_str() {
+        "x" => View::X,
+        "y" => View::Y,
+        "z" => View::Z,
+        _ => View::Oblique,
+    })
 }
 
 impl Arguments {
@@ -227,7 +218,7 @@ fn figure(
         let kernel = kernel(a, model, frame.dimensions)?;
         within_reach(&frame, kernel.range())?;
         let options = FieldOptions {
-            view: a.view.into(),
+            view: a.view,
             offset: a.offset,
             kernel,
             species: a.species.as_deref().map(|name| index(name, frame.names)).transpose()?,
@@ -236,8 +227,7 @@ fn figure(
         let label = a.species.as_ref().map_or("n".to_owned(), |s| format!("n_{s}"));
         return Ok(Figure::field(&title, &label, &frame, &options));
     }
-    let options =
-        ParticleOptions { view: a.view.into(), slice: a.slice, offset: a.offset, radius: a.radius, size };
+    let options = ParticleOptions { view: a.view, slice: a.slice, offset: a.offset, radius: a.radius, size };
     let label = match a.colour {
         Colour::Density => "n",
         Colour::Speed => "speed",
