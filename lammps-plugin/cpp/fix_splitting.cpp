@@ -103,13 +103,6 @@ void FixSplitting::stop(const std::string &text, const char *file, int line)
   error->all(file, line, std::string("Fix ") + style + ": " + text);
 }
 
-FixSplitting *FixSplitting::find(const Modify *modify)
-{
-  for (int k = 0; k < modify->nfix; k++)
-    if (auto *fix = dynamic_cast<FixSplitting *>(modify->fix[k])) return fix;
-  return nullptr;
-}
-
 int FixSplitting::setmask()
 {
   return INITIAL_INTEGRATE | FINAL_INTEGRATE | PRE_FORCE | POST_RUN;

@@ -12,10 +12,6 @@
 #include <string>
 #include <vector>
 
-namespace LAMMPS_NS {
-class Modify;
-}
-
 namespace psidpd {
 
 class PairPsi;
@@ -28,13 +24,11 @@ class FixSplitting : public LAMMPS_NS::Fix {
   FixSplitting(const FixSplitting &) = delete;
   FixSplitting &operator=(const FixSplitting &) = delete;
 
-  // The fix of this style in the simulation, or null.
-  static FixSplitting *find(const LAMMPS_NS::Modify *modify);
-
   int setmask() override;
   void init() override;
   void setup(int vflag) override;
   void setup_pre_force(int vflag) override { pre_force(vflag); }
+  // Finds the atoms whose whole force other fixes set: drag and noise must not change their velocities either.
   void pre_force(int vflag) override;
   void initial_integrate(int vflag) override;
   void final_integrate() override;
@@ -81,8 +75,6 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void act();
   // Adds what other fixes add to forces.
   void add_forces(int vflag);
-  // Finds the atoms whose whole force other fixes set: drag and noise must not change their velocities either.
-  void find_held();
   // What a fix makes of forces that are `scale` times a probe.
   std::vector<double> replaced(LAMMPS_NS::Fix *fix, double scale);
 

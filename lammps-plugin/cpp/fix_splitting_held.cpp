@@ -32,11 +32,6 @@ bool replaces_forces(const char *style)
 
 void FixSplitting::pre_force(int)
 {
-  find_held();
-}
-
-void FixSplitting::find_held()
-{
   const int owned = atom->nlocal;
   held.assign(owned, 0);
   for (int k = 0; k < modify->nfix; k++) {

@@ -2,7 +2,7 @@
 
 use psidpd_core::model::Units;
 
-/// One unit of the model in units of LAMMPS.
+/// Units in terms of others: mostly one unit of the model in units of LAMMPS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     pub length: f64,
@@ -11,23 +11,16 @@ pub struct Scale {
     pub time: f64,
 }
 
-/// Units of LAMMPS, in SI.
-struct HostUnits {
-    length: f64,
-    energy: f64,
-    time: f64,
-}
-
-/// Units of <https://docs.lammps.org/units.html>: velocities are in length over time, forces in energy over length.
-fn host_units(name: &str) -> Option<HostUnits> {
+/// Units of <https://docs.lammps.org/units.html> in SI: velocities are in length over time, forces in energy over length.
+fn host_units(name: &str) -> Option<Scale> {
     const ANGSTROM: f64 = 1e-10;
     // Energies are per molecule; the constants are exact since 2019, as is the electronvolt.
     const KILOCALORIE_PER_MOLE: f64 = 4184.0 / 6.022_140_76e23;
     const ELECTRONVOLT: f64 = 1.602_176_634e-19;
     match name {
-        "real" => Some(HostUnits { length: ANGSTROM, energy: KILOCALORIE_PER_MOLE, time: 1e-15 }),
-        "metal" => Some(HostUnits { length: ANGSTROM, energy: ELECTRONVOLT, time: 1e-12 }),
-        "si" => Some(HostUnits { length: 1.0, energy: 1.0, time: 1.0 }),
+        "real" => Some(Scale { length: ANGSTROM, energy: KILOCALORIE_PER_MOLE, time: 1e-15 }),
+        "metal" => Some(Scale { length: ANGSTROM, energy: ELECTRONVOLT, time: 1e-12 }),
+        "si" => Some(Scale::ONE),
         _ => None,
     }
 }

@@ -2,7 +2,7 @@ use crate::engine::{settings, thread_count};
 use crate::errors::{RunStoppedError, exception, wrong};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use psidpd::experiments::sweep::{self as sweeps, Axis, Options};
-use psidpd::formats::{Configuration, Which};
+use psidpd::formats::Configuration;
 use psidpd::observe;
 use psidpd::report::{headline, write_run_report};
 use psidpd::run::{Begin, Outcome, Runner};
@@ -187,7 +187,7 @@ pub fn sweep(
 /// The positions of a data file, in the order of the particles' tags: shape (N, 3).
 #[pyfunction]
 pub fn read_positions(py: Python, path: PathBuf) -> PyResult<Bound<PyArray2<f64>>> {
-    let read = py.detach(|| Configuration::open(&path, Which::Last)).map_err(exception)?;
+    let read = py.detach(|| Configuration::open(&path, None)).map_err(exception)?;
     let mut order: Vec<usize> = (0..read.x.len()).collect();
     order.sort_by_key(|k| read.tag.get(*k).copied());
     let flat: Vec<f64> = order.iter().flat_map(|k| read.x[*k]).collect();

@@ -110,7 +110,7 @@ fn an_older_instance_gets_the_styles_by_registration() {
                   assert new.has_style('pair', 'dpd/psi') and not old.has_style('pair', 'dpd/psi')\n\
                   psidpd_lammps.register(old, sys.argv[1])\n\
                   old.file('in.lammps')\n";
-    let interpreter = host.python.as_ref().unwrap();
+    let interpreter = &host.root.join("bin/python");
     let mut command = Command::new(interpreter);
     command.args(["-c", python]).arg(plugin).env("PYTHONPATH", root().join("lammps-plugin/python"));
     command.env("PYTHONDONTWRITEBYTECODE", "1").env_remove("LAMMPS_PLUGIN_PATH");
@@ -171,7 +171,7 @@ fn the_loaded_file_needs_nothing_of_lammps() {
 #[test]
 fn metadata_need_no_compiler() {
     let folder = tempfile::tempdir().unwrap();
-    let python = lammps().0.python.as_ref().unwrap();
+    let python = lammps().0.root.join("bin/python");
     let code = "import backend, sys; print(backend.prepare_metadata_for_build_wheel(sys.argv[1]))";
     let out = Command::new(python)
         .args(["-c", code])

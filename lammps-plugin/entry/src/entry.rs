@@ -5,7 +5,7 @@
 //! when they are needed, by their names in its C interface.
 
 use crate::styles;
-use crate::table::Creator;
+use crate::table::{Creator, Styles};
 use crate::version;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
@@ -35,15 +35,15 @@ fn named(number: &str) -> String {
     number.parse().map_or_else(|_| number.to_owned(), |n| format!("{n} ({})", version::in_words(n)))
 }
 
-/// Why this plugin must not run in the LAMMPS at `lmp`; None if it was compiled for it.
+/// The styles, for the LAMMPS at `lmp`; the error says why they must not run there, or cannot be loaded.
 ///
 /// # Safety
 /// `lmp` is a LAMMPS instance.
-unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
+unsafe fn styles_for(lmp: *mut c_void) -> Result<&'static Styles, String> {
     let (Some(version), Some(setting)) =
         (styles::symbol(c"lammps_version"), styles::symbol(c"lammps_extract_setting"))
     else {
-        return Some(format!(
+        return Err(format!(
             "The psidpd plugin was built for LAMMPS {}, and does not find the functions of LAMMPS's C interface here.",
             named(BUILT_FOR)
         ));
@@ -63,18 +63,16 @@ unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
         // MPI handles differ in size, and so does the layout of every LAMMPS class that holds one.
         ("another MPI than this LAMMPS uses".to_owned(), "the two do not mix".to_owned())
     } else {
-        return None;
+        return styles::load().map_err(|reason| {
+            format!(
+                "The styles of psidpd are not loaded: {reason}. Build the plugin again with 'psidpd lammps plugin'."
+            )
+        });
     };
-    Some(format!(
+    Err(format!(
         "The psidpd plugin was built for {built}, {here}: its styles are not loaded. \
          Build the plugin for this LAMMPS with 'psidpd lammps plugin'."
     ))
-}
-
-fn not_loaded(reason: String) -> String {
-    format!(
-        "The styles of psidpd are not loaded: {reason}. Build the plugin again with 'psidpd lammps plugin'."
-    )
 }
 
 /// Registers the styles in a LAMMPS that has no `plugin` command: call it with the handle of the
@@ -86,20 +84,17 @@ fn not_loaded(reason: String) -> String {
 /// `lmp` is null or a LAMMPS instance of this process.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_char {
-    let table = if lmp.is_null() {
+    let styles = if lmp.is_null() {
         Err("psidpd_register: no LAMMPS instance".to_owned())
     } else {
         // SAFETY: the caller promises that `lmp` is null or an instance; null was refused above.
-        match unsafe { trouble(lmp) } {
-            Some(text) => Err(text),
-            None => styles::table().and_then(|table| Ok((table, styles::load()?))).map_err(not_loaded),
-        }
+        unsafe { styles_for(lmp) }
     };
-    match table {
-        Ok((table, styles)) => {
-            for style in styles {
-                // SAFETY: `trouble` found that the C++ was compiled for this LAMMPS; the function copies the name.
-                unsafe { (table.insert)(lmp, style.kind, style.name, style.creator) };
+    match styles {
+        Ok(styles) => {
+            for style in styles.all() {
+                // SAFETY: `styles_for` found that the C++ was compiled for this LAMMPS; the function copies the name.
+                unsafe { (styles.insert)(lmp, style.kind, style.name, style.creator) };
             }
             std::ptr::null()
         }
@@ -124,11 +119,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     register: *mut c_void,
 ) {
     // SAFETY: LAMMPS passes its own instance to this function.
-    let found = match unsafe { trouble(lmp) } {
-        Some(text) => Err(text),
-        None => styles::load().map_err(not_loaded),
-    };
-    let styles = match found {
+    let styles = match unsafe { styles_for(lmp) } {
         Ok(styles) => styles,
         Err(text) => {
             // SAFETY: LAMMPS passes its own instance to this function.
@@ -140,7 +131,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     let Some(register) = (unsafe { std::mem::transmute::<*mut c_void, Option<Register>>(register) }) else {
         return;
     };
-    for style in styles {
+    for style in styles.all() {
         let mut registration = Registration {
             version: version_text(),
             style: style.kind,

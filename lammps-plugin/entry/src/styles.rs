@@ -64,16 +64,15 @@ fn last_error() -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
-/// The styles. Call this only where they were built for the LAMMPS of this process: they need its symbols.
-pub fn load() -> Result<&'static [Style], String> {
-    table().map(|table| {
+impl Styles {
+    pub fn all(&self) -> &[Style] {
         // SAFETY: the second file states the length of its static array, and is never unloaded.
-        unsafe { std::slice::from_raw_parts(table.first, table.count) }
-    })
+        unsafe { std::slice::from_raw_parts(self.first, self.count) }
+    }
 }
 
-/// The whole table of the styles; the condition of [`load`] applies.
-pub fn table() -> Result<&'static Styles, String> {
+/// The styles. Call this only where they were built for the LAMMPS of this process: they need its symbols.
+pub fn load() -> Result<&'static Styles, String> {
     let path = folders().into_iter().map(|folder| folder.join(FILE)).find(|path| path.is_file()).ok_or_else(
         || format!("{FILE} is not in the folder of psidpdplugin.so: keep both files in one folder"),
     )?;

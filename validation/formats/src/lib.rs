@@ -26,6 +26,6 @@ pub use error::FormatError;
 pub use files::WriteError;
 pub use frame::Frame;
 pub use gsd::GsdFile;
-pub use open::{Which, domain};
+pub use open::domain;
 pub use vtk::{Grid, write_vti, write_vtp};
 pub use xyz::{read_xyz, write_xyz};

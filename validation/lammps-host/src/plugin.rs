@@ -366,7 +366,6 @@ mod tests {
             mpirun: None,
             lmp: dir.join("lmp"),
             library_path: vec![],
-            python: None,
             yields: false,
         }
     }

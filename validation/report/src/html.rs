@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use super::table::{Table, Verdict};
+use super::table::{Table, verdict};
 use super::text::escape;
 use super::{Plot, ReportError};
 
@@ -126,11 +126,7 @@ fn render_table(table: &Table) -> String {
     let cells = |tag: &str, row: &[String]| -> String {
         let cell = |(column, &right): (usize, &bool)| {
             let text = row.get(column).map_or("", String::as_str);
-            let verdict = match Verdict::of(text) {
-                Some(Verdict::Pass) => "pass",
-                Some(Verdict::Fail) => "fail",
-                None => "",
-            };
+            let verdict = verdict(text).map_or("", |passed| if passed { "pass" } else { "fail" });
             let align = if right { "num" } else { "" };
             let class = format!("{align} {verdict}");
             format!("<{tag} class=\"{}\">{}</{}>", class.trim(), escape(text), &tag[..2])

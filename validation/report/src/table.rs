@@ -74,11 +74,7 @@ impl Table {
             out += &line(&rules, &|_| Some("2"));
         }
         for row in &self.rows {
-            out += &line(row, &|cell| match Verdict::of(cell) {
-                Some(Verdict::Pass) => Some("1;32"),
-                Some(Verdict::Fail) => Some("1;31"),
-                None => None,
-            });
+            out += &line(row, &|cell| verdict(cell).map(|passed| if passed { "1;32" } else { "1;31" }));
         }
         out
     }
@@ -107,20 +103,12 @@ impl Table {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
-    Pass,
-    Fail,
-}
-
-impl Verdict {
-    /// Reads a cell in upper or lower case.
-    pub fn of(cell: &str) -> Option<Self> {
-        match cell.trim().to_ascii_lowercase().as_str() {
-            "pass" | "passed" => Some(Self::Pass),
-            "fail" | "failed" => Some(Self::Fail),
-            _ => None,
-        }
+/// Whether a cell, in upper or lower case, says that a check passed or failed; `None` if it says neither.
+pub(super) fn verdict(cell: &str) -> Option<bool> {
+    match cell.trim().to_ascii_lowercase().as_str() {
+        "pass" | "passed" => Some(true),
+        "fail" | "failed" => Some(false),
+        _ => None,
     }
 }
 

@@ -57,22 +57,9 @@ pub(super) fn fit(text: &str, size: f64, room: f64) -> String {
 }
 
 pub(super) fn superscript(n: i32) -> String {
-    n.to_string()
-        .chars()
-        .map(|c| match c {
-            '-' => '⁻',
-            '1' => '¹',
-            '2' => '²',
-            '3' => '³',
-            '4' => '⁴',
-            '5' => '⁵',
-            '6' => '⁶',
-            '7' => '⁷',
-            '8' => '⁸',
-            '9' => '⁹',
-            _ => '⁰',
-        })
-        .collect()
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
+    n.to_string().chars().map(raised).collect()
 }
 
 /// Powers as superscripts: `r_c^-3` becomes `r_c⁻³`. Other exponents stay unchanged.

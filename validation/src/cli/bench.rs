@@ -128,8 +128,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         say!("the machine was busy before (load {load:.1}): do not trust these figures\n");
     }
     say!("report: {}", arguments.out.join("report.html").display());
-    write_json(json, &outcome)?;
-    Ok(Verdict::Good)
+    conclude(json, &outcome, true)
 }
 
 #[cfg(not(feature = "gpu"))]
@@ -154,6 +153,5 @@ fn time_device(device: Device, arguments: &Arguments, json: Option<&Path>) -> Re
     say::table(&outcome.table());
     say!("nanoseconds per particle and step, by the clock of the device:");
     say::table(&outcome.kernels());
-    write_json(json, &outcome)?;
-    Ok(Verdict::Good)
+    conclude(json, &outcome, true)
 }

@@ -155,8 +155,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         );
     }
     say!("written to {}", a.out.display());
-    write_json(json, &found)?;
-    Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
+    conclude(json, &found, found.converged)
 }
 
 /// The command line that repeats the calibration.

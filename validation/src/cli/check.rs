@@ -89,8 +89,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         findings.warnings.insert(0, Warning { id, severity: Severity::Error, message });
     }
     print(&findings, model.species());
-    write_json(json, &findings)?;
-    Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })
+    conclude(json, &findings, findings.works())
 }
 
 fn duration(seconds: f64) -> String {

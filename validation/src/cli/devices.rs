@@ -21,6 +21,5 @@ pub fn run(_: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         table.push([device, name, kind, interface, driver]);
     }
     say::table(&table);
-    write_json(json, &Report { devices: &devices })?;
-    Ok(Verdict::Good)
+    conclude(json, &Report { devices: &devices }, true)
 }

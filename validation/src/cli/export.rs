@@ -76,8 +76,7 @@ fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failu
     let files = deck::write(&scene, &a.out)?;
     say!("written to {}; run it there:", a.out.display());
     say!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
-    write_json(json, &json!({"folder": a.out, "files": files}))?;
-    Ok(Verdict::Good)
+    conclude(json, &json!({"folder": a.out, "files": files}), true)
 }
 
 fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -88,6 +87,5 @@ fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out)?;
     say!("{}", out.display());
     say!("pair_style eam/alloy\npair_coeff * * {} {}", out.display(), fluid.species.join(" "));
-    write_json(json, &json!({"table": out, "species": fluid.species}))?;
-    Ok(Verdict::Good)
+    conclude(json, &json!({"table": out, "species": fluid.species}), true)
 }

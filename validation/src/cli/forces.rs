@@ -68,6 +68,5 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     table.push(["root mean square force".to_owned(), format!("{:.12e}", size.sqrt())]);
     say::table(&table);
-    write_json(json, &forces)?;
-    Ok(Verdict::Good)
+    conclude(json, &forces, true)
 }

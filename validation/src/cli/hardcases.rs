@@ -23,7 +23,7 @@ pub struct Arguments {
     pub(super) fault: Option<Fault>,
 }
 
-pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure> {
+pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let extent = match (a.quick, a.full) {
         (true, _) => Extent::Quick,
         (_, true) => Extent::Full,
@@ -37,6 +37,5 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure
         say!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host.name(), v.integrator, v.precision, v.must);
     }
     say!("{} of {} cases as expected", found.len() - wrong.len(), found.len());
-    write_json(json, &found)?;
-    Ok(if wrong.is_empty() { super::Verdict::Good } else { super::Verdict::CheckFailed })
+    conclude(json, &found, wrong.is_empty())
 }

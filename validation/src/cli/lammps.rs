@@ -53,7 +53,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             say!("LAMMPS {} in {}", version.name, host.root.display());
             let lmp = host.lmp_by_hand();
             say!("run it: {}", lmp.display());
-            write_json(json, &json!({"root": host.root, "lmp": lmp, "version": version.number}))?;
+            conclude(json, &json!({"root": host.root, "lmp": lmp, "version": version.number}), true)
         }
         Verb::Plugin { lammps } => {
             let spinner = progress.spinner("building the plugin");
@@ -79,7 +79,8 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
                 }
             }
             let built = built.lammps_version;
-            write_json(json, &json!({"plugin": path, "launcher": launcher, "lammps_version": built}))?;
+            let told = json!({"plugin": path, "launcher": launcher, "lammps_version": built});
+            conclude(json, &told, true)
         }
         Verb::Convert { script, law, out, overwrite } => {
             // The path of the plugin if it has been built here; else a placeholder.
@@ -100,14 +101,8 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
                 }
             }
             let by_hand = &new.by_hand;
-            write_json(
-                json,
-                &json!({"files": files, "changed": new.changed, "left": new.left, "by_hand": by_hand}),
-            )?;
-            if !by_hand.is_empty() {
-                return Ok(Verdict::CheckFailed);
-            }
+            let told = json!({"files": files, "changed": new.changed, "left": new.left, "by_hand": by_hand});
+            conclude(json, &told, by_hand.is_empty())
         }
     }
-    Ok(Verdict::Good)
 }

@@ -253,6 +253,12 @@ fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), WriteEr
     psidpd_formats::files::write_atomically(path, text.as_bytes())
 }
 
+/// Writes the results of a verb as [`write_json`] does, and ends it: well, or with a failed check.
+fn conclude(json: Option<&Path>, value: &impl Serialize, good: bool) -> Result<Verdict, Failure> {
+    write_json(json, value)?;
+    Ok(if good { Verdict::Good } else { Verdict::CheckFailed })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

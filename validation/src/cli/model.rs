@@ -86,6 +86,5 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         say!("the tolerance of {:.1} % is not met", 100.0 * a.tolerance);
     }
     say!("written to {}", a.out.display());
-    write_json(json, &found)?;
-    Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
+    conclude(json, &found, found.converged)
 }

@@ -29,6 +29,5 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     say!("{}: {}", scene.display(), template.about);
     say!("{}: its model", model.display());
     say!("run it: psidpd run {} --out {}", scene.display(), scene.with_extension("").display());
-    write_json(json, &json!({"scene": scene, "model": model, "template": template.name}))?;
-    Ok(Verdict::Good)
+    conclude(json, &json!({"scene": scene, "model": model, "template": template.name}), true)
 }

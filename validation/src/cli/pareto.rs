@@ -76,6 +76,5 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     }
     say!("{}", page::recommendation(&outcome));
     say!("report: {}", a.out.join("pareto.html").display());
-    write_json(json, &outcome)?;
-    Ok(Verdict::Good)
+    conclude(json, &outcome, true)
 }

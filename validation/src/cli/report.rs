@@ -18,6 +18,5 @@ impl Arguments {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let page = write_run_report(&arguments.folder)?;
     say!("{}", page.display());
-    write_json(json, &json!({"report": page}))?;
-    Ok(Verdict::Good)
+    conclude(json, &json!({"report": page}), true)
 }

@@ -37,8 +37,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         chosen.iter().for_each(|case| table.push([&case.id, case.what]));
         say::table(&table);
         let entry = |case: &Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
-        write_json(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }))?;
-        return Ok(Verdict::Good);
+        return conclude(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }), true);
     }
     let size = if arguments.full { Size::Full } else { Size::Quick };
     let mut results = Vec::new();
@@ -73,10 +72,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         results.push(result);
     }
     match &results[..] {
-        [one] => write_json(json, one)?,
-        all => write_json(json, &json!({ "cases": all, "pass": good }))?,
+        [one] => conclude(json, one, good),
+        all => conclude(json, &json!({ "cases": all, "pass": good }), good),
     }
-    Ok(if good { Verdict::Good } else { Verdict::CheckFailed })
 }
 
 /// The cases of these ids, and of papers that are named by the first part of their ids.

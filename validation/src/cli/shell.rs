@@ -31,6 +31,5 @@ pub fn man(a: &Man, json: Option<&Path>) -> Result<Verdict, Failure> {
         .and_then(|()| clap_mangen::generate_to(super::command(), &a.out))
         .map_err(WriteError::at(&a.out))?;
     say!("{}", a.out.join("psidpd.1").display());
-    write_json(json, &json!({"folder": a.out}))?;
-    Ok(Verdict::Good)
+    conclude(json, &json!({"folder": a.out}), true)
 }

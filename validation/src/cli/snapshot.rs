@@ -1,8 +1,9 @@
 use super::*;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use psidpd_core::engine::check_reach;
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_formats::{Configuration, FormatError, Frame, Which};
+use psidpd_formats::{Configuration, FormatError, Frame};
 use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
 use psidpd_report::Figure;
 
@@ -22,8 +23,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// From where; two-dimensional systems are seen along z.
-    #[arg(long, value_enum, default_value_t = Eye::Oblique)]
-    view: Eye,
+    #[arg(long, default_value = "oblique", value_parser = view())]
+    view: View,
     /// Shows only particles in a slice of this thickness through the middle of the box, across the line of sight.
     #[arg(long, value_name = "LENGTH")]
     slice: Option<f64>,
@@ -68,23 +69,13 @@ enum Colour {
     Psi,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Eye {
-    Oblique,
-    X,
-    Y,
-    Z,
-}
-
-impl From<Eye> for View {
-    fn from(eye: Eye) -> View {
-        match eye {
-            Eye::Oblique => View::Oblique,
-            Eye::X => View::X,
-            Eye::Y => View::Y,
-            Eye::Z => View::Z,
-        }
-    }
+fn view() -> impl TypedValueParser<Value = View> {
+    PossibleValuesParser::new(["oblique", "x", "y", "z"]).map(|name| match name.as_str() {
+        "x" => View::X,
+        "y" => View::Y,
+        "z" => View::Z,
+        _ => View::Oblique,
+    })
 }
 
 impl Arguments {
@@ -116,8 +107,8 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         return Err(request(format!("--offset must be a number, is {}", a.offset)));
     }
     let model = a.model.as_deref().map(Model::open).transpose()?;
-    let open = |which| -> Result<Configuration, Failure> {
-        let mut configuration = Configuration::open(&a.file, which)?;
+    let open = |number| -> Result<Configuration, Failure> {
+        let mut configuration = Configuration::open(&a.file, number)?;
         if let Some(model) = &model {
             configuration.name_species(model.species(), model.dimensions());
         }
@@ -128,7 +119,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let most = usize::from(a.frames).min(last + 1);
         // The last frame is always chosen.
         let chosen = (0..most).map(|k| (k * last) / (most - 1).max(1));
-        let frames = chosen.map(|k| open(Which::Number(k))).collect::<Result<Vec<_>, _>>()?;
+        let frames = chosen.map(|k| open(Some(k))).collect::<Result<Vec<_>, _>>()?;
         let values = frames.iter().map(|f| values(a, model.as_ref(), f)).collect::<Result<Vec<_>, _>>()?;
         let ends = ends(values.iter().flatten().flatten());
         let images = frames
@@ -146,10 +137,9 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
             .collect::<Result<Vec<_>, Failure>>()?;
         write_atomically(&out, &Image::to_gif(&images, DELAY).map_err(request)?)?;
         say!("{}", out.display());
-        write_json(json, &json!({"film": out, "frames": images.len(), "colours": ends}))?;
-        return Ok(Verdict::Good);
+        return conclude(json, &json!({"film": out, "frames": images.len(), "colours": ends}), true);
     }
-    let configuration = open(a.frame.map_or(Which::Last, Which::Number))?;
+    let configuration = open(a.frame)?;
     let values = values(a, model.as_ref(), &configuration)?;
     let ends = ends(values.iter().flatten());
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
@@ -159,11 +149,9 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     say!("{}", out.display());
     let particles = configuration.x.len();
     let colours = values.map(|_| ends);
-    write_json(
-        json,
-        &json!({"picture": out, "particles": particles, "step": configuration.step, "colours": colours}),
-    )?;
-    Ok(Verdict::Good)
+    let told =
+        json!({"picture": out, "particles": particles, "step": configuration.step, "colours": colours});
+    conclude(json, &told, true)
 }
 
 /// The lowest and the highest value.
@@ -230,7 +218,7 @@ fn figure(
         let kernel = kernel(a, model, frame.dimensions)?;
         within_reach(&frame, kernel.range())?;
         let options = FieldOptions {
-            view: a.view.into(),
+            view: a.view,
             offset: a.offset,
             kernel,
             species: a.species.as_deref().map(|name| index(name, frame.names)).transpose()?,
@@ -239,8 +227,7 @@ fn figure(
         let label = a.species.as_ref().map_or("n".to_owned(), |s| format!("n_{s}"));
         return Ok(Figure::field(&title, &label, &frame, &options));
     }
-    let options =
-        ParticleOptions { view: a.view.into(), slice: a.slice, offset: a.offset, radius: a.radius, size };
+    let options = ParticleOptions { view: a.view, slice: a.slice, offset: a.offset, radius: a.radius, size };
     let label = match a.colour {
         Colour::Density => "n",
         Colour::Speed => "speed",

@@ -93,12 +93,13 @@ fn without_numbers(densities: &[f64]) -> Option<String> {
     })
 }
 
-/// An answer, or the reason why there is none. The absence of coexistence is an answer too.
-fn or_reason<T>(answer: Result<T, TheoryError>, show: impl FnOnce(T) -> Value) -> Value {
-    match answer {
-        Ok(found) => show(found),
-        Err(why) => json!({ "none": why.to_string() }),
-    }
+/// A named answer, or the reason why there is none. The absence of coexistence is an answer too.
+fn answer<T>(
+    name: &'static str,
+    found: Result<T, TheoryError>,
+    show: impl FnOnce(T) -> Value,
+) -> (&'static str, Value) {
+    (name, found.map_or_else(|why| json!({ "none": why.to_string() }), show))
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -126,10 +127,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         say!("report: {}", path.display());
     }
     match all.as_slice() {
-        [single] => write_json(json, single)?,
-        several => write_json(json, &json!({"title": model.title(), "temperatures": several}))?,
+        [single] => conclude(json, single, defined),
+        several => conclude(json, &json!({"title": model.title(), "temperatures": several}), defined),
     }
-    Ok(if defined { Verdict::Good } else { Verdict::CheckFailed })
 }
 
 /// The answers at one temperature, and whether the pressure is defined.
@@ -177,65 +177,49 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         say!("at density {} there is no pressure: psi or its slope is not finite there\n", number(total));
     }
 
-    let answers: Vec<(&str, Value)> = match species {
+    let answers = match species {
         1 => vec![
-            (
+            answer(
                 "critical point",
-                or_reason(
-                    critical_point_of_model(model, range),
-                    |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
-                ),
+                critical_point_of_model(model, range),
+                |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
             ),
-            ("spinodal", or_reason(theory.spinodal(), |s| json!(s))),
-            (
-                "binodal",
-                or_reason(theory.binodal(), |b| {
-                    json!({"vapour": b.vapour, "liquid": b.liquid, "pressure": b.pressure,
-                           "chemical_potential": b.chemical_potential})
-                }),
-            ),
-            (
-                "interface",
-                or_reason(theory.interface(201), |i| json!({"tension": i.tension, "width": i.width})),
-            ),
+            answer("spinodal", theory.spinodal(), |s| json!(s)),
+            answer("binodal", theory.binodal(), |b| {
+                json!({"vapour": b.vapour, "liquid": b.liquid, "pressure": b.pressure,
+                       "chemical_potential": b.chemical_potential})
+            }),
+            answer("interface", theory.interface(201), |i| json!({"tension": i.tension, "width": i.width})),
         ],
         2 => vec![
-            (
+            answer(
                 "critical point at this density",
-                or_reason(composition_critical_point(&|kt| Ok(model.at(kt)?), total, range), |c| {
+                composition_critical_point(&|kt| Ok(model.at(kt)?), total, range),
+                |c| {
                     json!({"kT": c.parameter, "composition": c.composition, "pressure": c.pressure,
-                               "stability_limit": c.limit})
-                }),
+                           "stability_limit": c.limit})
+                },
             ),
-            ("spinodal at this density", or_reason(theory.composition_spinodal(total), |s| json!(s))),
-            (
-                "coexistence",
-                or_reason(theory.coexistence([densities[0], densities[1]]), |c| {
-                    json!({"composition": c.composition(), "density": c.density(), "pressure": c.pressure,
-                           "chemical_potentials": c.chemical_potentials, "share": c.share,
-                           "metastable": c.more_stable.is_some()})
-                }),
-            ),
-            (
+            answer("spinodal at this density", theory.composition_spinodal(total), |s| json!(s)),
+            answer("coexistence", theory.coexistence([densities[0], densities[1]]), |c| {
+                json!({"composition": c.composition(), "density": c.density(), "pressure": c.pressure,
+                       "chemical_potentials": c.chemical_potentials, "share": c.share,
+                       "metastable": c.more_stable.is_some()})
+            }),
+            answer(
                 "binodal at this density",
-                or_reason(
-                    theory.composition_binodal(total),
-                    |b| json!({"composition": b.composition, "pressure": b.pressure}),
-                ),
+                theory.composition_binodal(total),
+                |b| json!({"composition": b.composition, "pressure": b.pressure}),
             ),
-            (
+            answer(
                 "binodal at this pressure",
-                or_reason(
-                    theory.composition_binodal_at_pressure(theory.pressure(&densities)),
-                    |b| json!({"composition": b.composition, "density": b.density, "pressure": b.pressure}),
-                ),
+                theory.composition_binodal_at_pressure(middle),
+                |b| json!({"composition": b.composition, "density": b.density, "pressure": b.pressure}),
             ),
-            (
+            answer(
                 "interface at this density",
-                or_reason(
-                    theory.composition_interface(total, 201),
-                    |i| json!({"tension": i.tension, "width": i.width}),
-                ),
+                theory.composition_interface(total, 201),
+                |i| json!({"tension": i.tension, "width": i.width}),
             ),
         ],
         _ => Vec::new(),
@@ -261,7 +245,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         scope.tension.push((kt, [t.value, t.error.unwrap_or(f64::NAN)], "measured"));
     }
     if prediction.is_some() || !measured.is_empty() {
-        let table = beside(total, theory.pressure(&densities), prediction.as_ref(), &known, &measured);
+        let table = beside(total, middle, prediction.as_ref(), &known, &measured);
         say!("");
         say::table(&table);
     }

@@ -31,6 +31,5 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         results.failed_count(),
         outcome.report.display()
     );
-    write_json(json, results)?;
-    Ok(if results.passed { Verdict::Good } else { Verdict::CheckFailed })
+    conclude(json, results, results.passed)
 }

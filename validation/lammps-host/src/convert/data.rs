@@ -12,17 +12,16 @@ pub struct DataFile {
     pub note: Note,
 }
 
-/// The place of the density in an atom's line.
+/// The place of the density in an atom's line: the number of columns before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Column {
-    /// `id type rho x y z`, of `atom_style mdpd`.
-    Third,
-    /// `id type x y z … rho …`, of a hybrid: the number of columns before it.
-    Behind(usize),
-}
+pub struct Column(pub usize);
 
 impl Column {
-    /// The column of `atom_style hybrid` with these styles, or `None` if a style before mdpd has unknown columns.
+    /// `id type rho x y z`, of `atom_style mdpd`.
+    pub const OF_MDPD: Column = Column(2);
+
+    /// `id type x y z … rho …`, of `atom_style hybrid` with these styles, or `None` if a style before mdpd has
+    /// unknown columns.
     pub fn of_hybrid(styles: &[&str]) -> Option<Column> {
         // A column that two styles have occurs once.
         let mut before: Vec<&str> = vec!["id", "type", "x", "y", "z"];
@@ -38,20 +37,13 @@ impl Column {
             };
             before.extend(columns.iter().filter(|column| !before.contains(column)).collect::<Vec<_>>());
         }
-        Some(Column::Behind(before.len()))
-    }
-
-    fn index(self) -> usize {
-        match self {
-            Column::Third => 2,
-            Column::Behind(count) => count,
-        }
+        Some(Column(before.len()))
     }
 }
 
 impl fmt::Display for Column {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "column {}", self.index() + 1)
+        write!(f, "column {}", self.0 + 1)
     }
 }
 
@@ -59,7 +51,7 @@ impl fmt::Display for Column {
 pub fn data_file(old: &str, column: Column) -> Result<String, TextError> {
     let mut new = String::new();
     let mut atoms = false;
-    let least = 6.max(column.index() + 1);
+    let least = 6.max(column.0 + 1);
     for (k, line) in old.split_inclusive('\n').enumerate() {
         let code = line.split('#').next().unwrap_or_default();
         let words: Vec<&str> = code.split_whitespace().collect();
@@ -75,7 +67,7 @@ pub fn data_file(old: &str, column: Column) -> Result<String, TextError> {
                     let expected = format!("at least {least}, as the atom style has them");
                     return Err(Problem::Columns { expected, found: words.len() }.at(k + 1));
                 }
-                let (before, after) = words.split_at(column.index());
+                let (before, after) = words.split_at(column.0);
                 new += &[before, &after[1..]].concat().join(" ");
                 new.push('\n');
             }

@@ -32,7 +32,7 @@ fn only_what_knows_of_the_built_in_is_changed() {
     assert_eq!(new.left, []);
     assert_eq!(new.changed.iter().map(|n| n.line).collect::<Vec<_>>(), [3, 5, 6, 7, 8, 9, 11]);
     assert_eq!(new.by_hand, []);
-    assert!(new.data.len() == 1 && new.data[0].name == "slab.data" && new.data[0].column == Column::Third);
+    assert!(new.data.len() == 1 && new.data[0].name == "slab.data" && new.data[0].column == Column::OF_MDPD);
     let conservative = converted(OLD, Law::Conservative, "p.so");
     assert!(conservative.script.contains("mdpd/psi 1.0 1.0 9872598  #"));
     assert!(texts(&conservative.left).contains("another fluid"));
@@ -89,21 +89,21 @@ fn the_column_of_densities_goes() {
     let old = "title\n\n2 atoms\n1 atom types\n0 1 xlo xhi\n\nAtoms # mdpd\n\n1 1 0.0 0.1 0.2 0.3\n\
         2 1 6.5 0.4 0.5 0.6 1 0 0 # last\n\nVelocities\n\n1 0 0 0\n";
     assert_eq!(
-        data_file(old, Column::Third).unwrap(),
+        data_file(old, Column::OF_MDPD).unwrap(),
         "title\n\n2 atoms\n1 atom types\n0 1 xlo xhi\n\nAtoms # atomic\n\n1 1 0.1 0.2 0.3\n\
          2 1 0.4 0.5 0.6 1 0 0\n\nVelocities\n\n1 0 0 0\n"
     );
-    assert_eq!(data_file("t\n\nAtoms\n\n1 1 0 0 0\n", Column::Third).unwrap_err().line, 5);
+    assert_eq!(data_file("t\n\nAtoms\n\n1 1 0 0 0\n", Column::OF_MDPD).unwrap_err().line, 5);
     // Of a hybrid the columns of a style that comes first are before it.
     for (styles, before) in [("mdpd bond", 5), ("bond mdpd", 6), ("bond full mdpd", 7), ("sphere mdpd", 7)] {
         let styles: Vec<&str> = styles.split(' ').collect();
-        assert_eq!(Column::of_hybrid(&styles), Some(Column::Behind(before)), "{styles:?}");
+        assert_eq!(Column::of_hybrid(&styles), Some(Column(before)), "{styles:?}");
     }
     assert_eq!(Column::of_hybrid(&["line", "mdpd"]), None);
     let hybrid = "t\n\nAtoms # hybrid\n\n1 1 0.1 0.2 0.3 6.5 7 1 0 0\n";
     let without = hybrid.replace("6.5 ", "");
-    assert_eq!(data_file(hybrid, Column::Behind(5)).unwrap(), without);
-    assert_eq!(data_file(&without, Column::Behind(9)).unwrap_err().line, 5);
+    assert_eq!(data_file(hybrid, Column(5)).unwrap(), without);
+    assert_eq!(data_file(&without, Column(9)).unwrap_err().line, 5);
 }
 
 /// Commands that name the built-in where they cannot be rewritten, with their lines.

@@ -163,7 +163,7 @@ impl Work<'_> {
             _ => return self.look(command, &command.words),
         };
         self.column =
-            Some(if style == ["mdpd"] { Some(Column::Third) } else { Column::of_hybrid(&style[1..]) });
+            Some(if style == ["mdpd"] { Some(Column::OF_MDPD) } else { Column::of_hybrid(&style[1..]) });
         self.changed(command, format!("atom_style {}: the style needs none of its own", new.join(" ")));
         Some(command.with("atom_style", &new))
     }

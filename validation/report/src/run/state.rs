@@ -4,7 +4,7 @@ use super::super::figure::Figure;
 use super::super::text::escape;
 use super::{About, Item, Path, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_formats::{Configuration, Which, memory};
+use psidpd_formats::{Configuration, memory};
 use psidpd_pictures::{FieldOptions, ParticleOptions, View, animate, data_url};
 
 pub struct State {
@@ -30,7 +30,7 @@ impl State {
                 notes.push(format!("{error}; there are no pictures of it"));
                 return None;
             }
-            match Configuration::open(&path, Which::Last) {
+            match Configuration::open(&path, None) {
                 Ok(mut configuration) => {
                     if let Some(a) = about {
                         configuration.name_species(&a.species, a.dimensions);

@@ -481,7 +481,7 @@ fn a_start_that_fails_leaves_what_it_started_from() {
 /// does a map of the density, where a particle at one wall does not appear at the other.
 #[test]
 fn a_data_file_keeps_walls() {
-    use psidpd_formats::{Configuration, Which};
+    use psidpd_formats::Configuration;
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\ndensity = 3.0\ndt = 0.01\nsteps = 2\n[box]\nlengths = [4.0, 4.0, 5.0]\n\
                 boundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
     let folder = tempfile::tempdir().unwrap();
@@ -494,7 +494,7 @@ fn a_data_file_keeps_walls() {
     let walls = [true, true, false];
     let scene = support::scene(SOFT, &again).unwrap();
     assert_eq!(scene.initial_state().domain.periodic(), walls);
-    assert_eq!(Configuration::open(&file, Which::Last).unwrap().domain.periodic(), walls);
+    assert_eq!(Configuration::open(&file, None).unwrap().domain.periodic(), walls);
     let open = format!("{again}[box]\nboundary = [\"periodic\", \"periodic\", \"periodic\"]\n");
     assert_eq!(support::scene(SOFT, &open).unwrap().initial_state().domain.periodic(), [true; 3]);
     // A box without walls has no entry for them, nor does a plane.
