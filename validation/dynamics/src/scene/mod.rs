@@ -23,7 +23,6 @@ mod masses;
 mod number;
 mod output;
 mod part;
-mod saved;
 mod shape;
 mod stage;
 mod template;
