@@ -12,5 +12,4 @@ pub use body_force::add as add_body_forces;
 pub use data_file::{StateError, write_data};
 pub use state::State;
 pub use tags::Tags;
-pub use tags::order_of_tags;
 pub use thermal::maxwell;

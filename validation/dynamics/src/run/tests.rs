@@ -63,7 +63,7 @@ fn advance(simulation: &mut Simulation, steps: u64, dt: f64, integrator: Integra
 fn settled() -> State {
     let mut simulation = simulation(SET6, state_of(SET6, "[4.0, 4.0, 4.0]", 6.05));
     advance(&mut simulation, 300, 0.01, Integrator::VelocityVerlet);
-    simulation.state()
+    simulation.state().clone()
 }
 
 /// Deviations of the energy over half a time unit, over several starts: forces have kinks, at their ranges
@@ -74,7 +74,7 @@ fn energy_is_conserved_to_second_order() {
     let starts: Vec<State> = (0..6)
         .map(|_| {
             advance(&mut run, 50, 0.01, Integrator::VelocityVerlet);
-            run.state()
+            run.state().clone()
         })
         .collect();
     let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();

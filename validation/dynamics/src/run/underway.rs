@@ -2,7 +2,6 @@ use super::checkpoints::Checkpoints;
 use super::folder::Folder;
 use super::output::{Output, write_observations};
 use super::timing::Clock;
-use super::view::ByTag;
 use super::watch::Watch;
 use super::{Advice, Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, write_data};
 use crate::checkpoint::{CheckpointError, Position};
@@ -190,11 +189,8 @@ impl<'a> Run<'a> {
                 }
             }
             if self.scene.output.writes_particles(step) {
-                let sorted = ByTag::of(&self.simulation);
-                let frame = match &sorted {
-                    Some(sorted) => sorted.frame(&self.simulation, self.present.position.time),
-                    None => self.simulation.frame(self.present.position.time),
-                };
+                let state = self.simulation.state().by_tag();
+                let frame = self.simulation.frame(&state, self.present.position.time);
                 output.particles(self.scene, &self.folder.path, &frame)?;
             }
         }
@@ -218,7 +214,7 @@ impl<'a> Run<'a> {
         let Present { position, sums, last } = self.present;
         (good.position, good.sums, good.last) = (position, sums, last);
         good.step = self.simulation.step_number();
-        self.simulation.copy_state(&mut good.state);
+        good.state.copy_particles(self.simulation.state());
         good.forces.clear();
         good.forces.extend_from_slice(self.simulation.forces());
         good.max_move = self.simulation.max_move();

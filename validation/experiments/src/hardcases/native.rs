@@ -160,7 +160,7 @@ fn conserved(scene: &Scene, integrator: Integrator, fault: Option<Fault>) -> Res
         .advance(measure.steps - 1, measure.dt, integrator)
         .and_then(|()| run.step(measure.dt, integrator, Want::TOTALS));
     match made {
-        Ok(()) => Ok(Found::Changed { energy: energy(&run) - before, momentum: momentum_of(&run.state()) }),
+        Ok(()) => Ok(Found::Changed { energy: energy(&run) - before, momentum: momentum_of(run.state()) }),
         Err(error) => stopped(error),
     }
 }

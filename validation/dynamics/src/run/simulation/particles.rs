@@ -174,14 +174,8 @@ impl Simulation {
         &self.particles.state.mass
     }
 
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> &State {
         debug_assert!(self.motion.deferred.is_none());
-        self.particles.state.clone()
-    }
-
-    /// Copies the particles into `state`, which belongs to this simulation, and reuses its memory.
-    pub fn copy_state(&self, state: &mut State) {
-        debug_assert!(self.motion.deferred.is_none());
-        state.copy_particles(&self.particles.state);
+        &self.particles.state
     }
 }

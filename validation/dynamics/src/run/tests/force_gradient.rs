@@ -66,7 +66,7 @@ fn it_is_of_fourth_order_for_smooth_forces() {
         advance(&mut begin, 200, dt, Integrator::VelocityVerlet);
     }
     let scale = (begin.len() as f64 * 3.0 / 2.0 / begin.kinetic_energy()).sqrt();
-    let mut start = begin.state();
+    let mut start = begin.state().clone();
     start.v.iter_mut().flatten().for_each(|v| *v *= scale);
     let deviation = |integrator: Integrator, dt: f64| {
         let mut run = simulation(SMOOTH, start.clone());
@@ -134,7 +134,7 @@ fn it_keeps_momentum_and_is_reversible_but_not_angular_momentum() {
     run.set_thermostat(false);
     run.prepare_for(step, 0.02, Want::FORCES).unwrap();
     run.advance(20, 0.02, step).unwrap();
-    let mut back = run.state();
+    let mut back = run.state().clone();
     back.v.iter_mut().flatten().for_each(|v| *v = -*v);
     let mut run = simulation(SET6, back);
     run.set_thermostat(false);
@@ -154,7 +154,7 @@ fn without_displacement_it_is_the_two_stage_step() {
         let mut run = simulation(SET6, start.clone());
         run.prepare_for(integrator, 0.03, Want::FORCES).unwrap();
         run.advance(10, 0.03, integrator).unwrap();
-        run.state()
+        run.state().clone()
     });
     assert!(a == b);
 }

@@ -131,7 +131,7 @@ fn without_thermostat_all_are_of_second_order() {
     let starts: Vec<State> = (0..4)
         .map(|_| {
             advance(&mut run, 50, 0.01, Integrator::VelocityVerlet);
-            run.state()
+            run.state().clone()
         })
         .collect();
     let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();

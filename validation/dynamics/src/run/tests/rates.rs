@@ -102,7 +102,7 @@ fn relative_velocities_decay_by_the_formula() {
             let shares = [MASS[1], -MASS[0]].map(|m| m / (MASS[0] + MASS[1]));
             shares.map(|share| std::array::from_fn(|c| mean[c] + share * relative[c]))
         };
-        let state = run.state();
+        let state = run.state().clone();
         let v = (0..run.len()).map(|k| of_pair(relative)[k % 2]).collect();
         run.restore(0, &State { v, ..state }, &[], [0; 2]);
         run.prepare_for(integrator, DT, Want::FORCES).unwrap();

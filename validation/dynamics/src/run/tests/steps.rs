@@ -32,7 +32,7 @@ fn steps_are_their_formulas() {
             run.prepare(dt, Want::FORCES).unwrap();
             let mut wrapped = 0;
             for _ in 0..20 {
-                let (before, f) = (run.state(), run.forces().to_vec());
+                let (before, f) = (run.state().clone(), run.forces().to_vec());
                 run.step(dt, integrator, Want::FORCES).unwrap();
                 for k in 0..run.len() {
                     let (mut x, mut image, mut v) = (before.x[k], before.image[k], before.v[k]);
