@@ -6,6 +6,7 @@ use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, 
 use crate::checkpoint::Position;
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl Runner<'_> {
@@ -192,27 +193,20 @@ impl Runner<'_> {
 
     /// Saves the last good state of a failed run.
     pub(super) fn stop(&mut self, cause: RunError) -> RunError {
-        let step = self.simulation.step_number();
+        let (step, good) = (self.simulation.step_number(), self.checkpoints.good.step);
         if cause.is_output() {
             // A newer checkpoint may fit on the disk; if not, the old one remains.
-            if self.checkpoints.stored != Some(self.checkpoints.good.step) {
+            if self.checkpoints.stored != Some(good) {
                 let _ = self.store_good();
             }
             return RunError::Halted { step, cause: Box::new(cause), checkpoint: self.checkpoints.stored };
         }
-        let checkpoint =
-            self.checkpoints.stored == Some(self.checkpoints.good.step) || self.store_good().is_ok();
-        let saved = self.folder.path.join("last-good.data");
-        match write_data(
-            &saved,
-            &self.data_title(self.checkpoints.good.step),
-            &self.checkpoints.good.state,
-            self.scene.model.species(),
-        ) {
-            Ok(()) => RunError::Stopped {
+        let checkpoint = self.checkpoints.stored == Some(good) || self.store_good().is_ok();
+        match self.write_good("last-good.data") {
+            Ok(saved) => RunError::Stopped {
                 stage: self.scene.stages[self.position.stage].name.clone(),
                 cause: Box::new(cause),
-                good: self.checkpoints.good.step,
+                good,
                 saved,
                 checkpoint,
             },
@@ -223,13 +217,7 @@ impl Runner<'_> {
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
-        let path = self.folder.path.join("final.data");
-        write_data(
-            &path,
-            &self.data_title(self.steps),
-            &self.checkpoints.good.state,
-            self.scene.model.species(),
-        )?;
+        let path = self.write_good("final.data")?;
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
@@ -243,8 +231,13 @@ impl Runner<'_> {
         Ok(Outcome::Finished { summary: Box::new(summary), timing, advice })
     }
 
-    fn data_title(&self, step: u64) -> String {
-        format!("psidpd: {}, step {step}", self.scene.title)
+    /// Writes the last good state as a data file in the folder, and returns its path.
+    fn write_good(&self, name: &str) -> Result<PathBuf, RunError> {
+        let good = &self.checkpoints.good;
+        let path = self.folder.path.join(name);
+        let title = format!("psidpd: {}, step {}", self.scene.title, good.step);
+        write_data(&path, &title, &good.state, self.scene.model.species())?;
+        Ok(path)
     }
 
     pub(super) fn summary(&self) -> Summary {
