@@ -100,7 +100,7 @@ mod tests {
         for k in 0..state.len() {
             let wind = if state.species[k] == 1 { 0.5 } else { 0.0 };
             let expected = [state.v[k][0] + wind, state.v[k][1], state.v[k][2] - 1.0];
-            assert!((0..3).all(|c| (run.velocities()[k][c] - expected[c]).abs() < 1e-12), "{k}");
+            assert!((0..3).all(|c| (run.state().v[k][c] - expected[c]).abs() < 1e-12), "{k}");
         }
         assert!(run.tally().virial.iter().all(|w| *w == 0.0));
     }
@@ -111,8 +111,8 @@ mod tests {
         let (scene, state) = scene("[[body_force]]\nacceleration = [5, 0, 0]\nreversed_along = \"z\"\n");
         let run = run(&scene, &state, 40, true);
         let mean = |upper: bool| {
-            let of = (0..run.len()).filter(|k| (run.positions()[*k][2] >= 4.0) == upper);
-            let v: Vec<f64> = of.map(|k| run.velocities()[k][0]).collect();
+            let of = (0..run.len()).filter(|k| (run.state().x[*k][2] >= 4.0) == upper);
+            let v: Vec<f64> = of.map(|k| run.state().v[k][0]).collect();
             v.iter().sum::<f64>() / v.len() as f64
         };
         // Without viscosity the means are 2 and -2; thermal velocities give the mean of 430 particles an error of 0.04.

@@ -7,6 +7,7 @@ use psidpd_observe::frame::View;
 impl Simulation {
     /// The present step as observables see it; `time` is measured from the start of the run.
     pub fn view(&self, time: f64) -> View<'_> {
+        let State { domain, mass: masses, x, v, species, tag: tags, image: images } = self.state();
         View {
             pool: self.engine().pool(),
             step: self.step_number(),
@@ -14,13 +15,13 @@ impl Simulation {
             kt: self.kt(),
             model: self.model(),
             dimensions: self.dimensions(),
-            domain: self.domain(),
-            masses: self.masses(),
-            x: self.positions(),
-            v: self.velocities(),
-            images: self.image_flags(),
-            species: self.species(),
-            tags: self.tags(),
+            domain,
+            masses,
+            x,
+            v,
+            images,
+            species,
+            tags,
             frozen: self.frozen(),
             temperature: self.temperature(),
             kinetic_energy: self.kinetic_energy(),

@@ -144,7 +144,7 @@ impl Simulation {
         }
         let Forces { engine, all_densities, .. } = &self.forces;
         let want = Want { densities: *all_densities, ..Want::FORCES };
-        engine.path_for(Surroundings::Box(self.domain()), want).describe(engine.settings())
+        engine.path_for(Surroundings::Box(&self.particles.now().domain), want).describe(engine.settings())
     }
 
     pub fn model(&self) -> &Model {

@@ -112,7 +112,7 @@ impl Simulation {
             });
         });
         self.record_ways(dt, |this, k| {
-            let back = (0.5 - lambda) * dt / this.masses()[this.species()[k] as usize];
+            let back = (0.5 - lambda) * dt / this.particles.mass_of(k);
             std::array::from_fn(|c| this.particles.now().v[k][c] + back * this.forces()[k][c])
         });
         self.refuse(faults, Some(dt), false)
