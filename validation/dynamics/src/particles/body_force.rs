@@ -1,7 +1,7 @@
 //! Accelerations of single particles.
 
 use super::tags::Tags;
-use psidpd_core::engine::{PeriodicBox, Pool, part};
+use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_observe::Drive;
 
 /// A constant acceleration of some of the particles, as by gravity. Reversed in the upper half of the box along
@@ -45,16 +45,9 @@ pub fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
 where
     F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
 {
-    let (count, mut rest, threads) = (force.len(), force, pool.threads());
-    let mut parts: Vec<_> = (0..threads)
-        .map(|number| {
-            let range = part(count, number, threads);
-            (range.start, rest.split_off_mut(..range.len()).unwrap_or_default())
-        })
-        .collect();
-    pool.each(&mut parts, |(first, force)| {
+    pool.parts(force, |first, force| {
         for (k, sum) in force.iter_mut().enumerate() {
-            for f in bodies.iter().filter_map(|body| on(body, *first + k)) {
+            for f in bodies.iter().filter_map(|body| on(body, first + k)) {
                 for c in 0..3 {
                     sum[c] += f[c];
                 }
