@@ -1,7 +1,7 @@
 //! Accelerations of single particles.
 
 use super::tags::Tags;
-use psidpd_core::engine::{PeriodicBox, Pool};
+use psidpd_core::engine::PeriodicBox;
 use psidpd_observe::Drive;
 
 /// A constant acceleration of some of the particles, as by gravity. Reversed in the upper half of the box along
@@ -38,22 +38,6 @@ impl BodyForce {
             _ => self.acceleration,
         }
     }
-}
-
-/// Adds the forces of `bodies` to `force`; `on` computes the force of one body on one particle.
-pub fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
-where
-    F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
-{
-    pool.parts(force, |first, force| {
-        for (k, sum) in force.iter_mut().enumerate() {
-            for f in bodies.iter().filter_map(|body| on(body, first + k)) {
-                for c in 0..3 {
-                    sum[c] += f[c];
-                }
-            }
-        }
-    });
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@ mod tags;
 mod thermal;
 
 pub use body_force::BodyForce;
-pub use body_force::add as add_body_forces;
 pub use data_file::{StateError, write_data};
 pub use state::State;
 pub use tags::Tags;
