@@ -11,7 +11,6 @@ use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::memory;
 use psidpd_observe::Observers;
-use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
@@ -104,6 +103,7 @@ impl<'a> Runner<'a> {
         let state = scene.initial_state();
         let simulation = scene.simulation_of_run(state.clone(), NonZeroUsize::MIN)?;
         store.clear()?;
+        let mut output = Output::create(scene, out)?;
         let good = Checkpoint {
             program: PROGRAM.into(),
             instructions: simulation.arithmetic(),
@@ -117,12 +117,10 @@ impl<'a> Runner<'a> {
             out_of_bounds: [0; 2],
             last: None,
             sums: Sums::default(),
-            files: BTreeMap::new(),
+            files: output.written(),
             observers: Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()))
                 .to_bytes(),
         };
-        let mut output = Output::create(scene, out)?;
-        let good = Checkpoint { files: output.written(), ..good };
         let checkpoints = Checkpoints::new(store, good, None);
         Runner::of(scene, folder, simulation, Some(output), checkpoints, Start::New)
     }

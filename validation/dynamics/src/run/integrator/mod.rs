@@ -1,6 +1,7 @@
 //! The steps of integrators, each a composition of drift, kick, forces and thermostat, which are the operators of a simulation.
 //!
-//! A file here states one step, what is exact in it and at which velocity the temperature is measured.
+//! A file here states one step, or steps that differ in one operator, what is exact in them and at which velocity the
+//! temperature is measured.
 
 mod aboba;
 mod baoab;

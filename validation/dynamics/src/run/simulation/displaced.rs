@@ -19,18 +19,15 @@ impl Simulation {
         let within = self.beyond_walls().map(|wide| self.particles.replace_domain(wide));
         let made = self.compute(Want { virial: self.is_recording(), ..Want::FORCES }, None);
         let wide = within.map(|within| self.particles.replace_domain(within));
-        if made.is_ok() && self.is_recording() {
-            let forces = self.forces().to_vec();
-            self.add_external_forces();
-            let x = self.particles.now().x.clone();
-            self.step_back();
+        let record = made.is_ok() && self.is_recording();
+        let recorded = record.then(|| (self.particles.now().x.clone(), self.forces().to_vec()));
+        self.add_external_forces();
+        self.step_back();
+        if let Some((x, forces)) = recorded {
             let domain = wide.unwrap_or_else(|| self.particles.now().domain.clone());
             let virial = self.virial_from(&x, &forces);
             self.record_forces(virial, Some(Displaced { x, domain }));
-            return Ok(());
         }
-        self.add_external_forces();
-        self.step_back();
         made
     }
 
