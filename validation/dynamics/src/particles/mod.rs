@@ -8,7 +8,7 @@ mod tags;
 mod thermal;
 
 pub use body_force::BodyForce;
-pub use data_file::{StateError, write_data};
+pub use data_file::StateError;
 pub use state::State;
 pub use tags::Tags;
 pub use thermal::maxwell;

@@ -2,10 +2,11 @@
 
 use super::output::write_observations;
 use super::watch::Watch;
-use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing, write_data};
+use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
 use crate::checkpoint::Position;
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
+use psidpd_formats::data::DataFile;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -236,7 +237,8 @@ impl Runner<'_> {
         let good = &self.checkpoints.good;
         let path = self.folder.path.join(name);
         let title = format!("psidpd: {}, step {}", self.scene.title, good.step);
-        write_data(&path, &title, &good.state, self.scene.model.species())?;
+        let data = good.state.to_data_by_tag(&title);
+        DataFile { names: self.scene.model.species().to_vec(), ..data }.write(&path)?;
         Ok(path)
     }
 
