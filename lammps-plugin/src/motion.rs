@@ -4,7 +4,6 @@
 use crate::bridge::Movers;
 use crate::converted::triples;
 use crate::style::Style;
-use psidpd_core::engine::part;
 
 impl Movers<'_> {
     /// Mass of atom `k`; infinite outside the group.
@@ -19,17 +18,8 @@ impl Movers<'_> {
 impl Style {
     /// Calls `work` with the number of each of `things`, and with the thing.
     fn each<T: Send>(&self, things: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
-        let (pool, count) = (self.engine.pool(), things.len());
-        let mut rest = things;
-        let of_thread = |t: usize| {
-            let range = part(count, t, pool.threads());
-            let (here, after) = std::mem::take(&mut rest).split_at_mut(range.len());
-            rest = after;
-            (range.start, here)
-        };
-        let mut parts: Vec<_> = (0..pool.threads()).map(of_thread).collect();
-        pool.each(&mut parts, |(first, part)| {
-            part.iter_mut().enumerate().for_each(|(k, thing)| work(*first + k, thing));
+        self.engine.pool().parts(things, |first, part| {
+            part.iter_mut().enumerate().for_each(|(k, thing)| work(first + k, thing));
         });
     }
 

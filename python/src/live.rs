@@ -13,7 +13,7 @@ use std::time::Instant;
 type Part = fn(&Simulation) -> &[[f64; 3]];
 
 /// What the arrays have, in their order.
-const PARTS: [Part; 3] = [Simulation::positions, Simulation::velocities, Simulation::forces];
+const PARTS: [Part; 3] = [|run| &run.state().x, |run| &run.state().v, Simulation::forces];
 
 /// The compiled part of psidpd.Simulation.
 #[pyclass(frozen, module = "psidpd")]
@@ -52,7 +52,7 @@ impl Steps {
 fn by_tag<T: Copy + Default>(live: &Live, of: fn(&Simulation) -> &[T]) -> Vec<T> {
     let simulation = live.simulation();
     let mut sorted = vec![T::default(); simulation.len()];
-    for (value, tag) in of(simulation).iter().zip(simulation.tags()) {
+    for (value, tag) in of(simulation).iter().zip(&simulation.state().tag) {
         sorted[*tag as usize - 1] = *value;
     }
     sorted
@@ -81,7 +81,7 @@ impl Steps {
         let scene = read_scene(path, text, &base, precision, device)?;
         let threads = thread_count(threads)?;
         let live = py.detach(|| Live::new(scene, threads)).map_err(exception)?;
-        let tags = live.simulation().tags();
+        let tags = &live.simulation().state().tag;
         if tags.iter().any(|tag| !(1..=tags.len() as i32).contains(tag)) {
             return Err(wrong("the tags of the particles must be 1 to their number"));
         }
@@ -135,13 +135,13 @@ impl Steps {
     /// The index of each particle's species, in the order of tags.
     #[getter]
     fn types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i32>>> {
-        Ok(PyArray1::from_vec(py, self.with(py, |live| by_tag(live, Simulation::species))?))
+        Ok(PyArray1::from_vec(py, self.with(py, |live| by_tag(live, |run| &run.state().species[..]))?))
     }
 
     /// The edge vectors of the box, as rows.
     #[getter]
     fn r#box(&self, py: Python) -> PyResult<[[f64; 3]; 3]> {
-        self.with(py, |live| [0, 1, 2].map(|k| live.simulation().domain().edge(k)))
+        self.with(py, |live| [0, 1, 2].map(|k| live.simulation().state().domain.edge(k)))
     }
 
     #[getter]

@@ -362,7 +362,7 @@ fn forces(model: &Model, kt: f64, c: &Configuration) -> Forces {
     let mut simulation = Simulation::new(model, kt, state, 1).unwrap();
     simulation.compute(Want::ALL, None).unwrap();
     let mut forces = vec![[f64::NAN; 3]; count];
-    for (tag, force) in simulation.tags().iter().zip(simulation.forces()) {
+    for (tag, force) in simulation.state().tag.iter().zip(simulation.forces()) {
         forces[*tag as usize - 1] = *force;
     }
     Forces { energy: simulation.potential_energy(), forces, virial: simulation.tally().total_virial() }

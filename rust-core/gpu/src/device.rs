@@ -3,7 +3,10 @@
 use crate::GpuError;
 use std::fmt;
 use std::sync::{Arc, Mutex};
-use wgpu::{Adapter, Backend, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
+use wgpu::{
+    Adapter, Backend, Backends, Buffer, BufferDescriptor, BufferUsages, DeviceType, Features, Instance,
+    InstanceDescriptor, Limits,
+};
 
 /// A device that can run simulations.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +79,7 @@ pub struct Device {
     pub(crate) limits: Arc<Limits>,
     pub(crate) has_timestamps: bool,
     /// Memory that both sides see, through which results come back.
-    pub(crate) staging: Arc<Mutex<Option<wgpu::Buffer>>>,
+    pub(crate) staging: Arc<Mutex<Option<Buffer>>>,
 }
 
 /// Storage buffers that the kernels bind.
@@ -123,6 +126,10 @@ impl Device {
     /// Describes the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    pub(crate) fn buffer(&self, size: u64, usage: BufferUsages) -> Buffer {
+        self.device.create_buffer(&BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     }
 
     pub(crate) fn failed(&self, reason: impl ToString) -> GpuError {

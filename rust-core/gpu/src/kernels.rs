@@ -3,6 +3,7 @@
 use crate::shader::{LANES, Shader};
 use crate::{Device, GpuError, Timing};
 use std::collections::HashMap;
+use wgpu::BufferUsages as Usage;
 
 /// The arguments of one run: see `Step` of `wgsl/common.wgsl`.
 #[repr(C)]
@@ -204,22 +205,15 @@ impl Kernels {
     }
 
     pub fn measure_time(&mut self, device: &Device, on: bool) {
-        let buffer = |usage| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size: u64::from(8 * STAMPS),
-                usage,
-                mapped_at_creation: false,
-            })
-        };
+        let buffer = |usage| device.buffer(u64::from(8 * STAMPS), usage);
         self.clock = on.then(|| Clock {
             queries: device.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: None,
                 ty: wgpu::QueryType::Timestamp,
                 count: STAMPS,
             }),
-            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            read: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            resolved: buffer(Usage::QUERY_RESOLVE | Usage::COPY_SRC),
+            read: buffer(Usage::MAP_READ | Usage::COPY_DST),
             times: HashMap::new(),
         });
     }
@@ -266,12 +260,7 @@ pub fn read<T: bytemuck::Pod>(device: &Device, parts: &[(&wgpu::Buffer, u64)]) -
     let mut staging = device.staging.lock().map_err(|error| device.failed(error))?;
     let staging = match &mut *staging {
         Some(buffer) if buffer.size() >= bytes => buffer,
-        other => other.insert(device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })),
+        other => other.insert(device.buffer(bytes, Usage::MAP_READ | Usage::COPY_DST)),
     };
     let mut encoder = device.device.create_command_encoder(&Default::default());
     let mut to = 0;

@@ -168,12 +168,21 @@ impl Pool {
         if let [thing] = things {
             return work(thing);
         }
+        self.parts(things, |_, part| part.iter_mut().for_each(&work));
+    }
+
+    /// Calls `work` with the part of `things` of each thread, and with the number of its first thing.
+    ///
+    /// # Panics
+    /// Panics if `work` panics on any thread.
+    pub fn parts<T: Send>(&self, things: &mut [T], work: impl Fn(usize, &mut [T]) + Sync) {
         let (threads, things) = (self.threads(), SharedSlice::new(things));
         self.run(&|t| {
+            let range = part(things.len(), t, threads);
+            let first = range.start;
             // SAFETY: `run` calls this once for each number of a thread, and `part` makes
             // ranges of different numbers disjoint.
-            let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
-            part.iter_mut().for_each(&work);
+            work(first, unsafe { things.slice_mut(range) });
         });
     }
 

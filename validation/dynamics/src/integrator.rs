@@ -139,8 +139,9 @@ pub struct Properties {
 }
 
 impl Integrator {
-    /// Those with a time step: names in scene files, and what they mean with all other keys left out.
-    pub const ALL: [(&str, Integrator); 12] = [
+    /// Names in scene files, and what they mean with all other keys left out.
+    pub const NAMED: [(&str, Integrator); 13] = [
+        ("monte-carlo", Integrator::MonteCarlo { sweeps: 1, max_move: None }),
         ("velocity-verlet", Integrator::VelocityVerlet),
         ("groot-warren", Integrator::GrootWarren { lambda: GROOT_WARREN }),
         ("dpd-vv", Integrator::DpdVv { noise: Law::Gaussian }),
@@ -162,15 +163,10 @@ impl Integrator {
         ),
     ];
 
-    pub const NAMED: [(&str, Integrator); Integrator::ALL.len() + 1] = {
-        let monte_carlo = Integrator::MonteCarlo { sweeps: 1, max_move: None };
-        let mut named = [("monte-carlo", monte_carlo); Integrator::ALL.len() + 1];
-        let mut k = 0;
-        while k < Integrator::ALL.len() {
-            named[k] = Integrator::ALL[k];
-            k += 1;
-        }
-        named
+    /// Those with a time step.
+    pub const ALL: [(&str, Integrator); 12] = {
+        let [_, timed @ ..] = Integrator::NAMED;
+        timed
     };
 
     pub fn name(&self) -> &'static str {

@@ -95,7 +95,7 @@ fn in_precision(
         simulation.prepare(dt, Want::FORCES)?;
         simulation.advance(steps, dt, Integrator::VelocityVerlet)?;
     }
-    Ok(simulation.state())
+    Ok(simulation.state().clone())
 }
 
 /// A state with the data files that LAMMPS reads.

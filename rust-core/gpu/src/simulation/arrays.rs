@@ -95,14 +95,10 @@ impl GpuSimulation {
             .enumerate()
             .map(|(k, size)| match old.get(k) {
                 Some(buffer) if buffer.size() == *size => buffer.clone(),
-                _ => self.device.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: None,
-                    size: *size,
-                    usage: Usage::COPY_DST
-                        | Usage::COPY_SRC
-                        | if k < 2 { Usage::UNIFORM } else { Usage::STORAGE },
-                    mapped_at_creation: false,
-                }),
+                _ => {
+                    let usage = if k < 2 { Usage::UNIFORM } else { Usage::STORAGE };
+                    self.device.buffer(*size, Usage::COPY_DST | Usage::COPY_SRC | usage)
+                }
             })
             .collect();
         if let Some(error) = pollster::block_on(scope.pop()) {

@@ -3,7 +3,7 @@
 //! Each plane adds to its own particles and to those of the next in a buffer of its own, so that the
 //! order of each sum is fixed, whichever thread computes it.
 
-use crate::engine::sweep::{PlanePairs, Pool, part};
+use crate::engine::sweep::{PlanePairs, Pool};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{PairList, pairs_of_each};
 pub use psidpd_passes::plane::pair_sums::Wide;
@@ -133,17 +133,9 @@ pub fn fill<T: Copy + Default + Send>(
     order: &[u32],
     value: impl Fn(usize) -> T + Sync,
 ) {
-    let (count, threads) = (order.len(), pool.threads());
-    to.resize(count, T::default());
-    let mut rest = &mut to[..];
-    let mut parts: Vec<_> = (0..threads)
-        .map(|number| {
-            let range = part(count, number, threads);
-            (rest.split_off_mut(..range.len()).unwrap_or_default(), &order[range])
-        })
-        .collect();
-    pool.each(&mut parts, |(to, order)| {
-        for (to, k) in to.iter_mut().zip(*order) {
+    to.resize(order.len(), T::default());
+    pool.parts(to, |first, to| {
+        for (to, k) in to.iter_mut().zip(&order[first..]) {
             *to = value(*k as usize);
         }
     });
@@ -162,15 +154,8 @@ pub fn each_of_host(
     to: &mut [[f64; 3]],
     change: impl Fn(&mut [f64; 3], &Wide) + Sync,
 ) {
-    let (count, mut rest, threads) = (to.len(), to, pool.threads());
-    let mut parts: Vec<_> = (0..threads)
-        .map(|number| {
-            let range = part(count, number, threads);
-            (rest.split_off_mut(..range.len()).unwrap_or_default(), &place[range])
-        })
-        .collect();
-    pool.each(&mut parts, |(to, place)| {
-        for (to, place) in to.iter_mut().zip(*place) {
+    pool.parts(to, |first, to| {
+        for (to, place) in to.iter_mut().zip(&place[first..]) {
             if let Some(from) = from.get(*place as usize) {
                 change(to, from);
             }

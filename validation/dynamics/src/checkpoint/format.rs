@@ -1,7 +1,6 @@
 //! The conversion of a checkpoint to bytes and back.
 
-use super::{Checkpoint, CheckpointError};
-use crc32fast::Hasher;
+use super::{Checkpoint, CheckpointError, Written};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
@@ -14,14 +13,13 @@ const HEADER: usize = 24;
 pub fn write<W: Write + Seek>(checkpoint: &Checkpoint, mut to: W) -> io::Result<()> {
     // The header holds the checksum and the length of the payload, so it is written last.
     to.write_all(&[0; HEADER])?;
-    let payload = Payload { to: &mut to, length: 0, hasher: Hasher::new(), error: None };
+    let payload = Payload { to: &mut to, written: Written::default(), error: None };
     let mut buffer = BufWriter::with_capacity(1 << 16, payload);
     if let Err(error) = postcard::to_io(checkpoint, &mut buffer) {
         let (payload, _) = buffer.into_parts();
         return Err(payload.error.unwrap_or_else(|| io::Error::other(error)));
     }
-    let payload = buffer.into_inner().map_err(io::IntoInnerError::into_error)?;
-    let (length, checksum) = (payload.length, payload.hasher.finalize());
+    let Written { length, checksum } = buffer.into_inner().map_err(io::IntoInnerError::into_error)?.written;
     to.seek(SeekFrom::Start(0))?;
     to.write_all(&MAGIC)?;
     to.write_all(&VERSION.to_le_bytes())?;
@@ -32,8 +30,7 @@ pub fn write<W: Write + Seek>(checkpoint: &Checkpoint, mut to: W) -> io::Result<
 /// Counts the bytes of the payload, updates their checksum, and keeps the error that postcard would drop.
 struct Payload<W> {
     to: W,
-    length: u64,
-    hasher: Hasher,
+    written: Written,
     error: Option<io::Error>,
 }
 
@@ -41,8 +38,7 @@ impl<W: Write> Write for Payload<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self.to.write(bytes) {
             Ok(count) => {
-                self.length += count as u64;
-                self.hasher.update(&bytes[..count]);
+                self.written.add(&bytes[..count]);
                 Ok(count)
             }
             Err(error) => {
@@ -95,6 +91,5 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Checkpoint, CheckpointError> {
     if payload.len() as u64 > length || crc32fast::hash(payload) != checksum {
         return Err(damaged("its checksum does not match".into()));
     }
-    let checkpoint: Checkpoint = postcard::from_bytes(payload).map_err(|e| damaged(e.to_string()))?;
-    Ok(checkpoint)
+    postcard::from_bytes(payload).map_err(|e| damaged(e.to_string()))
 }

@@ -1,7 +1,7 @@
 //! Accelerations of single particles.
 
 use super::tags::Tags;
-use psidpd_core::engine::{PeriodicBox, Pool, part};
+use psidpd_core::engine::PeriodicBox;
 use psidpd_observe::Drive;
 
 /// A constant acceleration of some of the particles, as by gravity. Reversed in the upper half of the box along
@@ -38,29 +38,6 @@ impl BodyForce {
             _ => self.acceleration,
         }
     }
-}
-
-/// Adds the forces of `bodies` to `force`; `on` computes the force of one body on one particle.
-pub fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
-where
-    F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
-{
-    let (count, mut rest, threads) = (force.len(), force, pool.threads());
-    let mut parts: Vec<_> = (0..threads)
-        .map(|number| {
-            let range = part(count, number, threads);
-            (range.start, rest.split_off_mut(..range.len()).unwrap_or_default())
-        })
-        .collect();
-    pool.each(&mut parts, |(first, force)| {
-        for (k, sum) in force.iter_mut().enumerate() {
-            for f in bodies.iter().filter_map(|body| on(body, *first + k)) {
-                for c in 0..3 {
-                    sum[c] += f[c];
-                }
-            }
-        }
-    });
 }
 
 #[cfg(test)]
@@ -100,7 +77,7 @@ mod tests {
         for k in 0..state.len() {
             let wind = if state.species[k] == 1 { 0.5 } else { 0.0 };
             let expected = [state.v[k][0] + wind, state.v[k][1], state.v[k][2] - 1.0];
-            assert!((0..3).all(|c| (run.velocities()[k][c] - expected[c]).abs() < 1e-12), "{k}");
+            assert!((0..3).all(|c| (run.state().v[k][c] - expected[c]).abs() < 1e-12), "{k}");
         }
         assert!(run.tally().virial.iter().all(|w| *w == 0.0));
     }
@@ -111,8 +88,8 @@ mod tests {
         let (scene, state) = scene("[[body_force]]\nacceleration = [5, 0, 0]\nreversed_along = \"z\"\n");
         let run = run(&scene, &state, 40, true);
         let mean = |upper: bool| {
-            let of = (0..run.len()).filter(|k| (run.positions()[*k][2] >= 4.0) == upper);
-            let v: Vec<f64> = of.map(|k| run.velocities()[k][0]).collect();
+            let of = (0..run.len()).filter(|k| (run.state().x[*k][2] >= 4.0) == upper);
+            let v: Vec<f64> = of.map(|k| run.state().v[k][0]).collect();
             v.iter().sum::<f64>() / v.len() as f64
         };
         // Without viscosity the means are 2 and -2; thermal velocities give the mean of 430 particles an error of 0.04.

@@ -3,9 +3,7 @@
 use super::state::State;
 use super::tags::order_of_tags;
 use psidpd_core::model::Model;
-use psidpd_formats::FormatError;
 use psidpd_formats::data::{Atom, DataFile};
-use std::path::Path;
 
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the initial state is not usable: {message}")]
@@ -107,11 +105,6 @@ impl State {
         }
         Ok(state)
     }
-}
-
-/// Writes `state` as a data file in the order of tags, with enough digits to restore the exact values.
-pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -> Result<(), FormatError> {
-    DataFile { names: species.to_vec(), ..state.to_data_by_tag(title) }.write(path)
 }
 
 #[cfg(test)]

@@ -8,9 +8,7 @@ mod tags;
 mod thermal;
 
 pub use body_force::BodyForce;
-pub use body_force::add as add_body_forces;
-pub use data_file::{StateError, write_data};
+pub use data_file::StateError;
 pub use state::State;
 pub use tags::Tags;
-pub use tags::order_of_tags;
 pub use thermal::maxwell;

@@ -1,6 +1,8 @@
 use super::box_by_edges;
+use super::tags::order_of_tags;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// The particles in their box: all that a trajectory starts from and ends with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,6 +42,23 @@ impl State {
 
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
+    }
+
+    /// The particles in the order of their tags: a copy, unless they are in it.
+    pub fn by_tag(&self) -> Cow<'_, State> {
+        if self.tag.is_sorted() {
+            return Cow::Borrowed(self);
+        }
+        let order = order_of_tags(&self.tag);
+        Cow::Owned(State {
+            domain: self.domain.clone(),
+            mass: self.mass.clone(),
+            x: order.iter().map(|k| self.x[*k]).collect(),
+            v: order.iter().map(|k| self.v[*k]).collect(),
+            species: order.iter().map(|k| self.species[*k]).collect(),
+            tag: order.iter().map(|k| self.tag[*k]).collect(),
+            image: order.iter().map(|k| self.image[*k]).collect(),
+        })
     }
 
     /// Copies all particles of `other`, which has the same box and masses, and reuses the memory.

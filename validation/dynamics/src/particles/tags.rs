@@ -64,7 +64,7 @@ mod tests {
             assert_eq!((run.mobile(), run.len()), (450, 525));
             advance(&mut run, 100, integrator);
             for k in 0..run.len() {
-                let rests = run.positions()[k] == state.x[k] && run.velocities()[k] == [0.0; 3];
+                let rests = run.state().x[k] == state.x[k] && run.state().v[k] == [0.0; 3];
                 assert_eq!(rests, run.frozen()[k], "{k}");
             }
             assert_eq!(run.degrees_of_freedom(), 3 * 450);

@@ -74,7 +74,7 @@ impl Advice {
 /// The root mean square frequency of the particles; `None` if the forces have no Laplacian.
 fn frequency(simulation: &Simulation) -> Option<f64> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
-    if configurational::missing(&fluid, simulation.domain()).is_some() {
+    if configurational::missing(&fluid, &simulation.state().domain).is_some() {
         return None;
     }
     let evaluator = Evaluator::new(fluid).ok()?;

@@ -150,8 +150,8 @@ mod tests {
             for k in 0..200 {
                 for (c, low, length) in [(0, -1.0, 3.0), (2, 2.0, 5.0)] {
                     let (x, sign) = fold(start.x[k][c] + 7.0 * start.v[k][c], low, length);
-                    assert!((run.positions()[k][c] - x).abs() < 1e-9, "{k} {c}");
-                    assert!((run.velocities()[k][c] - sign * start.v[k][c]).abs() < 1e-12);
+                    assert!((run.state().x[k][c] - x).abs() < 1e-9, "{k} {c}");
+                    assert!((run.state().v[k][c] - sign * start.v[k][c]).abs() < 1e-12);
                 }
             }
             // Momentum is conserved along y alone, and each direction has its share of the degrees of freedom.

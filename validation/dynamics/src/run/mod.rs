@@ -27,7 +27,7 @@ mod watch;
 
 pub use crate::checkpoint::{self, Means, Sums, Thermo};
 pub use crate::integrator::Integrator;
-pub use crate::particles::{BodyForce, State, StateError, Tags, write_data};
+pub use crate::particles::{BodyForce, State, StateError, Tags};
 pub use advice::Advice;
 pub use error::RunError;
 pub use live::Live;

@@ -1,7 +1,7 @@
 //! Sorts particles in memory by their cells: neighbours share the cache, and the engine reads and writes the
 //! host's arrays almost sequentially.
 
-use psidpd_core::engine::{Pool, part};
+use psidpd_core::engine::Pool;
 use std::iter::Map;
 use std::slice::Iter;
 
@@ -45,15 +45,8 @@ impl Reordering {
 
     fn gather(&mut self, pool: &Pool, order: &[u32], get: impl Fn(usize) -> [f64; 3] + Sync) {
         self.scratch.resize(order.len(), [0.0; 3]);
-        let (mut rest, threads) = (&mut self.scratch[..], pool.threads());
-        let mut parts: Vec<_> = (0..threads)
-            .map(|number| {
-                let range = part(order.len(), number, threads);
-                (rest.split_off_mut(..range.len()).unwrap_or_default(), &order[range])
-            })
-            .collect();
-        pool.each(&mut parts, |(to, order)| {
-            for (to, k) in to.iter_mut().zip(*order) {
+        pool.parts(&mut self.scratch, |first, to| {
+            for (to, k) in to.iter_mut().zip(&order[first..]) {
                 *to = get(*k as usize);
             }
         });

@@ -1,15 +1,16 @@
 use super::checkpoints::Checkpoints;
 use super::folder::Folder;
 use super::output::{Output, replaces};
-use super::underway::Run;
-use super::{Outcome, Progress, RunError, Summary, Sums, Timing, bytes_per_particle};
-
+use super::timing::Clock;
+use super::watch::Watch;
+use super::{
+    Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, about, bytes_per_particle,
+};
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::memory;
 use psidpd_observe::Observers;
-use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
@@ -61,7 +62,21 @@ pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) 
 /// state of the last checkpoint, thermo row or start of a stage.
 pub struct Runner<'a> {
     start: Start,
-    run: Run<'a>,
+    pub(super) scene: &'a Scene,
+    pub(super) folder: Folder,
+    pub(super) simulation: Simulation,
+    /// The open files; `None` if the run is finished.
+    pub(super) output: Option<Output>,
+    pub(super) checkpoints: Checkpoints,
+    /// The present place of the run in its stages, and the totals of the stage so far.
+    pub(super) position: Position,
+    pub(super) sums: Sums,
+    pub(super) last: Option<Thermo>,
+    pub(super) steps: u64,
+    pub(super) observers: Observers,
+    /// The watch over the present stage since the start of this session.
+    pub(super) watch: Watch,
+    pub(super) clock: Clock,
 }
 
 impl<'a> Runner<'a> {
@@ -88,6 +103,7 @@ impl<'a> Runner<'a> {
         let state = scene.initial_state();
         let simulation = scene.simulation_of_run(state.clone(), NonZeroUsize::MIN)?;
         store.clear()?;
+        let mut output = Output::create(scene, out)?;
         let good = Checkpoint {
             program: PROGRAM.into(),
             instructions: simulation.arithmetic(),
@@ -101,15 +117,12 @@ impl<'a> Runner<'a> {
             out_of_bounds: [0; 2],
             last: None,
             sums: Sums::default(),
-            files: BTreeMap::new(),
+            files: output.written(),
             observers: Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()))
                 .to_bytes(),
         };
-        let mut output = Output::create(scene, out)?;
-        let good = Checkpoint { files: output.written(), ..good };
         let checkpoints = Checkpoints::new(store, good, None);
-        let run = Run::new(scene, folder, simulation, Some(output), checkpoints, Timing::default())?;
-        Ok(Runner { start: Start::New, run })
+        Runner::of(scene, folder, simulation, Some(output), checkpoints, Start::New)
     }
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
@@ -133,17 +146,48 @@ impl<'a> Runner<'a> {
             (start, Some(Output::reopen(scene, &folder.path, &good)?))
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
-        let timing = Timing::read(&folder.path);
         // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
         if !folder.path.join("about.json").is_file() {
-            super::about::about(scene)
+            about::about(scene)
                 .write(&folder.path)
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
         let stored = Some(good.step);
         let checkpoints = Checkpoints::new(store, good, stored);
-        let run = Run::new(scene, folder, simulation, output, checkpoints, timing)?;
-        Ok(Runner { start, run })
+        Runner::of(scene, folder, simulation, output, checkpoints, start)
+    }
+
+    fn of(
+        scene: &'a Scene,
+        folder: Folder,
+        simulation: Simulation,
+        output: Option<Output>,
+        checkpoints: Checkpoints,
+        start: Start,
+    ) -> Result<Runner<'a>, RunError> {
+        let good = &checkpoints.good;
+        let unused = Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()));
+        let observers = unused.restore(&good.observers).map_err(|error| CheckpointError::Damaged {
+            path: checkpoints.store.path(),
+            what: format!("its observables: {error}"),
+        })?;
+        let earlier =
+            if matches!(start, Start::New) { Timing::default() } else { Timing::read(&folder.path) };
+        Ok(Runner {
+            start,
+            scene,
+            folder,
+            simulation,
+            output,
+            position: good.position,
+            sums: good.sums,
+            last: good.last,
+            steps: scene.stages.iter().map(|s| s.steps).sum(),
+            observers,
+            watch: Watch::default(),
+            clock: Clock::new(earlier, good.step),
+            checkpoints,
+        })
     }
 
     pub fn start(&self) -> &Start {
@@ -152,27 +196,27 @@ impl<'a> Runner<'a> {
 
     /// Sets the wall time between checkpoints for a scene without a step interval; the default is ten minutes.
     pub fn set_checkpoint_interval(&mut self, interval: Duration) {
-        self.run.checkpoints.interval = interval;
+        self.checkpoints.interval = interval;
     }
 
     /// Sets the number of threads; the default is one. The output of a run does not depend on it.
     pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
-        let settings = self.run.simulation.settings();
-        self.run.simulation.set_settings(Settings { threads, ..settings })
+        let settings = self.simulation.settings();
+        self.simulation.set_settings(Settings { threads, ..settings })
     }
 
     /// Makes forces wrong; see [`Simulation::falsify`]. Call it last, for a run at one temperature.
     #[doc(hidden)]
     pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
-        self.run.simulation.falsify(fault)
+        self.simulation.falsify(fault)
     }
 
     pub fn evaluation(&self) -> String {
-        self.run.simulation.evaluation()
+        self.simulation.evaluation()
     }
 
     pub fn particles(&self) -> usize {
-        self.run.simulation.len()
+        self.simulation.len()
     }
 
     /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop` is not 0.
@@ -181,17 +225,16 @@ impl<'a> Runner<'a> {
         stop: &AtomicUsize,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<Outcome, RunError> {
-        let Runner { start, run } = self;
-        if matches!(start, Start::Finished) {
+        if matches!(self.start, Start::Finished) {
             // Leftover checkpoints are harmless, and the folder may be read-only, so an error is ignored.
-            let _ = run.checkpoints.store.keep_newest();
+            let _ = self.checkpoints.store.keep_newest();
             return Ok(Outcome::Finished {
-                summary: Box::new(run.summary()),
-                timing: run.clock.earlier.clone(),
+                summary: Box::new(self.summary()),
+                timing: self.clock.earlier.clone(),
                 advice: None,
             });
         }
-        run.go_on(stop, progress).map_err(|error| run.stop(error))
+        self.go_on(stop, progress).map_err(|error| self.stop(error))
     }
 
     pub fn run_to_end(&mut self, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {

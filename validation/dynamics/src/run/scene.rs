@@ -1,8 +1,10 @@
 //! Simulations of scenes.
 
 use super::{RunError, Simulation, State};
-use crate::scene::{Scene, Stage};
-use psidpd_core::engine::Settings;
+use crate::device::{Device, DeviceError, refused_step};
+use crate::scene::{Scene, Stage, place_of_integrator};
+use psidpd_core::document::{Document, Section, Value};
+use psidpd_core::engine::{Precision, Settings};
 use std::num::NonZeroUsize;
 
 impl Scene {
@@ -24,15 +26,43 @@ impl Scene {
         let precision = self.precision();
         simulation.set_settings(Settings { precision, threads, ..simulation.settings() })?;
         simulation.set_reordering(true);
-        let refused = match simulation.use_device(self.device) {
-            Err(RunError::Device(error)) => Some(self.located(error, |_| None)),
-            outcome => outcome.map(|()| self.refused_by_device())?,
-        };
-        match refused {
-            None => Ok(simulation),
-            Some((_, Some(located))) => Err(located.into()),
-            Some((error, None)) => Err(error.into()),
+        match simulation.use_device(self.device) {
+            Err(RunError::Device(error)) => Err(self.located(error, |_| None)),
+            outcome => outcome.and_then(|()| self.check_device()).map(|()| simulation),
         }
+    }
+
+    /// Refuses the first setting that the device of this scene does not compute.
+    fn check_device(&self) -> Result<(), RunError> {
+        if self.device == Device::Cpu {
+            return Ok(());
+        }
+        if self.precision() == Precision::Double {
+            let lacks = DeviceError::Lacks("double precision".into());
+            return Err(self.located(lacks, |root| root.get("precision")));
+        }
+        let walls = self.domain.periodic()[..self.model.dimensions()].contains(&false);
+        let lacks = |stage: &Stage| {
+            let lacks = DeviceError::Lacks(refused_step(stage.integrator, walls)?);
+            Some(self.located(lacks, |root| place_of_integrator(root, &stage.name)))
+        };
+        self.stages.iter().find_map(lacks).map_or(Ok(()), Err)
+    }
+
+    /// An error of the device, at its place if the file has it: that of `find`, or else of the key `device`.
+    fn located(
+        &self,
+        error: DeviceError,
+        find: impl for<'a> Fn(&Section<'a>) -> Option<Value<'a>>,
+    ) -> RunError {
+        let document = Document::parse(self.source.name(), self.source.text()).ok();
+        let at = document.as_ref().and_then(|document| {
+            let root = document.root();
+            let value = find(&root).or_else(|| root.get("device"))?;
+            let found = value.error(error.to_string());
+            Some(error.help().map_or(found.clone(), |help| found.with_help(help)))
+        });
+        at.map_or(RunError::Device(error), RunError::File)
     }
 
     /// Whether the length of trial moves is still tuned before step `done` of stage `index`. It is tuned in the

@@ -1,69 +1,17 @@
-use super::checkpoints::Checkpoints;
-use super::folder::Folder;
-use super::output::{Output, write_observations};
-use super::timing::Clock;
-use super::view::ByTag;
+//! The course of a run: its steps, its output and its end.
+
+use super::output::write_observations;
 use super::watch::Watch;
-use super::{Advice, Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, write_data};
-use crate::checkpoint::{CheckpointError, Position};
-use crate::scene::{Scene, Stage, every};
+use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
+use crate::checkpoint::Position;
+use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
-use psidpd_observe::Observers;
+use psidpd_formats::data::DataFile;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The place of a run in its scene, and the totals of the stage so far.
-#[derive(Clone, Copy)]
-struct Present {
-    position: Position,
-    sums: Sums,
-    last: Option<Thermo>,
-}
-
-pub(super) struct Run<'a> {
-    scene: &'a Scene,
-    folder: Folder,
-    pub simulation: Simulation,
-    /// The open files; `None` if the run is finished.
-    output: Option<Output>,
-    pub checkpoints: Checkpoints,
-    present: Present,
-    steps: u64,
-    observers: Observers,
-    /// The watch over the present stage since the start of this session.
-    watch: Watch,
-    pub clock: Clock,
-}
-
-impl<'a> Run<'a> {
-    pub fn new(
-        scene: &'a Scene,
-        folder: Folder,
-        simulation: Simulation,
-        output: Option<Output>,
-        checkpoints: Checkpoints,
-        timing: Timing,
-    ) -> Result<Run<'a>, RunError> {
-        let good = &checkpoints.good;
-        let unused = Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()));
-        let observers = unused.restore(&good.observers).map_err(|error| CheckpointError::Damaged {
-            path: checkpoints.store.path(),
-            what: format!("its observables: {error}"),
-        })?;
-        Ok(Run {
-            scene,
-            folder,
-            simulation,
-            output,
-            present: Present { position: good.position, sums: good.sums, last: good.last },
-            steps: scene.stages.iter().map(|s| s.steps).sum(),
-            observers,
-            watch: Watch::default(),
-            clock: Clock::new(timing, good.step),
-            checkpoints,
-        })
-    }
-
-    pub fn go_on(
+impl Runner<'_> {
+    pub(super) fn go_on(
         &mut self,
         stop: &AtomicUsize,
         progress: &mut dyn FnMut(Progress),
@@ -71,8 +19,8 @@ impl<'a> Run<'a> {
         self.clock.restart(self.simulation.step_number());
         let scene = self.scene;
         loop {
-            let stage = &scene.stages[self.present.position.stage];
-            if !self.present.position.entered {
+            let stage = &scene.stages[self.position.stage];
+            if !self.position.entered {
                 self.enter(stage, progress)?;
                 // With many particles the first forces take as long as many steps of few, so a stop request
                 // is checked here too.
@@ -80,17 +28,17 @@ impl<'a> Run<'a> {
                     return Ok(outcome);
                 }
             }
-            while self.present.position.done < stage.steps {
+            while self.position.done < stage.steps {
                 self.step(stage, progress)?;
                 if let Some(outcome) = self.interrupted(stop)? {
                     return Ok(outcome);
                 }
             }
-            if self.present.position.stage + 1 == scene.stages.len() {
+            if self.position.stage + 1 == scene.stages.len() {
                 return self.finish();
             }
-            let Position { stage, time, .. } = self.present.position;
-            self.present.position = Position { stage: stage + 1, entered: false, done: 0, begin: time, time };
+            let Position { stage, time, .. } = self.position;
+            self.position = Position { stage: stage + 1, entered: false, done: 0, begin: time, time };
         }
     }
 
@@ -111,12 +59,12 @@ impl<'a> Run<'a> {
 
     /// Computes the forces before the first step of a stage.
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
-        self.present.sums = Sums::default();
+        self.sums = Sums::default();
         self.watch = Watch::default();
         self.scene.enter(stage, &mut self.simulation)?;
         self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
         self.simulation.fetch()?;
-        self.present.position.entered = true;
+        self.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
             // A test of writing a checkpoint before the first step reveals a full or read-only disk early.
@@ -135,15 +83,14 @@ impl<'a> Run<'a> {
             want = Want { energy: true, virial: true, ..want };
         }
         self.simulation.record_flux(self.observers.wants_flux(number, &stage.name));
-        self.simulation
-            .set_settling(self.scene.settles(self.present.position.stage, self.present.position.done));
+        self.simulation.set_settling(self.scene.settles(self.position.stage, self.position.done));
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
-        let is_last = self.present.position.done + 1 == stage.steps;
-        let watched = Watch::is_due(stage, self.present.position.done + 1);
+        let is_last = self.position.done + 1 == stage.steps;
+        let watched = Watch::is_due(stage, self.position.done + 1);
         if watched {
             self.simulation.end_step()?;
             self.simulation.fetch()?;
-            self.watch.sample(&mut self.simulation, stage, self.present.position.done + 1)?;
+            self.watch.sample(&mut self.simulation, stage, self.position.done + 1)?;
         }
         let sampled = self.observers.may_sample(number, &stage.name);
         if is_last || totals || sampled || self.scene.output.writes_particles(number) {
@@ -153,11 +100,10 @@ impl<'a> Run<'a> {
                 self.simulation.fetch()?;
             }
         }
-        self.present.position.done += 1;
-        self.present.position.time =
-            self.present.position.begin + self.present.position.done as f64 * stage.dt;
+        self.position.done += 1;
+        self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
         if sampled {
-            self.observers.sample(self.simulation.view(self.present.position.time), &stage.name);
+            self.observers.sample(self.simulation.view(self.position.time), &stage.name);
         }
         self.report(stage, totals, progress)?;
         let due = match self.scene.output.checkpoint {
@@ -180,21 +126,18 @@ impl<'a> Run<'a> {
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RunError> {
         let step = self.simulation.step_number();
-        let thermo = totals.then(|| Thermo::of(&self.simulation, self.present.position.time));
+        let thermo = totals.then(|| Thermo::of(&self.simulation, self.position.time));
         if let Some(output) = &mut self.output {
             if let Some(thermo) = &thermo {
-                self.present.last = Some(*thermo);
+                self.last = Some(*thermo);
                 // The initial state of a run is not counted in the means of its stage.
                 if output.row(thermo)? && step > 0 && thermo.potential.is_finite() {
-                    self.present.sums.add(thermo);
+                    self.sums.add(thermo);
                 }
             }
             if self.scene.output.writes_particles(step) {
-                let sorted = ByTag::of(&self.simulation);
-                let frame = match &sorted {
-                    Some(sorted) => sorted.frame(&self.simulation, self.present.position.time),
-                    None => self.simulation.frame(self.present.position.time),
-                };
+                let state = self.simulation.state().by_tag();
+                let frame = self.simulation.frame(&state, self.position.time);
                 output.particles(self.scene, &self.folder.path, &frame)?;
             }
         }
@@ -202,7 +145,7 @@ impl<'a> Run<'a> {
         if totals && self.simulation.is_here() {
             self.keep_state()?;
         }
-        let deviations = match self.present.position.done == stage.steps {
+        let deviations = match self.position.done == stage.steps {
             true => self.watch.deviations(stage),
             false => Vec::new(),
         };
@@ -215,10 +158,9 @@ impl<'a> Run<'a> {
     fn keep_state(&mut self) -> Result<(), RunError> {
         self.simulation.fetch()?;
         let good = &mut self.checkpoints.good;
-        let Present { position, sums, last } = self.present;
-        (good.position, good.sums, good.last) = (position, sums, last);
+        (good.position, good.sums, good.last) = (self.position, self.sums, self.last);
         good.step = self.simulation.step_number();
-        self.simulation.copy_state(&mut good.state);
+        good.state.copy_particles(self.simulation.state());
         good.forces.clear();
         good.forces.extend_from_slice(self.simulation.forces());
         good.max_move = self.simulation.max_move();
@@ -251,28 +193,21 @@ impl<'a> Run<'a> {
     }
 
     /// Saves the last good state of a failed run.
-    pub fn stop(&mut self, cause: RunError) -> RunError {
-        let step = self.simulation.step_number();
+    pub(super) fn stop(&mut self, cause: RunError) -> RunError {
+        let (step, good) = (self.simulation.step_number(), self.checkpoints.good.step);
         if cause.is_output() {
             // A newer checkpoint may fit on the disk; if not, the old one remains.
-            if self.checkpoints.stored != Some(self.checkpoints.good.step) {
+            if self.checkpoints.stored != Some(good) {
                 let _ = self.store_good();
             }
             return RunError::Halted { step, cause: Box::new(cause), checkpoint: self.checkpoints.stored };
         }
-        let checkpoint =
-            self.checkpoints.stored == Some(self.checkpoints.good.step) || self.store_good().is_ok();
-        let saved = self.folder.path.join("last-good.data");
-        match write_data(
-            &saved,
-            &self.data_title(self.checkpoints.good.step),
-            &self.checkpoints.good.state,
-            self.scene.model.species(),
-        ) {
-            Ok(()) => RunError::Stopped {
-                stage: self.scene.stages[self.present.position.stage].name.clone(),
+        let checkpoint = self.checkpoints.stored == Some(good) || self.store_good().is_ok();
+        match self.write_good("last-good.data") {
+            Ok(saved) => RunError::Stopped {
+                stage: self.scene.stages[self.position.stage].name.clone(),
                 cause: Box::new(cause),
-                good: self.checkpoints.good.step,
+                good,
                 saved,
                 checkpoint,
             },
@@ -283,13 +218,7 @@ impl<'a> Run<'a> {
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
-        let path = self.folder.path.join("final.data");
-        write_data(
-            &path,
-            &self.data_title(self.steps),
-            &self.checkpoints.good.state,
-            self.scene.model.species(),
-        )?;
+        let path = self.write_good("final.data")?;
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
@@ -303,21 +232,24 @@ impl<'a> Run<'a> {
         Ok(Outcome::Finished { summary: Box::new(summary), timing, advice })
     }
 
-    fn data_title(&self, step: u64) -> String {
-        format!("psidpd: {}, step {step}", self.scene.title)
+    /// Writes the last good state as a data file in the folder, and returns its path.
+    fn write_good(&self, name: &str) -> Result<PathBuf, RunError> {
+        let good = &self.checkpoints.good;
+        let path = self.folder.path.join(name);
+        let title = format!("psidpd: {}, step {}", self.scene.title, good.step);
+        let data = good.state.to_data_by_tag(&title);
+        DataFile { names: self.scene.model.species().to_vec(), ..data }.write(&path)?;
+        Ok(path)
     }
 
-    pub fn summary(&self) -> Summary {
+    pub(super) fn summary(&self) -> Summary {
         Summary {
             title: self.scene.title.clone(),
             particles: self.simulation.len(),
             steps: self.steps,
             out_of_bounds: self.simulation.out_of_bounds(),
-            last: self
-                .present
-                .last
-                .unwrap_or_else(|| Thermo::of(&self.simulation, self.present.position.time)),
-            means: self.present.sums.means(),
+            last: self.last.unwrap_or_else(|| Thermo::of(&self.simulation, self.position.time)),
+            means: self.sums.means(),
         }
     }
 }

@@ -321,7 +321,7 @@ fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Esti
 /// so many particles that their pairs would fill the memory.
 fn configurational(simulation: &Simulation) -> Option<Configurational> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
-    let missing = configurational::missing(&fluid, simulation.domain()).is_some();
+    let missing = configurational::missing(&fluid, &simulation.state().domain).is_some();
     if simulation.len() > MOST || simulation.has_body_forces() || missing {
         return None;
     }

@@ -10,21 +10,19 @@ pub struct Composition(pub(super) Vec<f64>);
 impl Composition {
     /// Reads the fractions; equal ones if the file gives none. Species without an entry get none.
     pub(super) fn read(initial: &Section, species: &[String]) -> Result<Composition, FileError> {
-        let count = species.len();
+        let mut fractions = vec![0.0; species.len()];
         if let Some(value) = initial.get("species") {
-            let index = species_of(&value.string()?, species)?;
+            fractions[species_of(&value.string()?, species)?] = 1.0;
             if let Some(both) = initial.get("composition") {
                 return Err(both.error("species is given too: give one of them"));
             }
-            let mut fractions = vec![0.0; count];
-            fractions[index] = 1.0;
             return Ok(Composition(fractions));
         }
         let Some(value) = initial.get("composition") else {
-            return Ok(Composition::equal(count));
+            fractions.fill(1.0 / species.len() as f64);
+            return Ok(Composition(fractions));
         };
         let section = value.section()?;
-        let mut fractions = vec![0.0; count];
         for (name, value) in section.entries() {
             let index = species_of(&name, species)?;
             let fraction = value.number()?.value;
@@ -38,10 +36,6 @@ impl Composition {
             return Err(value.error(format!("the fractions add up to {sum}, not to 1")));
         }
         Ok(Composition(fractions))
-    }
-
-    pub(super) fn equal(count: usize) -> Composition {
-        Composition(vec![1.0 / count as f64; count])
     }
 
     /// Divides `count` particles among the species: whole numbers that add up to `count`, each less than one

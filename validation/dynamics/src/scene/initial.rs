@@ -3,8 +3,11 @@
 use super::part::{Common, WHOLE};
 use super::{
     Arrangement, FileError, Lattice, Model, Part, Path, PathBuf, PeriodicBox, Section, State, Tags, Value,
-    Velocities, domain, saved,
+    Velocities, domain,
 };
+use crate::checkpoint;
+use nalgebra::{Matrix3, Vector3};
+use psidpd_formats::data::DataFile;
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
@@ -68,39 +71,30 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
     if let Some(other) = root.get("part") {
         return Err(other.error("there is an [initial] too: give one of them"));
     }
-    let initial = if let Some(format) = saved::Format::of(&kind) {
+    if ["data", "checkpoint"].contains(&kind.as_str()) {
         if let Some(value) = root.get("density") {
             return Err(value.error("the initial file gives the particles: remove the density"));
         }
         let periodic = domain::read_boundary_alone(root, dimensions)?;
-        let saved::Saved { path, state, velocities, frozen } =
-            saved::read(&section, format, model, base, periodic)?;
-        let domain = state.domain.clone();
-        (Initial::File { path, state: Box::new(state), velocities, frozen }, domain)
-    } else {
-        let domain = domain::read(root, dimensions)?;
-        let common = Common::of(root, model, &domain)?;
-        let part = read_one(&kind, &key, &section, &common)?;
-        (Initial::Parts(vec![part]), domain)
-    };
-    Ok(initial)
+        return read_saved(&section, kind == "checkpoint", model, base, periodic);
+    }
+    let domain = domain::read(root, dimensions)?;
+    let part = read_one(&kind, &key, &section, &Common::of(root, model, &domain)?)?;
+    Ok((Initial::Parts(vec![part]), domain))
 }
 
 /// Reads a scene without `[initial]`: from its parts, or as the whole box at the density of the scene.
 fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox), FileError> {
     let parts = root.get("part");
-    let density = root.get("density");
-    if parts.is_none() && density.is_none() {
-        let message = "the scene gives no particles".to_owned();
-        let error = root.error(message);
+    if parts.is_none() && root.get("density").is_none() {
+        let error = root.error("the scene gives no particles");
         return Err(error.with_help("give a density, [initial] or [[part]]"));
     }
     let domain = domain::read(root, model.dimensions())?;
     let common = Common::of(root, model, &domain)?;
-    let parts = match (parts, density) {
-        (Some(parts), _) => common.parts(&parts)?,
-        (None, Some(density)) => vec![common.everywhere(&density, density.positive()?)?],
-        (None, None) => Vec::new(),
+    let parts = match parts {
+        Some(parts) => common.parts(&parts)?,
+        None => vec![common.fill(root, WHOLE.to_owned(), common.shapes.whole())?],
     };
     Ok((Initial::Parts(parts), domain))
 }
@@ -120,4 +114,65 @@ fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Resu
         part.arrangement = Arrangement::Lattice(Lattice::Simple);
     }
     Ok(part)
+}
+
+/// Reads a start from a file of another run: a checkpoint, which may be the folder of a run with one, or a data file.
+fn read_saved(
+    section: &Section,
+    is_checkpoint: bool,
+    model: &Model,
+    base: &Path,
+    periodic: Option<[bool; 3]>,
+) -> Result<(Initial, PeriodicBox), FileError> {
+    let value = section.require("file")?;
+    let path = base.join(value.string()?.value);
+    let read = if is_checkpoint { read_checkpoint } else { read_data };
+    let state = read(&path, model, periodic)
+        .map_err(|why| value.error(why).with_help("the path is relative to the scene file"))?;
+    let velocities = Velocities::read_or_keep(section, is_checkpoint)?;
+    let frozen = read_frozen(section, &state)?;
+    let domain = state.domain.clone();
+    Ok((Initial::File { path, state: Box::new(state), velocities, frozen }, domain))
+}
+
+/// Reads a checkpoint, with its own boundaries without `periodic`.
+fn read_checkpoint(path: &Path, model: &Model, periodic: Option<[bool; 3]>) -> Result<State, String> {
+    let state = checkpoint::read_state(path).map_err(|e| e.to_string())?;
+    let periodic = periodic.unwrap_or_else(|| state.domain.periodic());
+    let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| Vector3::from(state.domain.edge(k))));
+    let domain = PeriodicBox::new(state.domain.origin(), edges, periodic).map_err(|e| e.to_string())?;
+    let state = State { domain, ..state };
+    match state.fault(model.species().len(), model.dimensions()) {
+        Some(fault) => Err(format!("is not a state of this model: {fault}")),
+        None => Ok(state),
+    }
+}
+
+/// Reads a data file, without `periodic` with the walls that it names, or as a periodic box.
+fn read_data(path: &Path, model: &Model, periodic: Option<[bool; 3]>) -> Result<State, String> {
+    let data = DataFile::read(path).map_err(|e| e.to_string())?;
+    let periodic = periodic.or(data.boundary()).unwrap_or([true; 3]);
+    State::from_data_in(&data, model, periodic).map_err(|e| e.to_string())
+}
+
+fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
+    let Some(value) = section.get("frozen_ids") else { return Ok(Tags::none()) };
+    let wrong = |message: String| value.error(message);
+    let ids: Vec<u64> =
+        value.array()?.iter().map(|v| v.count().map(|c| c.value)).collect::<Result<_, _>>()?;
+    let [first, last] = ids[..] else {
+        return Err(wrong(format!(
+            "expected the first and the last id, found an array of length {}",
+            ids.len()
+        )));
+    };
+    let (Ok(first), Ok(last)) = (i32::try_from(first), i32::try_from(last)) else {
+        return Err(wrong(format!("{last} exceeds the largest id, 2147483647")));
+    };
+    let tags = Tags::Ranges(vec![first..=last]);
+    match state.tag.iter().filter(|t| tags.contain(**t)).count() {
+        0 => Err(wrong(format!("no particle of the file has an id from {first} to {last}"))),
+        all if all == state.len() => Err(wrong("every particle is frozen: nothing would move".into())),
+        _ => Ok(tags),
+    }
 }

@@ -13,7 +13,6 @@
 mod arrangement;
 mod body_force;
 mod composition;
-mod device;
 mod domain;
 mod edits;
 mod fill;
@@ -23,8 +22,6 @@ mod masses;
 mod number;
 mod output;
 mod part;
-mod ramp;
-mod saved;
 mod shape;
 mod stage;
 mod template;
@@ -38,6 +35,7 @@ pub use output::{Output, every};
 pub use part::Part;
 pub use shape::Shape;
 pub use stage::Stage;
+pub(crate) use stage::place_of_integrator;
 pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
@@ -118,7 +116,7 @@ impl Scene {
         let kt = root.require("kT")?.positive()?;
         let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
-        let device = root.get("device").map_or(Ok(Device::Cpu), |value| device::read(&value))?;
+        let device = root.get("device").map_or(Ok(Device::Cpu), |value| read_device(&value))?;
         let (initial, domain) = initial::read(&root, &model, base)?;
         let stages = stage::read(&root, kt)?;
         let body_forces = body_force::read(&root, &model, &initial)?;
@@ -251,7 +249,7 @@ impl Scene {
     fn check_trials(&self, root: &Section) -> Result<(), FileError> {
         for stage in self.stages.iter().filter(|stage| !stage.integrator.has_time()) {
             let refuse = |message: String| {
-                stage::place_of_integrator(root, &stage.name)
+                place_of_integrator(root, &stage.name)
                     .map_or_else(|| root.error(message.as_str()), |v| v.error(message.as_str()))
             };
             if let Err(reason) = LocalEnergy::new(&self.model.at(stage.kt)?) {
@@ -265,6 +263,11 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+fn read_device(value: &Value) -> Result<Device, FileError> {
+    let name = value.string()?.value;
+    name.parse().map_err(|message| value.error(message))
 }
 
 fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Model), FileError> {

@@ -56,23 +56,6 @@ impl<'a> Common<'a> {
         })
     }
 
-    /// Fills the whole box at the density of the scene, given by `value`, with equal shares of the species.
-    pub fn everywhere(&self, value: &Value, density: f64) -> Result<Part, FileError> {
-        let shape = self.shapes.whole();
-        let count = (density * shape.volume(self.shapes.dimensions)).round();
-        Ok(Part {
-            name: WHOLE.to_owned(),
-            shape,
-            normal: None,
-            count: check_count(count, |why| value.error(why))?,
-            composition: Composition::equal(self.model.species().len()),
-            arrangement: Arrangement::Random { min_distance: 0.0 },
-            velocities: Velocities::default(),
-            velocity: [0.0; 3],
-            frozen: false,
-        })
-    }
-
     fn count(&self, section: &Section, volume: f64) -> Result<usize, FileError> {
         match (section.get("density"), section.get("count"), self.density) {
             (Some(_), Some(count), _) => Err(count.error("density is given too: give one of them")),

@@ -1,6 +1,6 @@
 //! `[[stage]]`, or `steps` at the top level: the stages of a run.
 
-use super::{FileError, Section, Value, ramp};
+use super::{FileError, Section, Value};
 use crate::integrator::{Integrator, Settings, THERMOSTAT_STEPS};
 use psidpd_core::engine::noise::Law;
 
@@ -35,32 +35,37 @@ const MOST_STEPS: u64 = 1 << 53;
 /// The time step Δt of stages without `dt`.
 const DEFAULT_DT: f64 = 0.01;
 
-/// Defaults of keys that a stage leaves out.
-#[derive(Debug, Clone, Copy)]
-struct Defaults {
-    kt: f64,
-    dt: f64,
-    integrator: Integrator,
-}
+/// Numbers of levels of a ramp: without `levels`, and at most.
+const DEFAULT_LEVELS: u64 = 20;
+const MOST_LEVELS: u64 = 1000;
 
 /// Reads the stages; `kt` is the default of their temperature.
 pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
-    let defaults = Defaults {
-        kt,
+    // A stage has these values of the keys that it leaves out.
+    let default = Stage {
+        name: String::new(),
+        level: None,
+        steps: 0,
         dt: root.get("dt").map_or(Ok(DEFAULT_DT), |value| value.positive())?,
         integrator: read_integrator(root, Integrator::default())?,
+        kt,
+        thermostat: true,
+        body_forces: true,
     };
-    let stages = read_all(root, defaults)?;
+    let mut stages = read_all(root, &default)?;
     // A scene whose integrators have no time step must have no `dt`.
     if let Some(dt) = root.get("dt").filter(|_| stages.iter().all(|stage| !stage.integrator.has_time())) {
         return Err(no_time(&dt, "no dt"));
     }
+    for stage in stages.iter_mut().filter(|stage| !stage.integrator.has_time()) {
+        stage.dt = 1.0;
+    }
     Ok(stages)
 }
 
-fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError> {
+fn read_all(root: &Section, default: &Stage) -> Result<Vec<Stage>, FileError> {
     let (steps, equilibrate) = (root.get("steps"), root.get("equilibrate"));
-    let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, defaults) };
+    let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, default) };
     if let Some(other) = steps.or(equilibrate) {
         return Err(other.error("the scene has [[stage]] tables too: keep one of the two"));
     }
@@ -68,7 +73,7 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
     let mut total = 0u64;
     for item in value.array()? {
         let section = item.section()?;
-        let levels = read_one(&section, defaults)?;
+        let levels = read_one(&section, default)?;
         let wrong =
             |key: &str, message: String| section.require(key).map(|v| v.error(message)).unwrap_or_else(|e| e);
         if let Some(stage) = levels.iter().find(|l| stages.iter().any(|s| s.name == l.name)) {
@@ -93,7 +98,7 @@ fn read_short(
     root: &Section,
     steps: Option<Value>,
     equilibrate: Option<Value>,
-    defaults: Defaults,
+    default: &Stage,
 ) -> Result<Vec<Stage>, FileError> {
     let steps = match steps {
         Some(value) => value,
@@ -105,16 +110,7 @@ fn read_short(
     };
     let stages = [("equilibrate", equilibrate), ("produce", Some(steps))];
     let stages = stages.into_iter().filter_map(|(name, value)| {
-        let stage = |steps| Stage {
-            name: name.to_owned(),
-            level: None,
-            steps,
-            dt: if defaults.integrator.has_time() { defaults.dt } else { 1.0 },
-            integrator: defaults.integrator,
-            kt: defaults.kt,
-            thermostat: true,
-            body_forces: true,
-        };
+        let stage = |steps| Stage { name: name.to_owned(), steps, ..default.clone() };
         value.map(|value| read_steps(&value).map(stage))
     });
     stages.collect()
@@ -130,23 +126,18 @@ fn read_steps(value: &Value) -> Result<u64, FileError> {
 }
 
 /// Reads the stages of one table: a ramp makes one stage for each level.
-fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError> {
-    let name = section.require("name")?.string()?.value;
-    let steps = read_steps(&section.require("steps")?)?;
+fn read_one(section: &Section, default: &Stage) -> Result<Vec<Stage>, FileError> {
     let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean().map(|b| b.value));
-    let integrator = read_integrator(section, defaults.integrator)?;
-    let dt = section.get("dt").map_or(Ok(defaults.dt), |value| value.positive())?;
     let stage = Stage {
-        name,
-        level: None,
-        steps,
-        dt: if integrator.has_time() { dt } else { 1.0 },
-        integrator,
-        kt: defaults.kt,
+        name: section.require("name")?.string()?.value,
+        steps: read_steps(&section.require("steps")?)?,
+        integrator: read_integrator(section, default.integrator)?,
+        dt: section.get("dt").map_or(Ok(default.dt), |value| value.positive())?,
         thermostat: flag("thermostat")?,
         body_forces: flag("body_forces")?,
+        ..default.clone()
     };
-    if !integrator.has_time() {
+    if !stage.integrator.has_time() {
         if let Some(dt) = section.get("dt") {
             return Err(no_time(&dt, "no dt"));
         }
@@ -157,14 +148,50 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
             ));
         }
     }
-    let levels = ramp::read(section, stage.steps, stage.kt)?;
-    let at = |level: &ramp::Level| Stage {
-        level: level.number,
-        steps: level.steps,
-        kt: level.kt,
+    read_levels(section, stage)
+}
+
+/// Reads the temperature of a stage. In a ramp, `kT = [from, to]`, it changes in equal levels: the first is one level after
+/// the start of the ramp, the last is at its end.
+///
+/// Each level is a stage of its own, because ψ may depend on kT: forces are computed again at its start, and a
+/// LAMMPS input has a `run` for it.
+fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError> {
+    let value = section.get("kT");
+    let ramp = value.as_ref().and_then(|v| v.as_array());
+    let levels = section.get("levels");
+    let Some(ends) = ramp else {
+        if let Some(levels) = levels {
+            return Err(levels
+                .error("only a ramp has levels, and kT is one temperature")
+                .with_help("kT = [from, to] is a ramp"));
+        }
+        let kt = value.map_or(Ok(stage.kt), |value| value.positive())?;
+        return Ok(vec![Stage { kt, ..stage }]);
+    };
+    let ends: Vec<f64> = ends.iter().map(|end| end.positive()).collect::<Result<_, _>>()?;
+    let [from, to] = ends[..] else {
+        return Err(section
+            .require("kT")?
+            .error(format!("expected a temperature, or two of a ramp, found {}", ends.len())));
+    };
+    let steps = stage.steps;
+    let most = MOST_LEVELS.min(steps);
+    let levels = match levels {
+        None => DEFAULT_LEVELS.min(steps),
+        Some(value) => match value.count()?.value {
+            n if (1..=most).contains(&n) => n,
+            n => return Err(value.error(format!("must be from 1 to {most}, is {n}"))),
+        },
+    };
+    let level = |k: u64| Stage {
+        level: Some([k, levels]),
+        // Whole numbers of steps, which add up to the steps of the stage.
+        steps: steps / levels + u64::from(k <= steps % levels),
+        kt: if k == levels { to } else { from + (to - from) * k as f64 / levels as f64 },
         ..stage.clone()
     };
-    Ok(levels.iter().map(at).collect())
+    Ok((1..=levels).map(level).collect())
 }
 
 /// Reads the integrator of a stage or of the scene; `default` if the file gives none.

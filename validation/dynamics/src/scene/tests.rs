@@ -428,7 +428,7 @@ fn ramps_have_levels_that_add_up() {
 fn data_files_bring_box_and_frozen_particles() {
     let folder = folder();
     let state = parse(PARTS).unwrap().initial_state();
-    crate::run::write_data(&folder.path().join("start.data"), "t", &state, &[]).unwrap();
+    state.to_data_by_tag("t").write(&folder.path().join("start.data")).unwrap();
     let text = "model = \"mixture.toml\"\nkT = 1.0\nsteps = 3\n[box]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
                 [initial]\nkind = \"data\"\nfile = \"start.data\"\nfrozen_ids = [1, 79]\n";
     let scene = Scene::parse("s.toml", text, folder.path()).unwrap();

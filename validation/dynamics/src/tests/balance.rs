@@ -198,7 +198,7 @@ fn a_film_on_a_wall_carries_its_weight() {
                 simulation.step(LONG, force_gradient(), Want::TOTALS).unwrap();
                 observers.sample(simulation.view(0.0), "run");
                 for (sum, z) in above.iter_mut().zip(&middles) {
-                    *sum += simulation.positions().iter().filter(|x| x[2] > *z).count() as f64 / 150.0;
+                    *sum += simulation.state().x.iter().filter(|x| x[2] > *z).count() as f64 / 150.0;
                 }
             }
             let out = observers.finish();

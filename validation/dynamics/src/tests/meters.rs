@@ -26,7 +26,7 @@ fn every_particle_is_in_its_cell() {
     assert_eq!(names, ["x", "z", "density", "density_A", "density_B"]);
     let (x, z) = (&field.columns[0].values, &field.columns[1].values);
     let mut expected = vec![[0.0; 2]; 20];
-    for (p, s) in simulation.positions().iter().zip(simulation.species()) {
+    for (p, s) in simulation.state().x.iter().zip(&simulation.state().species) {
         let inside = |k: &usize| (p[0] - x[*k]).abs() <= 0.5 && (p[2] - z[*k]).abs() <= 0.5;
         expected[(0..20).find(inside).unwrap()][*s as usize] += 1.0 / 3.0;
     }

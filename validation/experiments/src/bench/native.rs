@@ -73,7 +73,7 @@ pub fn equal_on_threads(
     for &threads in threads {
         let mut simulation = simulation(subject, state, Some(Settings { threads, ..settings }))?;
         advance(&mut simulation, subject, 20)?;
-        let end = simulation.state();
+        let end = simulation.state().clone();
         let bits = |s: &State| s.x.iter().chain(&s.v).flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
         if first.as_ref().is_some_and(|first| bits(first) != bits(&end)) {
             return Ok(false);

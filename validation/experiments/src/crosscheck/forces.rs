@@ -76,7 +76,7 @@ fn native(
 pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ExperimentError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
-        forces: by_tag(simulation.tags(), simulation.forces()),
+        forces: by_tag(&simulation.state().tag, simulation.forces()),
         energy: simulation.potential_energy(),
         virial: simulation.tally().total_virial(),
     })

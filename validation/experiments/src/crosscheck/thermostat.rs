@@ -105,7 +105,8 @@ fn noise(context: &Context, part: &mut Part) -> Result<Table, ExperimentError> {
         let mut drawn: [[Vec<f64>; DISTANCES.len()]; 2] = Default::default();
         for number in 0..DRAWS {
             simulation.compute(Want::FORCES, Some(Step { seed: SEED, number, dt }))?;
-            let ours = by_tag(simulation.tags(), simulation.forces()).into_iter().map(|f| f[0]).collect();
+            let ours =
+                by_tag(&simulation.state().tag, simulation.forces()).into_iter().map(|f| f[0]).collect();
             lammps.command("run 0 post no")?;
             let theirs: Vec<f64> = lammps.gather("f", 3)?.into_iter().step_by(3).collect();
             for (drawn, forces) in drawn.iter_mut().zip::<[Vec<f64>; 2]>([ours, theirs]) {

@@ -115,7 +115,7 @@ pub(super) fn native(
             advance(step);
         }
         if length.frame > 0 && step % length.frame == 0 {
-            trace.frames.push(simulation.positions().iter().map(|x| x[2]).collect());
+            trace.frames.push(simulation.state().x.iter().map(|x| x[2]).collect());
         }
     }
     Ok(trace)

@@ -66,7 +66,7 @@ fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ExperimentE
     let mut simulation = context.simulation(&model, 1.0, state, SEED)?;
     simulation.prepare(DT, Want::FORCES)?;
     simulation.advance(STEPS, DT, Integrator::VelocityVerlet)?;
-    Ok(by_tag(simulation.tags(), simulation.positions()))
+    Ok(by_tag(&simulation.state().tag, &simulation.state().x))
 }
 
 fn lammps(

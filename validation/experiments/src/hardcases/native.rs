@@ -124,9 +124,9 @@ fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, ExperimentError>
     let mut run = simulation(scene, scene.initial_state(), fault)?;
     run.set_thermostat(false);
     run.prepare(scene.stages[0].dt, Want::FORCES)?;
-    let species: Vec<usize> = run.species().iter().map(|s| *s as usize).collect();
+    let species: Vec<usize> = run.state().species.iter().map(|s| *s as usize).collect();
     let fluid = scene.model.at(scene.kt)?;
-    let truth = truth::conservative(&fluid, run.positions(), &species, run.domain());
+    let truth = truth::conservative(&fluid, &run.state().x, &species, &run.state().domain);
     let expected = truth.map_err(RunError::from)?.forces;
     let largest = expected.iter().flatten().fold(f64::MIN_POSITIVE, |m, c| m.max(c.abs()));
     let pairs = expected.iter().flatten().zip(run.forces().iter().flatten());
@@ -160,7 +160,7 @@ fn conserved(scene: &Scene, integrator: Integrator, fault: Option<Fault>) -> Res
         .advance(measure.steps - 1, measure.dt, integrator)
         .and_then(|()| run.step(measure.dt, integrator, Want::TOTALS));
     match made {
-        Ok(()) => Ok(Found::Changed { energy: energy(&run) - before, momentum: momentum_of(&run.state()) }),
+        Ok(()) => Ok(Found::Changed { energy: energy(&run) - before, momentum: momentum_of(run.state()) }),
         Err(error) => stopped(error),
     }
 }

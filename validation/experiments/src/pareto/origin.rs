@@ -54,7 +54,7 @@ impl<'a> Origin<'a> {
                 steps -= batch;
             }
         }
-        Ok(Origin { scene, stage, state: run.state() })
+        Ok(Origin { scene, stage, state: run.state().clone() })
     }
 
     /// Δt of a setting, without the digits that the rounding of the product leaves.

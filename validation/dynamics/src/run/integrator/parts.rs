@@ -29,39 +29,12 @@ pub struct Moving<'a> {
 
 #[derive(Debug, Clone, Default)]
 pub struct Kept {
-    /// Velocities and forces of the beginning of the step.
-    v: Vec<[f64; 3]>,
+    /// Velocities of the beginning of the step, or positions that are put aside.
+    pub v: Vec<[f64; 3]>,
+    /// Forces of the beginning of the step.
     f: Vec<[f64; 3]>,
-    /// Whether the present step needs them.
-    in_use: bool,
     /// A number by species.
     over_mass: Vec<f64>,
-}
-
-impl Kept {
-    /// The first of the arrays that are kept, of as many vectors as there are particles behind a loop that kept it.
-    pub fn aside(&mut self) -> &mut Vec<[f64; 3]> {
-        &mut self.v
-    }
-}
-
-impl Moving<'_> {
-    /// Makes room for velocities and forces of before.
-    pub fn keep(&mut self) {
-        self.kept.in_use = true;
-        self.kept.v.resize(self.x.len(), [0.0; 3]);
-        self.kept.f.resize(self.x.len(), [0.0; 3]);
-    }
-
-    pub fn keep_nothing(&mut self) {
-        self.kept.in_use = false;
-    }
-
-    /// Computes a number of the mass of each species: a division for each, not for each particle.
-    pub fn over_mass(&mut self, number: impl Fn(f64) -> f64) {
-        self.kept.over_mass.clear();
-        self.kept.over_mass.extend(self.mass.iter().map(|mass| number(*mass)));
-    }
 }
 
 /// What a moved particle is checked against.
@@ -95,12 +68,27 @@ pub struct Part<'a> {
     faults: Faults,
 }
 
-/// Does `work` with all particles of `moving`.
-pub fn share<'a>(moving: Moving<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
-    let Moving { mut x, mut v, mut f, mut species, mut image, kept, .. } = moving;
-    let (kept_v, kept_f) = (&mut kept.v[..], &mut kept.f[..]);
-    let [mut kept_v, mut kept_f] = if kept.in_use { [kept_v, kept_f] } else { Default::default() };
+/// Does `work` with all particles of `moving`, and `factor` over the mass of each species; with what is kept, if the step
+/// `keeps` anything.
+pub fn share<'a>(
+    moving: Moving<'a>,
+    factor: f64,
+    keeps: bool,
+    pool: &Pool,
+    work: impl Fn(&mut Part, &[f64]) + Sync,
+) -> Faults {
+    let Moving { mut x, mut v, mut f, mut species, mut image, mass, kept } = moving;
+    // A division for each species, not for each particle.
+    kept.over_mass.clear();
+    kept.over_mass.extend(mass.iter().map(|mass| factor / mass));
     let count = x.len();
+    let [mut kept_v, mut kept_f] = if keeps {
+        kept.v.resize(count, [0.0; 3]);
+        kept.f.resize(count, [0.0; 3]);
+        [&mut kept.v[..], &mut kept.f[..]]
+    } else {
+        Default::default()
+    };
     let parts = pool.threads().min(count / WORTH).max(1);
     let mut shares = Vec::with_capacity(parts);
     for number in 0..parts {

@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use super::particles::Particles;
-use crate::particles::{BodyForce, Tags, add_body_forces};
+use crate::particles::{BodyForce, Tags};
 use psidpd_core::engine::Pool;
 
 #[derive(Debug, Clone)]
@@ -44,10 +44,15 @@ impl External {
     pub fn add_forces(&mut self, particles: &mut Particles, pool: &Pool) {
         let (state, force) = particles.forces_mut();
         if !self.body_forces.is_empty() {
-            add_body_forces(&self.body_forces, pool, force, |body, k| {
-                let mass = state.mass[state.species[k] as usize];
-                let acts = body.acts_on(state.species[k], state.tag[k]);
-                acts.then(|| body.at(&state.domain, state.x[k]).map(|a| mass * a))
+            pool.parts(force, |first, force| {
+                for (k, sum) in (first..).zip(force) {
+                    let species = state.species[k];
+                    let mass = state.mass[species as usize];
+                    for body in self.body_forces.iter().filter(|body| body.acts_on(species, state.tag[k])) {
+                        let acceleration = body.at(&state.domain, state.x[k]);
+                        (0..3).for_each(|c| sum[c] += mass * acceleration[c]);
+                    }
+                }
             });
         }
         self.support_force = [0.0; 3];

@@ -4,8 +4,8 @@ use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Fault, PassCounts, PeriodicBox, Plan, Precision, Request, Settings, Step, Surroundings,
-    Tally, Want,
+    self, Engine, Fault, PassCounts, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally,
+    Want,
 };
 use psidpd_core::model::Model;
 
@@ -144,7 +144,7 @@ impl Simulation {
         }
         let Forces { engine, all_densities, .. } = &self.forces;
         let want = Want { densities: *all_densities, ..Want::FORCES };
-        engine.path_for(Surroundings::Box(self.domain()), want).describe(engine.settings())
+        engine.path_for(Surroundings::Box(&self.particles.now().domain), want).describe(engine.settings())
     }
 
     pub fn model(&self) -> &Model {
@@ -153,10 +153,6 @@ impl Simulation {
 
     pub fn kt(&self) -> f64 {
         self.forces.kt
-    }
-
-    pub fn plan(&self) -> &Plan {
-        self.forces.engine.plan()
     }
 
     pub fn dimensions(&self) -> usize {

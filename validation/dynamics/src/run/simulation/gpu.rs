@@ -120,8 +120,8 @@ impl Simulation {
             reversed_along: force.reversed_along,
         };
         Ok(gpu::Settings {
-            domain: self.domain().clone(),
-            mass: self.masses().to_vec(),
+            domain: self.particles.now().domain.clone(),
+            mass: self.particles.now().mass.clone(),
             seed: self.seed,
             thermostat: conditions.thermostat,
             body_forces: conditions.body_forces.iter().map(acceleration).collect(),
@@ -305,7 +305,7 @@ impl Simulation {
         match fault {
             Fault::Velocity => RunError::Velocity { step, tag },
             Fault::Runaway => {
-                let found = self.tags().iter().position(|other| *other == tag);
+                let found = self.particles.now().tag.iter().position(|other| *other == tag);
                 let v = found.map_or([f64::NAN; 3], |k| self.particles.now().v[k]);
                 RunError::Runaway { step, tag, distance: dt * v[0].hypot(v[1]).hypot(v[2]) }
             }

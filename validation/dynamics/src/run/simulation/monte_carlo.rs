@@ -64,7 +64,7 @@ impl Simulation {
     ) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let dimensions = self.dimensions();
-        let heights = (0..dimensions).map(|k| self.domain().height(k));
+        let heights = (0..dimensions).map(|k| self.particles.now().domain.height(k));
         let longest = 0.5 * heights.fold(f64::INFINITY, f64::min);
         let mut energy = match self.monte_carlo.energy.take() {
             Some(energy) => energy,
@@ -125,7 +125,7 @@ impl Simulation {
     pub(in crate::run) fn draw_velocities(&mut self, random: &mut ChaCha8Rng) {
         let (kt, dimensions) = (self.kt(), self.dimensions());
         let conserved = self.frozen().is_empty();
-        let conserved = self.domain().periodic().map(|periodic| conserved && periodic);
+        let conserved = self.particles.now().domain.periodic().map(|periodic| conserved && periodic);
         let Simulation { particles, external, .. } = self;
         let frozen = &external.frozen;
         let state = particles.now();

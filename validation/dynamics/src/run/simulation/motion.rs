@@ -4,9 +4,9 @@
 //! makes both, with the same bits.
 
 use super::super::bounds::Bounds;
-use super::super::integrator::parts::{Faults, Kept, Moving, Surroundings, drift, kick, share};
+use super::super::integrator::parts::{Faults, Kept, Moving, Part, Surroundings, drift, kick, share};
 use super::{RunError, Simulation};
-use psidpd_core::engine::{PeriodicBox, Pool};
+use psidpd_core::engine::PeriodicBox;
 
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
@@ -28,23 +28,19 @@ impl Simulation {
     pub(in crate::run) fn kick_and_drift(&mut self, h: f64, dt: f64) -> Result<(), RunError> {
         let deferred = self.motion.deferred.take_if(|deferred| *deferred == h).is_some();
         self.make_deferred_kick()?;
-        let faults = self.moving(Some(dt), |mut moving, around, pool| {
-            moving.keep_nothing();
-            moving.over_mass(|mass| h / mass);
-            share(moving, pool, |part, over_mass| {
-                if deferred {
-                    drift(part, over_mass, around, |x, v, f, over_mass| {
-                        let kick = over_mass * f;
-                        let v = v + kick + kick;
-                        (x + dt * v, v)
-                    });
-                } else {
-                    drift(part, over_mass, around, |x, v, f, over_mass| {
-                        let v = v + over_mass * f;
-                        (x + dt * v, v)
-                    });
-                }
-            })
+        let faults = self.moving(Some(dt), h, false, |part, over_mass, around| {
+            if deferred {
+                drift(part, over_mass, around, |x, v, f, over_mass| {
+                    let kick = over_mass * f;
+                    let v = v + kick + kick;
+                    (x + dt * v, v)
+                });
+            } else {
+                drift(part, over_mass, around, |x, v, f, over_mass| {
+                    let v = v + over_mass * f;
+                    (x + dt * v, v)
+                });
+            }
         });
         self.record_ways(dt, |this, k| this.particles.now().v[k]);
         self.refuse(faults, Some(dt), deferred)
@@ -53,12 +49,8 @@ impl Simulation {
     /// Drift: `x += dt v`.
     pub(in crate::run) fn drift(&mut self, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let faults = self.moving(Some(dt), |mut moving, around, pool| {
-            moving.keep_nothing();
-            moving.over_mass(|_| 0.0);
-            share(moving, pool, |part, over_mass| {
-                drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
-            })
+        let faults = self.moving(Some(dt), 0.0, false, |part, over_mass, around| {
+            drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
         });
         self.record_ways(dt, |this, k| this.particles.now().v[k]);
         self.refuse(faults, Some(dt), false)
@@ -67,12 +59,8 @@ impl Simulation {
     /// Kick: `v += h f/m`.
     pub(in crate::run) fn kick(&mut self, h: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let faults = self.moving(None, |mut moving, _, pool| {
-            moving.keep_nothing();
-            moving.over_mass(|mass| h / mass);
-            share(moving, pool, |part, over_mass| {
-                kick::<false, _>(part, over_mass, |v, f, _, over_mass| v + over_mass * f);
-            })
+        let faults = self.moving(None, h, false, |part, over_mass, _| {
+            kick::<false, _>(part, over_mass, |v, f, _, over_mass| v + over_mass * f);
         });
         self.refuse(faults, None, false)
     }
@@ -93,20 +81,16 @@ impl Simulation {
     /// Puts particles at `x + c f/m` for an evaluation of forces, without reflection;
     /// [`Simulation::step_back`] follows.
     pub(super) fn displace(&mut self, c: f64) {
-        self.moving(None, |mut moving, around, pool| {
-            moving.keep();
-            moving.over_mass(|mass| c / mass);
+        self.moving(None, c, true, |part, over_mass, around| {
             let (low, high) = (around.bounds.low, around.bounds.high);
-            share(moving, pool, |part, over_mass| {
-                for (k, to) in part.kept[0].iter_mut().enumerate() {
-                    let m = over_mass[part.species[k] as usize];
-                    *to = std::array::from_fn(|c| part.x[k][c] + m * part.f[k][c]);
-                    let inside = |c: usize| (low[c]..=high[c]).contains(&to[c]);
-                    if !(inside(0) && inside(1) && inside(2)) {
-                        around.domain.wrap(to, &mut [0; 3]);
-                    }
+            for (k, to) in part.kept[0].iter_mut().enumerate() {
+                let m = over_mass[part.species[k] as usize];
+                *to = std::array::from_fn(|c| part.x[k][c] + m * part.f[k][c]);
+                let inside = |c: usize| (low[c]..=high[c]).contains(&to[c]);
+                if !(inside(0) && inside(1) && inside(2)) {
+                    around.domain.wrap(to, &mut [0; 3]);
                 }
-            })
+            }
         });
         self.step_back();
     }
@@ -114,25 +98,21 @@ impl Simulation {
     /// Exchanges the present positions for those that [`Simulation::displace`] has put aside, or the reverse.
     pub(super) fn step_back(&mut self) {
         let Simulation { particles, motion, .. } = self;
-        std::mem::swap(&mut particles.motion(false).0.x, motion.kept.aside());
+        std::mem::swap(&mut particles.motion(false).0.x, &mut motion.kept.v);
     }
 
     /// Predictor: `x += dt (v + ½dt f/m); v += λ dt f/m`; the previous velocities and forces are kept.
     pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let faults = self.moving(Some(dt), |mut moving, around, pool| {
-            moving.keep();
-            moving.over_mass(|mass| dt / mass);
-            share(moving, pool, |part, over_mass| {
-                part.kept[0].copy_from_slice(part.v);
-                part.kept[1].copy_from_slice(part.f);
-                drift(part, over_mass, around, |x, v, f, over_mass| {
-                    (x + dt * (v + 0.5 * over_mass * f), v + lambda * over_mass * f)
-                });
-            })
+        let faults = self.moving(Some(dt), dt, true, |part, over_mass, around| {
+            part.kept[0].copy_from_slice(part.v);
+            part.kept[1].copy_from_slice(part.f);
+            drift(part, over_mass, around, |x, v, f, over_mass| {
+                (x + dt * (v + 0.5 * over_mass * f), v + lambda * over_mass * f)
+            });
         });
         self.record_ways(dt, |this, k| {
-            let back = (0.5 - lambda) * dt / this.masses()[this.species()[k] as usize];
+            let back = (0.5 - lambda) * dt / this.particles.mass_of(k);
             std::array::from_fn(|c| this.particles.now().v[k][c] + back * this.forces()[k][c])
         });
         self.refuse(faults, Some(dt), false)
@@ -140,22 +120,20 @@ impl Simulation {
 
     /// Corrector: `v = v₀ + ½dt (f₀ + f)/m` with the values that [`Simulation::predict`] has kept.
     pub(in crate::run) fn correct(&mut self, dt: f64) -> Result<(), RunError> {
-        let faults = self.moving(None, |mut moving, _, pool| {
-            moving.over_mass(|mass| 0.5 * dt / mass);
-            share(moving, pool, |part, half| {
-                kick::<true, _>(part, half, |_, f, [before_v, before_f], half| {
-                    before_v + half * (before_f + f)
-                });
-            })
+        let faults = self.moving(None, 0.5 * dt, true, |part, half, _| {
+            kick::<true, _>(part, half, |_, f, [before_v, before_f], half| before_v + half * (before_f + f));
         });
         self.refuse(faults, None, false)
     }
 
-    /// Calls `work` with the moving arrays, the box and its limits, and the threads; `dt` is the time of a drift.
+    /// Does `work` with the particles of each thread, `factor` over the mass of each species, and the box with its limits;
+    /// `dt` is the time of a drift. A step that `keeps` velocities and forces of before has room for them.
     fn moving(
         &mut self,
         dt: Option<f64>,
-        work: impl FnOnce(Moving, Surroundings, &Pool) -> Faults,
+        factor: f64,
+        keeps: bool,
+        work: impl Fn(&mut Part, &[f64], Surroundings) + Sync,
     ) -> Faults {
         let Simulation { particles, motion, forces, .. } = self;
         let (state, f) = particles.motion(dt.is_some());
@@ -171,7 +149,7 @@ impl Simulation {
             mass: &state.mass,
             kept: &mut motion.kept,
         };
-        work(moving, around, forces.engine.pool())
+        share(moving, factor, keeps, forces.engine.pool(), |part, over_mass| work(part, over_mass, around))
     }
 
     /// Refuses velocities that are not finite, or that lead beyond the box within `dt`. If the kick of the

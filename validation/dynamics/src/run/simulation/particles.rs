@@ -50,6 +50,10 @@ impl Particles {
         &self.state
     }
 
+    pub fn mass_of(&self, k: usize) -> f64 {
+        self.state.mass[self.state.species[k] as usize]
+    }
+
     pub fn forces(&self) -> &[[f64; 3]] {
         &self.force
     }
@@ -140,48 +144,13 @@ impl Simulation {
         self.particles.state.is_empty()
     }
 
-    pub fn domain(&self) -> &PeriodicBox {
-        &self.particles.state.domain
-    }
-
-    /// Positions, wrapped into the box.
-    pub fn positions(&self) -> &[[f64; 3]] {
-        &self.particles.state.x
-    }
-
-    pub fn velocities(&self) -> &[[f64; 3]] {
-        debug_assert!(self.motion.deferred.is_none());
-        &self.particles.state.v
-    }
-
     pub fn forces(&self) -> &[[f64; 3]] {
         &self.particles.force
     }
 
-    pub fn species(&self) -> &[i32] {
-        &self.particles.state.species
-    }
-
-    pub fn tags(&self) -> &[i32] {
-        &self.particles.state.tag
-    }
-
-    pub fn image_flags(&self) -> &[[i32; 3]] {
-        &self.particles.state.image
-    }
-
-    pub fn masses(&self) -> &[f64] {
-        &self.particles.state.mass
-    }
-
-    pub fn state(&self) -> State {
+    /// The particles; positions are wrapped into the box.
+    pub fn state(&self) -> &State {
         debug_assert!(self.motion.deferred.is_none());
-        self.particles.state.clone()
-    }
-
-    /// Copies the particles into `state`, which belongs to this simulation, and reuses its memory.
-    pub fn copy_state(&self, state: &mut State) {
-        debug_assert!(self.motion.deferred.is_none());
-        state.copy_particles(&self.particles.state);
+        &self.particles.state
     }
 }

@@ -1,6 +1,6 @@
 //! Records the transport of momentum in a step, for observables.
 
-use super::Simulation;
+use super::{Simulation, State};
 use crate::integrator::Integrator;
 use psidpd_core::engine::thermostat::Pull;
 use psidpd_observe::flux::{Acted, Displaced, Flux, Line, Place};
@@ -59,9 +59,9 @@ impl Simulation {
         let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
         let ways: Vec<Line> = (0..self.len())
             .map(|k| {
-                let momentum = over_dt * self.masses()[self.species()[k] as usize];
+                let momentum = over_dt * self.particles.mass_of(k);
                 let u = u(self, k);
-                Line { from: self.positions()[k], d: u.map(|u| h * u), f: u.map(|u| momentum * u) }
+                Line { from: self.particles.now().x[k], d: u.map(|u| h * u), f: u.map(|u| momentum * u) }
             })
             .collect();
         if let Some(record) = self.record.as_deref_mut() {
@@ -74,9 +74,9 @@ impl Simulation {
     pub(super) fn record_momenta(&mut self) {
         const TIME: f64 = 1e-9;
         let way = |k: usize| {
-            let momentum = self.masses()[self.species()[k] as usize] / TIME;
+            let momentum = self.particles.mass_of(k) / TIME;
             let v = self.particles.now().v[k];
-            Line { from: self.positions()[k], d: v.map(|v| TIME * v), f: v.map(|v| momentum * v) }
+            Line { from: self.particles.now().x[k], d: v.map(|v| TIME * v), f: v.map(|v| momentum * v) }
         };
         let ways: Vec<Line> = (0..self.len()).map(way).collect();
         if let Some(record) = &mut self.record {
@@ -90,7 +90,8 @@ impl Simulation {
         if !self.is_recording() {
             return;
         }
-        let place = Place { x: self.positions().to_vec(), species: self.species().to_vec(), displaced };
+        let State { x, species, .. } = self.particles.now();
+        let place = Place { x: x.clone(), species: species.clone(), displaced };
         let acted = Acted { share: 1.0, virial, at: Some(place) };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);

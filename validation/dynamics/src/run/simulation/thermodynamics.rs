@@ -17,8 +17,9 @@ impl Simulation {
     /// direction along which the total momentum is conserved. Frozen particles break all conservation, walls
     /// that of the direction across them.
     pub fn degrees_of_freedom(&self) -> usize {
+        let periodic = self.particles.now().domain.periodic();
         let conserved = match self.frozen().is_empty() {
-            true => self.domain().periodic()[..self.dimensions()].iter().filter(|p| **p).count(),
+            true => periodic[..self.dimensions()].iter().filter(|p| **p).count(),
             false => 0,
         };
         (self.dimensions() * self.mobile()).saturating_sub(conserved)
@@ -33,18 +34,8 @@ impl Simulation {
         }
     }
 
-    pub fn momentum(&self) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (v, s) in self.velocities().iter().zip(self.species()) {
-            for c in 0..3 {
-                sum[c] += self.masses()[*s as usize] * v[c];
-            }
-        }
-        sum
-    }
-
     fn over_volume(&self, virial: [f64; 6]) -> [f64; 6] {
-        let volume = self.domain().volume(self.dimensions());
+        let volume = self.particles.now().domain.volume(self.dimensions());
         let flux = self.particles.momentum_flux();
         std::array::from_fn(|k| (flux[k] + virial[k]) / volume)
     }

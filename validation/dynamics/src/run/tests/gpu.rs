@@ -87,13 +87,13 @@ fn follows(start: impl Fn() -> Simulation, steps: u64, dt: f64, integrator: Inte
     });
     let count = cpu.len() as f64;
     let boxes = |run: &Simulation| {
-        let by_tag = run.tags().iter().copied().zip(run.image_flags().iter().copied());
+        let by_tag = run.state().tag.iter().copied().zip(run.state().image.iter().copied());
         std::collections::BTreeMap::from_iter(by_tag)
     };
     let apart = super::difference(&cpu, &gpu);
     let energy = (cpu.potential_energy() - gpu.potential_energy()).abs() / count;
     let pressure = |run: &Simulation| [run.conservative_pressure_tensor(), run.pressure_tensor()].concat();
-    let scale = cpu.domain().volume(cpu.dimensions()) / count;
+    let scale = cpu.state().domain.volume(cpu.dimensions()) / count;
     let stress =
         pressure(&cpu).iter().zip(pressure(&gpu)).map(|(a, b)| scale * (a - b).abs()).fold(0.0, f64::max);
     println!("{count} particles, {integrator:?}: {apart:.1e}, energy {energy:.1e}, stress {stress:.1e}");
@@ -221,7 +221,7 @@ fn means(scene: &Scene) -> Vec<psidpd_observe::Estimate> {
         let tensor = now.conservative_pressure_tensor();
         let across = now.dimensions() - 1;
         let along = tensor[..across].iter().sum::<f64>() / across as f64;
-        let tension = 0.5 * now.domain().height(across) * (tensor[across] - along);
+        let tension = 0.5 * now.state().domain.height(across) * (tensor[across] - along);
         let energy = now.potential_energy() / now.len() as f64;
         let values = [now.temperature(), now.scalar_pressure(tensor), energy, tension];
         // A fifth for the start to settle.

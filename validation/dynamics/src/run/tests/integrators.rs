@@ -39,9 +39,11 @@ fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
             let mut sums = [0.0; 2];
             for _ in 0..24 {
                 run.step(dt, integrator, Want::FORCES).unwrap();
-                let masses: Vec<f64> = run.species().iter().map(|s| run.masses()[*s as usize]).collect();
+                let masses: Vec<f64> =
+                    run.state().species.iter().map(|s| run.state().mass[*s as usize]).collect();
                 let fourth: f64 = run
-                    .velocities()
+                    .state()
+                    .v
                     .iter()
                     .zip(masses)
                     .map(|(v, m)| v.iter().map(|c| (m * c * c).powi(2)).sum::<f64>())
@@ -56,14 +58,14 @@ fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
             sums
         })
         .collect();
-    assert!(run.momentum().iter().all(|p| p.abs() < 1e-9), "{integrator}: {:?}", run.momentum());
+    assert!(momentum(&run).iter().all(|p| p.abs() < 1e-9), "{integrator}: {:?}", momentum(&run));
     let of = |k: usize| {
         let n = blocks.len() as f64;
         let mean = blocks.iter().map(|b| b[k]).sum::<f64>() / n;
         let variance = blocks.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
         [mean, (variance / n).sqrt()]
     };
-    let pairs = 0.5 * (run.len() * (run.len() - 1)) as f64 * frames / run.domain().volume(3);
+    let pairs = 0.5 * (run.len() * (run.len() - 1)) as f64 * frames / run.state().domain.volume(3);
     let shells = std::array::from_fn(|s| {
         let expected = pairs * 4.0 / 3.0 * std::f64::consts::PI * (edges[s + 1].powi(3) - edges[s].powi(3));
         (found[s] - expected) / expected.sqrt()
@@ -72,10 +74,10 @@ fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
 }
 
 fn count_pairs(run: &Simulation, edges: &[f64; 4], found: &mut [f64; 3]) {
-    let x = run.positions();
+    let x = &run.state().x;
     for i in 0..x.len() {
         for j in 0..i {
-            let d = run.domain().minimum_image(x[i], x[j]);
+            let d = run.state().domain.minimum_image(x[i], x[j]);
             let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
             if let Some(shell) = (0..3).find(|s| (edges[*s]..edges[s + 1]).contains(&r)) {
                 found[shell] += 1.0;
@@ -131,7 +133,7 @@ fn without_thermostat_all_are_of_second_order() {
     let starts: Vec<State> = (0..4)
         .map(|_| {
             advance(&mut run, 50, 0.01, Integrator::VelocityVerlet);
-            run.state()
+            run.state().clone()
         })
         .collect();
     let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
@@ -258,9 +260,9 @@ fn noise_of_pairs_acts_at_every_kth_step() {
     let integrator = Integrator::TwoStage { lambda: 0.21, coupling };
     run.prepare_for(integrator, 0.01, Want::FORCES).unwrap();
     for step in 1..=12 {
-        let before = run.velocities().to_vec();
+        let before = run.state().v.to_vec();
         run.step(0.01, integrator, Want::FORCES).unwrap();
-        assert_eq!(run.velocities() != before, step % 4 == 0, "{step}");
+        assert_eq!(run.state().v != before, step % 4 == 0, "{step}");
     }
 }
 

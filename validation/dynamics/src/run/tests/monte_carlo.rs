@@ -50,7 +50,7 @@ fn two_particles_have_their_boltzmann_distribution() {
     let mut counts = vec![0.0; bins + 1];
     for _ in 0..20_000 {
         run.step(1.0, trials(20, Some(half)), Want::FORCES).unwrap();
-        let d = run.domain().minimum_image(run.positions()[0], run.positions()[1]);
+        let d = run.state().domain.minimum_image(run.state().x[0], run.state().x[1]);
         let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
         counts[((r / half * bins as f64) as usize).min(bins)] += 1.0;
     }
@@ -80,8 +80,8 @@ fn walls_turn_nothing_away_that_belongs_there() {
     let (mut counts, mut heat) = ([0.0; 8], 0.0);
     for _ in 0..10_000 {
         run.step(1.0, trials(60, Some(0.7)), Want::FORCES).unwrap();
-        assert_eq!((run.positions()[0], run.velocities()[0]), (frozen, [0.0; 3]));
-        counts[(run.positions()[1][2] / EDGE * 8.0) as usize] += 1.0;
+        assert_eq!((run.state().x[0], run.state().v[0]), (frozen, [0.0; 3]));
+        counts[(run.state().x[1][2] / EDGE * 8.0) as usize] += 1.0;
         heat += run.temperature() / 10_000.0;
     }
     // No momentum is conserved: the mean of 30 000 squared velocities deviates by 4 % once in 10⁶ seeds.
@@ -91,7 +91,7 @@ fn walls_turn_nothing_away_that_belongs_there() {
     for z in 0..fine {
         for y in 0..fine {
             for x in 0..fine {
-                let d = run.domain().minimum_image([at(x), at(y), at(z)], frozen);
+                let d = run.state().domain.minimum_image([at(x), at(y), at(z)], frozen);
                 weights[z / 10] += (-energy((d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()) / kt).exp();
             }
         }
@@ -270,7 +270,7 @@ fn starts_without_energy() {
     run.prepare_for(integrator, 1.0, Want::TOTALS).unwrap();
     assert_eq!(run.potential_energy(), f64::INFINITY);
     run.step(1.0, integrator, Want::TOTALS).unwrap();
-    assert!(run.potential_energy().is_finite() && run.positions()[0] != run.positions()[1]);
+    assert!(run.potential_energy().is_finite() && run.state().x[0] != run.state().x[1]);
     let pole = "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
         [excess_free_energy]\nA = \"-ln(1 - n)\"\n";
     let mut run = simulation(pole, pair([true; 3], [[0.5; 3]; 2]));

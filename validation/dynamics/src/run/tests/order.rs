@@ -27,11 +27,11 @@ fn crowd() -> Scene {
 fn by_tag(run: &Simulation) -> Vec<(i32, [u64; 9], [i32; 4], bool)> {
     let mut all: Vec<_> = (0..run.len())
         .map(|k| {
-            let vectors = [run.positions()[k], run.velocities()[k], run.forces()[k]];
+            let vectors = [run.state().x[k], run.state().v[k], run.forces()[k]];
             let bits = std::array::from_fn(|c| vectors[c / 3][c % 3].to_bits());
-            let [a, b, c] = run.image_flags()[k];
+            let [a, b, c] = run.state().image[k];
             let frozen = run.frozen().get(k).is_some_and(|frozen| *frozen);
-            (run.tags()[k], bits, [a, b, c, run.species()[k]], frozen)
+            (run.state().tag[k], bits, [a, b, c, run.state().species[k]], frozen)
         })
         .collect();
     all.sort_unstable_by_key(|p| p.0);
@@ -83,7 +83,7 @@ fn reordering_keeps_particles_whole() {
             run.step(0.01, integrator, Want::FORCES).unwrap();
             run
         });
-        assert!(kept.tags().is_sorted() && !moved.tags().is_sorted());
+        assert!(kept.state().tag.is_sorted() && !moved.state().tag.is_sorted());
         assert!(by_tag(&kept) == by_tag(&moved), "{name}");
         assert!(kept.frozen().iter().any(|f| *f));
         // Later positions differ by rounding.
@@ -95,7 +95,7 @@ fn reordering_keeps_particles_whole() {
         assert!(d < 1e-9, "{name}: {d}");
         let flags = |run: &Simulation| by_tag(run).iter().map(|p| (p.2, p.3)).collect::<Vec<_>>();
         assert!(flags(&kept) == flags(&moved));
-        assert!(kept.image_flags().iter().flatten().any(|i| *i != 0));
+        assert!(kept.state().image.iter().flatten().any(|i| *i != 0));
     }
 }
 
@@ -113,7 +113,7 @@ fn reordering_keeps_the_physics() {
             }
             run
         });
-        assert!(!moved.tags().is_sorted());
+        assert!(!moved.state().tag.is_sorted());
         // Rounding of single precision, relative to forces of order 10², grows with the number of steps.
         let tolerance = if precision == Precision::Double { 1e-9 } else { 1e-3 };
         let d = difference(&kept, &moved);
@@ -133,7 +133,7 @@ fn the_reference_leaves_the_order_alone() {
     run.set_reordering(true);
     run.use_pair_sums_only(true);
     advance(&mut run, 3, 0.01, Integrator::VelocityVerlet);
-    assert!(run.tags().is_sorted());
+    assert!(run.state().tag.is_sorted());
 }
 
 /// A run stopped before, at and between steps with a reordering ends with the same bytes.

@@ -102,7 +102,7 @@ fn relative_velocities_decay_by_the_formula() {
             let shares = [MASS[1], -MASS[0]].map(|m| m / (MASS[0] + MASS[1]));
             shares.map(|share| std::array::from_fn(|c| mean[c] + share * relative[c]))
         };
-        let state = run.state();
+        let state = run.state().clone();
         let v = (0..run.len()).map(|k| of_pair(relative)[k % 2]).collect();
         run.restore(0, &State { v, ..state }, &[], [0; 2]);
         run.prepare_for(integrator, DT, Want::FORCES).unwrap();
@@ -116,7 +116,7 @@ fn relative_velocities_decay_by_the_formula() {
                 now = one_step(integrator, X * every as f64, now, 0.0);
             }
             let expected = of_pair(std::array::from_fn(|c| relative[c] + (now[0] - start) * ALONG[c]));
-            for (k, v) in run.velocities().iter().enumerate() {
+            for (k, v) in run.state().v.iter().enumerate() {
                 let off = (0..3).map(|c| (v[c] - expected[k % 2][c]).abs()).fold(0.0, f64::max);
                 assert!(off < 1e-10 * 1e-12, "{integrator}, step {step}: {v:?}, not {:?}", expected[k % 2]);
             }
@@ -127,7 +127,7 @@ fn relative_velocities_decay_by_the_formula() {
 /// `u` and the force times Δt/μ of each pair, in units of √(kT/μ).
 fn along(run: &Simulation) -> Vec<[f64; 2]> {
     let unit = (run.kt() / REDUCED).sqrt();
-    let (v, f) = (run.velocities(), run.forces());
+    let (v, f) = (&run.state().v, run.forces());
     (0..run.len())
         .step_by(2)
         .map(|k| {
@@ -198,10 +198,10 @@ fn relative_velocities_are_drawn_anew_at_the_rate_of_drag() {
     run.advance(SETTLE, DT, Integrator::LoweAndersen).unwrap();
     let [mut drawn, mut square] = [0.0; 2];
     for _ in 0..STEPS {
-        let before = run.velocities().to_vec();
+        let before = run.state().v.to_vec();
         run.step(DT, Integrator::LoweAndersen, Want::FORCES).unwrap();
         for (k, [u, _]) in along(&run).into_iter().enumerate() {
-            if run.velocities()[2 * k] != before[2 * k] {
+            if run.state().v[2 * k] != before[2 * k] {
                 drawn += 1.0;
                 square += u * u;
             }

@@ -32,7 +32,7 @@ fn steps_are_their_formulas() {
             run.prepare(dt, Want::FORCES).unwrap();
             let mut wrapped = 0;
             for _ in 0..20 {
-                let (before, f) = (run.state(), run.forces().to_vec());
+                let (before, f) = (run.state().clone(), run.forces().to_vec());
                 run.step(dt, integrator, Want::FORCES).unwrap();
                 for k in 0..run.len() {
                     let (mut x, mut image, mut v) = (before.x[k], before.image[k], before.v[k]);
@@ -51,12 +51,9 @@ fn steps_are_their_formulas() {
                             }
                         }
                     }
-                    run.domain().wrap(&mut x, &mut image);
+                    run.state().domain.wrap(&mut x, &mut image);
                     wrapped += usize::from(image != before.image[k]);
-                    assert_eq!(
-                        (x, v, image),
-                        (run.positions()[k], run.velocities()[k], run.image_flags()[k])
-                    );
+                    assert_eq!((x, v, image), (run.state().x[k], run.state().v[k], run.state().image[k]));
                 }
             }
             assert!(wrapped > 20, "{wrapped}");
@@ -103,7 +100,7 @@ fn momentum_is_carried_by_mass() {
     let mut run = Simulation::new(&model, 1.0, state, 7).unwrap();
     let carried = |run: &Simulation, v: &[[f64; 3]]| {
         [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|(a, b)| {
-            let term = |k: usize| run.masses()[run.species()[k] as usize] * v[k][a] * v[k][b];
+            let term = |k: usize| run.state().mass[run.state().species[k] as usize] * v[k][a] * v[k][b];
             (0..run.len()).map(term).sum::<f64>()
         })
     };
@@ -115,19 +112,19 @@ fn momentum_is_carried_by_mass() {
     let dt = 1e-3;
     run.record_flux(true);
     run.prepare(dt, Want::TOTALS).unwrap();
-    let before: Vec<[f64; 3]> = run.velocities().to_vec();
+    let before: Vec<[f64; 3]> = run.state().v.to_vec();
     let pulls = run.forces().to_vec();
     run.step(dt, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
     let moved: Vec<[f64; 3]> = (0..run.len())
         .map(|k| {
-            let mass = run.masses()[run.species()[k] as usize];
+            let mass = run.state().mass[run.state().species[k] as usize];
             std::array::from_fn(|c| before[k][c] + 0.5 * dt / mass * pulls[k][c])
         })
         .collect();
     let flux = run.flux().unwrap();
     same(Flux { ways: flux.ways.clone(), ..Flux::default() }.sum(), carried(&run, &moved));
-    let volume = run.domain().volume(3);
-    let ends = carried(&run, run.velocities()).map(|sum| sum / volume);
+    let volume = run.state().domain.volume(3);
+    let ends = carried(&run, &run.state().v).map(|sum| sum / volume);
     same(run.conservative_pressure_tensor(), ends);
     let drag: [f64; 6] = std::array::from_fn(|c| run.pressure_tensor()[c] - ends[c]);
     assert!(drag.iter().any(|c| *c != 0.0));
