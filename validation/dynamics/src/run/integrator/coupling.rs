@@ -1,4 +1,8 @@
-use super::{Coupling, Heat, RunError, Simulation, Stream, Want};
+use crate::integrator::Coupling;
+use crate::run::error::RunError;
+use crate::run::simulation::{Heat, Simulation};
+use psidpd_core::engine::Want;
+use psidpd_core::engine::thermostat::Stream;
 
 impl Coupling {
     /// Its action in the present step of `dt`, if it is its turn.

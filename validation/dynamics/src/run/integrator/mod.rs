@@ -5,23 +5,23 @@
 
 mod aboba;
 mod baoab;
-mod by_pairs;
 mod coupling;
 mod dpd_vv;
+mod force_gradient;
 mod groot_warren;
+mod lowe_andersen;
 mod monte_carlo;
 pub(super) mod parts;
+mod peters;
 mod self_consistent;
 mod shardlow;
 mod two_stage;
 mod velocity_verlet;
 
-use super::simulation::Heat;
 use super::{Integrator, RunError, Simulation};
 use crate::integrator::Coupling;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Stream, Update};
 
 impl Integrator {
     /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.
@@ -33,18 +33,14 @@ impl Integrator {
             Integrator::SelfConsistent { noise } => self_consistent::step(system, dt, want, noise),
             Integrator::ShardlowS1 { noise } => shardlow::first(system, dt, want, noise),
             Integrator::ShardlowS2 { noise } => shardlow::second(system, dt, want, noise),
-            Integrator::Peters { noise } => {
-                by_pairs::step(system, dt, want, Update::OrnsteinUhlenbeck, noise)
-            }
-            Integrator::LoweAndersen => by_pairs::step(system, dt, want, Update::LoweAndersen, Law::Gaussian),
+            Integrator::Peters { noise } => peters::step(system, dt, want, noise),
+            Integrator::LoweAndersen => lowe_andersen::step(system, dt, want),
             Integrator::Aboba(coupling) => aboba::step(system, dt, want, coupling),
             Integrator::Baoab(coupling) => baoab::step(system, dt, want, coupling),
-            Integrator::TwoStage { lambda, coupling } => {
-                two_stage::step(system, dt, want, lambda, None, coupling)
-            }
             Integrator::ForceGradient { lambda, gradient, coupling } => {
-                two_stage::step(system, dt, want, lambda, Some(gradient), coupling)
+                force_gradient::step(system, dt, want, [lambda, gradient], coupling)
             }
+            Integrator::TwoStage { lambda, coupling } => two_stage::step(system, dt, want, lambda, coupling),
             Integrator::MonteCarlo { sweeps, max_move } => monte_carlo::step(system, want, sweeps, max_move),
         }
     }

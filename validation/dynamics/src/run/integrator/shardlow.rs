@@ -8,7 +8,9 @@
 //! S2 of second. One evaluation of forces; one and two passes over pairs, which only planes of cells share among threads. T_kin is
 //! that of the velocities at the end of the step: behind a kick in S1, behind the thermostat in S2.
 
-use super::{Heat, Law, RunError, Simulation, Stream, Update, Want};
+use super::{Law, RunError, Simulation, Want};
+use crate::run::simulation::Heat;
+use psidpd_core::engine::thermostat::{Stream, Update};
 
 pub fn first(system: &mut Simulation, dt: f64, want: Want, noise: Law) -> Result<(), RunError> {
     let update = Update::Shardlow { reversed: false };
