@@ -260,7 +260,7 @@ impl Writer<'_> {
     fn pair_form(&mut self, k: usize, potential: &PairPotential) -> String {
         match potential {
             PairPotential::Soft(soft) => {
-                let (a, range) = (soft.strength(), PairForm::range(soft));
+                let (a, range) = (soft.strength, PairForm::range(soft));
                 let (inverse, half, minus) =
                     (self.number(1.0 / range), self.number(0.5 * a * range), self.number(-a));
                 format!("    let t = 1.0 - r * {inverse};\n    out += vec2({half} * t * t, {minus} * t);\n")
@@ -268,8 +268,8 @@ impl Writer<'_> {
             PairPotential::Spline(spline) => {
                 let mut text = String::new();
                 for (factor, range) in [
-                    (spline.repulsion(), spline.repulsion_range()),
-                    (-spline.attraction(), spline.attraction_range()),
+                    (spline.repulsion, spline.repulsion_range),
+                    (-spline.attraction, spline.attraction_range),
                 ] {
                     let [limit, inverse] = [range, 1.0 / range].map(|x| self.number(x));
                     let [value, slope] = [factor, factor / range].map(|x| self.number(x));
@@ -282,11 +282,11 @@ impl Writer<'_> {
                 text
             }
             PairPotential::Expression(pair) => {
-                let wgsl = pair.program().wgsl(&format!("p{k}_"), |_| "r".into(), |c| self.numbers.name(c));
+                let wgsl = pair.program.wgsl(&format!("p{k}_"), |_| "r".into(), |c| self.numbers.name(c));
                 format!("{}    out += vec2({}, {});\n", wgsl.statements, wgsl.outputs[0], wgsl.outputs[1])
             }
             PairPotential::Table(table) => {
-                let from = of_spline(table.spline(), &mut self.tables);
+                let from = of_spline(&table.spline, &mut self.tables);
                 format!("    out += m_table({from}u, r).xy;\n")
             }
         }
