@@ -43,8 +43,7 @@ impl Meter for Energy {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let mut out = Observation::new("energy", "Energy per particle", Kind::Scalar)
-            .samples(self.series.samples())
+        let mut out = Observation::new("energy", "Energy per particle", Kind::Scalar, &self.series)
             .column("total", "energy", [self.series.linear(|s| s.iter().sum())])
             .column("kinetic", "energy", [self.series.mean(0)])
             .column("potential", "energy", [self.series.linear(|s| s[1..].iter().sum())]);

@@ -81,8 +81,7 @@ impl Meter for InterfaceWidth {
         };
         let at = |k: usize| [fit.get(k).copied().unwrap_or(Measured::NONE)];
         vec![
-            Observation::new("interface_width", "Interfaces of a slab", Kind::Scalar)
-                .samples(self.series.samples())
+            Observation::new("interface_width", "Interfaces of a slab", Kind::Scalar, &self.series)
                 .column("width", "length", at(0))
                 .column("liquid", "1/volume", at(1))
                 .column("vapour", "1/volume", at(2))

@@ -55,7 +55,7 @@ impl Meter for Pressure {
 
     fn finish(&self) -> Vec<Observation> {
         let d = self.dimensions;
-        let mut out = Observation::new("pressure", "Pressure", Kind::Scalar).samples(self.series.samples());
+        let mut out = Observation::new("pressure", "Pressure", Kind::Scalar, &self.series);
         for (what, first) in [("carried", 12), ("conservative", 6), ("total", 0)] {
             let trace = self.series.linear(|s| s[first..first + d].iter().sum::<f64>() / d as f64);
             out = out.column(what, "energy/volume", [trace]);

@@ -62,9 +62,8 @@ impl Bins {
 
     /// An observation against the coordinate, without columns.
     fn observation(&self, name: &str, title: &str) -> Observation {
-        Observation::new(name, title, Kind::Profile)
+        Observation::new(name, title, Kind::Profile, &self.series)
             .against(self.across.name(), "length", self.across.middles())
-            .samples(self.series.samples())
             .note(self.across.note())
     }
 

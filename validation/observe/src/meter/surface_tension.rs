@@ -117,8 +117,7 @@ impl Meter for SurfaceTension {
             free_energy.error = self.series.linear(linear).error;
         }
         vec![
-            Observation::new("surface_tension", "Surface tension", Kind::Scalar)
-                .samples(self.series.samples())
+            Observation::new("surface_tension", "Surface tension", Kind::Scalar, &self.series)
                 .column("stress", "energy/area", [self.series.mean(0)])
                 .column("stress_conservative", "energy/area", [self.series.mean(1)])
                 .column("free_energy", "energy/area", [free_energy]),

@@ -120,15 +120,12 @@ impl Meter for Viscosity {
         let lags = if self.series.is_empty() { 0 } else { self.length + 1 };
         let last = if lags == 0 { Measured::NONE } else { viscosity(self.length) };
         let times = (0..lags).map(|k| k as f64 * dt).collect();
-        let samples = self.series.samples();
-        let curve =
-            Observation::new("stress_correlation", "Stress autocorrelation and its integral", Kind::Curve)
-                .against("time", "time", times)
-                .samples(samples)
-                .column("correlation", "(energy/volume)^2", (0..lags).map(|k| self.series.mean(k)))
-                .column("viscosity", "mass/(r_c time)", (0..lags).map(viscosity));
-        let scalar = Observation::new("viscosity", "Shear viscosity", Kind::Scalar)
-            .samples(samples)
+        let title = "Stress autocorrelation and its integral";
+        let curve = Observation::new("stress_correlation", title, Kind::Curve, &self.series)
+            .against("time", "time", times)
+            .column("correlation", "(energy/volume)^2", (0..lags).map(|k| self.series.mean(k)))
+            .column("viscosity", "mass/(r_c time)", (0..lags).map(viscosity));
+        let scalar = Observation::new("viscosity", "Shear viscosity", Kind::Scalar, &self.series)
             .column("viscosity", "mass/(r_c time)", [last])
             .column("kT", "energy", [self.series.mean(self.length + 1)]);
         vec![scalar, curve]
