@@ -37,7 +37,6 @@ pub use outcome::Asked;
 use outcome::{FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
-use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -106,23 +105,17 @@ struct Bench<'a> {
 pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
     let out = files::absolute_folder(&options.out)?;
-    let spinner = progress.spinner("LAMMPS and the plugin");
-    let (place, version) = place(options, &out, progress)?;
-    spinner.finish();
-
+    let prepared = || PluginHost::prepared(options.lammps.as_deref(), &|line| progress.note(line));
+    let (lammps, version) = progress.spinner("LAMMPS and the plugin", prepared)?;
+    let place = Place { lammps, work: out.join("runs") };
     let (choice, missing) = choice(options, &place)?;
     let mut bench = Bench { asked: &options.asked, place, cases: BTreeMap::new(), progress };
     let mut entries = bench.entries(&choice, &out)?;
     bench.calibrate(&mut entries)?;
     bench.time(&mut entries)?;
 
-    let spinner = progress.spinner("memory and threads");
-    let memory = match &options.memory[..] {
-        [] => Vec::new(),
-        sizes => memory::measure(program, sizes)?,
-    };
-    let equal_bits = bench.equal_bits()?;
-    spinner.finish();
+    let memory = progress.spinner("memory", || memory::measure(program, &options.memory))?;
+    let equal_bits = progress.spinner("threads", || bench.equal_bits())?;
 
     let runs = bench.runs(&entries);
     let fluids = SUBJECTS.iter().map(facts).collect::<Result<Vec<_>, _>>()?;
@@ -153,18 +146,6 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     files::write_json(&out.join("bench.json"), &outcome)?;
     write_atomically(out.join("report.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
-}
-
-/// LAMMPS with the plugin, and its version in words.
-fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, String), ExperimentError> {
-    let note = |line: &str| progress.note(line);
-    let host = match &options.lammps {
-        Some(place) => Host::at(place)?,
-        None => psidpd_lammps_host::plugin::install_to_build(&note)?,
-    };
-    let version = host.version()?;
-    let lammps = PluginHost::open(host, &note)?;
-    Ok((Place { lammps, work: out.join("runs") }, version.name))
 }
 
 /// Who can be timed here, and the styles that LAMMPS lacks.
@@ -199,9 +180,9 @@ impl Bench<'_> {
         let mut entries = Vec::new();
         for &size in &self.asked.sizes {
             for subject in SUBJECTS {
-                let spinner = self.progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
-                let start = start::kept(&subject, size, &out.join("starts"))?;
-                spinner.finish();
+                let name = format!("equilibrium: {}, {size}", subject.name);
+                let start =
+                    self.progress.spinner(&name, || start::kept(&subject, size, &out.join("starts")))?;
                 let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
                 let pairs = pairs::pairs_per_particle(&start.state, cutoff);
                 self.cases.insert((subject.name, size), Case { start, pairs });
@@ -254,7 +235,6 @@ impl Bench<'_> {
             (entry.skin, entry.step) = (pace.skin, Some(step));
             entry.length = Length::within(self.asked.seconds, &entry.contender, step);
         }
-        bar.finish();
         Ok(())
     }
 
@@ -291,7 +271,6 @@ impl Bench<'_> {
             // Alternate the order, so that neighbours in time do not matter.
             order.reverse();
         }
-        bar.finish();
         Ok(())
     }
 

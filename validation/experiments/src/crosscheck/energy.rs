@@ -43,9 +43,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let runs = setups.iter().map(|setup| (setup, bar(setup))).collect();
     let traces = jobs::each(runs, |(setup, bar)| {
         let name = format!("nve-{}", setup.slug());
-        let trace = run_code(context, setup, &state, length, &name, &|s| bar.set(s));
-        bar.finish();
-        trace
+        run_code(context, setup, &state, length, &name, &|s| bar.set(s))
     });
     let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut part = Part::of("energy");

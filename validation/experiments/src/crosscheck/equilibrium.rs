@@ -97,7 +97,6 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         };
         let trace = run_code(context, &setup, state, length, &folder, &advance);
         advance(steps);
-        bar.finish();
         trace
     });
     let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
