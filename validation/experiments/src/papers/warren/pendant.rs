@@ -19,7 +19,7 @@ const DROPS: [Drop; 4] = [
 fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-pendant");
     // As the paper has them, at the small size too: twenty seconds each. With a longer step the drop of set 5 falls.
-    context.shipped(name, model, scene, &[("output.dump", 0i64)])
+    context.shipped(name, model, scene, &["output.dump=0"])
 }
 
 pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
