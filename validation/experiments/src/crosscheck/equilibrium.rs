@@ -84,7 +84,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         for (n, &(code, law, _)) in runs(set, context.full).iter().enumerate() {
             let seed = SEED + (10 * k + n) as u64;
             let setup = Setup { gamma: GAMMA, seed, ..Setup::new(code, set, law) };
-            let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), setup.slug());
+            let folder = format!("nvt-{}-{}-{n}", set.slug(), setup.slug());
             let bar = context.progress.bar(&format!("NVT {}: {}", set.name, name(code, law)), steps);
             slots.push((setup, &starts[k], folder, bar));
         }
@@ -192,7 +192,7 @@ fn report_set(
     measured: &[Slab],
     comparisons: usize,
 ) -> Result<(), ExperimentError> {
-    let slug = set.name.replace(' ', "");
+    let slug = set.slug();
     let quantities = QUANTITIES.iter().map(|(name, ..)| *name);
     let mut table = Table::new(std::iter::once("code").chain(quantities).chain(["width"]));
     let levels = vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))];
@@ -211,7 +211,7 @@ fn report_set(
             part.values.push((id, json!(get(m))));
         }
     }
-    let published = set.published().map(|(value, error)| format!("{value} ± {error}"));
+    let published = set.published().map(|[value, error]| format!("{value} ± {error}"));
     table.push(["Warren, Table 2", "", "", ""].map(str::to_owned).into_iter().chain(published));
     for ((code, law, other), m) in RUNS.iter().zip(measured) {
         let Some(other) = other else { continue };
@@ -261,7 +261,7 @@ fn report_set(
 
 fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Slab) -> Check {
     Check::at_most(
-        format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), Setup::new(code, set, law).slug()),
+        format!("nvt.{}.{}.thermostat", set.slug(), Setup::new(code, set, law).slug()),
         "equilibrium",
         format!("{}: temperature of {} against kT", set.name, name(code, law)),
         found.temperature.mean - 1.0,
@@ -272,9 +272,9 @@ fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Slab) -> Check
 
 /// Density and tension of the native runner against Warren's.
 fn against_published(set: &WarrenSet, native: &Slab) -> [Check; 2] {
-    let published = |what: &str, found: &Estimate, (value, error): (f64, f64)| {
+    let published = |what: &str, found: &Estimate, [value, error]: [f64; 2]| {
         Check::agreement(
-            format!("nvt.{}.published.{what}", set.name.replace(' ', "")),
+            format!("nvt.{}.published.{what}", set.slug()),
             "equilibrium",
             format!("{}: {what} of native against Warren's Table 2, with his error and ours", set.name),
             found.mean - value,
@@ -284,10 +284,8 @@ fn against_published(set: &WarrenSet, native: &Slab) -> [Check; 2] {
         )
     };
     let tension = native.conservative_tension.as_ref().unwrap_or(&native.tension);
-    [
-        published("density", &native.liquid, (set.fluid.density, set.liquid_error)),
-        published("tension", tension, set.tension),
-    ]
+    let [liquid, of_surface, _] = set.published();
+    [published("density", &native.liquid, liquid), published("tension", tension, of_surface)]
 }
 
 fn law_slug(law: ForceLaw) -> &'static str {
