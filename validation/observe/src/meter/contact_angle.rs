@@ -284,7 +284,7 @@ impl Meter for ContactAngle {
 
     fn finish(&self) -> Vec<Observation> {
         let new = |name, title, kind| Observation::new(name, title, kind, &self.series);
-        let found = self.series.jackknife_many(|field| self.cap(field));
+        let found = self.series.jackknife(|field| self.cap(field));
         let at = |k: usize| [found.get(k).copied().unwrap_or(Measured::NONE)];
         let surface = self.surface();
         let note = match found.is_empty() {
@@ -309,7 +309,7 @@ impl Meter for ContactAngle {
         let level = |field: &[f64]| self.isodensity.unwrap_or(0.5 * self.liquid(field));
         let [rows, _] = self.contour(&field, level(&field));
         let heights: Vec<f64> = rows.iter().map(|p| p[1]).collect();
-        let radii = self.series.jackknife_many(|field| {
+        let radii = self.series.jackknife(|field| {
             let [rows, _] = self.contour(field, level(field));
             let near = |z: f64| rows.iter().find(|p| (p[1] - z).abs() < 0.5 * self.width[1]);
             Some(heights.iter().map(|z| near(*z).map_or(f64::NAN, |p| p[0])).collect())

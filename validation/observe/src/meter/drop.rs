@@ -274,7 +274,7 @@ impl Meter for Drop {
 
     fn finish(&self) -> Vec<Observation> {
         let rest = (self.dimensions - 1) as f64;
-        let found = self.shells.jackknife_many(|means| {
+        let found = self.shells.jackknife(|means| {
             let s = self.shape(means)?;
             let laplace = s.inside - s.outside;
             let tension = laplace * s.radius / rest;

@@ -51,7 +51,7 @@ impl Meter for InterfaceWidth {
             let density = means.iter().map(|n| n / volume).collect();
             DensityProfile { centres: centres.clone(), density }
         };
-        let mut fit = self.series.jackknife_many(|means| {
+        let mut fit = self.series.jackknife(|means| {
             let profile = profile(means);
             let found = slab_edges(&profile)?;
             let fit = interface(&profile);

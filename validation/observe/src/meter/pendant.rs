@@ -189,7 +189,7 @@ impl Meter for Pendant {
 
     fn finish(&self) -> Vec<Observation> {
         let new = |name, title, kind| Observation::new(name, title, kind, &self.series);
-        let found = self.series.jackknife_many(|field| self.shape(field));
+        let found = self.series.jackknife(|field| self.shape(field));
         let at = |k: usize| [found.get(k).copied().unwrap_or(Measured::NONE)];
         let mut scalar = new("pendant", "Hanging drop", Kind::Scalar)
             .column("bond", "1", at(0))
@@ -211,7 +211,7 @@ impl Meter for Pendant {
         // The radius of the mean surface at each height. Its error comes from the jackknife.
         let top = self.bins[1] as f64 * self.width[1];
         let heights: Vec<f64> = self.surface(&field, level).iter().map(|p| p.1).collect();
-        let radii = self.series.jackknife_many(|field| {
+        let radii = self.series.jackknife(|field| {
             let level = self.isodensity.unwrap_or(0.5 * self.liquid(field));
             let points = self.surface(field, level);
             let near = |z: f64| points.iter().find(|p| (p.1 - z).abs() < 0.5 * self.width[1]);

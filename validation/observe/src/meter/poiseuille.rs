@@ -116,7 +116,7 @@ impl Meter for Poiseuille {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let found = self.series.jackknife_many(|means| self.fit(means));
+        let found = self.series.jackknife(|means| self.fit(means));
         let at = |k: usize| found.get(k).copied().unwrap_or(Measured::NONE);
         let velocity = (0..self.across.bins).map(|k| self.series.ratio(|s| s[2 * k + 1], |s| s[2 * k]));
         let fit = self.parabolas().into_iter().map(|f| at(2).times(f));

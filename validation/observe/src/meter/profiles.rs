@@ -186,7 +186,7 @@ impl Quantity for Temperature {
 
     fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
         let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
-        let temperature = bins.series.jackknife_many(|means| {
+        let temperature = bins.series.jackknife(|means| {
             let of = |at: &[f64]| {
                 let flow: f64 = at[count + 1..count + 1 + d].iter().map(|p| p * p).sum::<f64>() / at[count];
                 (at[count + 1 + d] - flow) / (d as f64 * at[count + 2 + d])
