@@ -28,14 +28,11 @@ impl Meter for Pressure {
         ..PLAIN
     };
 
+    const NEEDS: Want = Want::TOTALS;
     const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<Pressure, FileError> {
         Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(19) })
-    }
-
-    fn needs(&self) -> Want {
-        Want::TOTALS
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {

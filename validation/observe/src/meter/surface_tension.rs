@@ -59,6 +59,7 @@ impl Meter for SurfaceTension {
         ..PLAIN
     };
 
+    const NEEDS: Want = Want::TOTALS;
     const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
@@ -76,10 +77,6 @@ impl Meter for SurfaceTension {
             kt: 0.0,
             series: Series::new(4),
         })
-    }
-
-    fn needs(&self) -> Want {
-        Want::TOTALS
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {

@@ -87,6 +87,8 @@ impl Meter for Viscosity {
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;
 
+    const NEEDS: Want = Want { virial: true, ..Want::FORCES };
+
     const OF_MOTION: bool = true;
 
     fn read(options: &Options) -> Result<Viscosity, FileError> {
@@ -95,10 +97,6 @@ impl Meter for Viscosity {
         options.require_periodic()?;
         let length = options.count("length", 2, 100_000)?.unwrap_or(400);
         Ok(Viscosity::new(dimensions, length, place.domain.volume(dimensions)))
-    }
-
-    fn needs(&self) -> Want {
-        Want { virial: true, ..Want::FORCES }
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
