@@ -262,7 +262,7 @@ impl Meter for Drop {
         if !known {
             return false;
         }
-        let percolates = f64::from(u8::from(linked.percolates(largest)));
+        let percolates = f64::from(u8::from(linked.percolates[largest]));
         self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares, percolates])
     }
 

@@ -91,7 +91,7 @@ impl Meter for LocalDensity {
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let (evaluation, species) = (frame.evaluation(), view.species);
-        let fluid = &frame.evaluator().fluid;
+        let fluid = &frame.evaluator.fluid;
         let kinds = self.species.len();
         let density = &fluid.densities[self.density];
         let at = |i: usize, beta: usize| evaluation.densities_of(i)[self.density * kinds + beta];

@@ -36,10 +36,6 @@ impl Clock {
     pub fn spacing(&self) -> f64 {
         (self.last - self.first) / self.samples.saturating_sub(1) as f64
     }
-
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
 }
 
 /// A configuration from which displacements are measured.
@@ -97,7 +93,7 @@ impl Msd {
                 .collect();
             self.diffusion.push(&slope);
         }
-        if (self.clock.samples() - 1).is_multiple_of(self.spacing as u64) {
+        if (self.clock.samples - 1).is_multiple_of(self.spacing as u64) {
             self.origins.push(Origin { x, curve: Vec::new() });
         }
         true
@@ -178,7 +174,7 @@ impl Meter for Msd {
         let mut curve = Observation::new("msd", "Mean-square displacement", Kind::Curve, &self.diffusion)
             .against("time", "time", times);
         // Its samples are configurations, not origins.
-        curve.samples = self.clock.samples();
+        curve.samples = self.clock.samples;
         let mut diffusion =
             Observation::new("diffusion", "Diffusion coefficient", Kind::Scalar, &self.diffusion)
                 .note("Samples are origins that were followed to the end.");
