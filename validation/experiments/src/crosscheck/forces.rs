@@ -64,15 +64,6 @@ impl Point {
     }
 }
 
-fn native(
-    context: &Context,
-    model: &Model,
-    state: &State,
-    step: Option<Step>,
-) -> Result<Point, ExperimentError> {
-    point_of(context.simulation(model, 1.0, state, SEED)?, step)
-}
-
 pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ExperimentError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
@@ -186,7 +177,13 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling { lengths, thickness: 0.5 * lengths[2] };
     let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
     let volume = state.domain.volume(3);
-    let mut part = Part { section: heading(state.len()), ..Part::of("forces") };
+    let text = format!(
+        "{} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
+         native runner (seed {SEED}).",
+        state.len()
+    );
+    let heading = "Forces, energy and virial of one configuration";
+    let mut part = Part { section: Section::new(heading, vec![Item::Prose(text)]), ..Part::of("forces") };
     let mut table = Table::new(["code", "law", "against", "force", "energy", "virial"]);
     let mut compare =
         |part: &mut Part, setup: Setup, id: &str, truth: &Point, limits: [f64; 3], note: &str| {
@@ -209,7 +206,8 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
     against_plain(&mut part, &equilibrated(&SET6.fluid, small, 500, SEED)?, context.fault)?;
     use ForceLaw::{Conservative, LucyLammps};
-    let truth = native(context, &SET6.model(Conservative, 0.0)?, &state, None)?;
+    let native = |model: &Model, step| point_of(context.simulation(model, 1.0, &state, SEED)?, step);
+    let truth = native(&SET6.model(Conservative, 0.0)?, None)?;
     let tight = [1e-12; 3];
     let plugin = setup(Code::Psi, Conservative);
     compare(&mut part, plugin, "psi", &truth, tight, "native")?;
@@ -225,9 +223,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     part.bound("forces.native-mixed", of, "double precision", &mixed, loose);
     part.values.push(("forces.native-mixed".into(), json!(mixed)));
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
-    let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
+    let noisy = native(&SET6.model(Conservative, GAMMA)?, Some(step))?;
     compare(&mut part, Setup { gamma: GAMMA, ..plugin }, "psi-noise", &noisy, tight, "native, noise on")?;
-    let lucy = native(context, &SET6.model(LucyLammps, 0.0)?, &state, None)?;
+    let lucy = native(&SET6.model(LucyLammps, 0.0)?, None)?;
     compare(&mut part, setup(Code::MdpdPsi, LucyLammps), "mdpd-psi-lucy", &lucy, tight, "native")?;
     let built_in = setup(Code::Mdpd, LucyLammps);
     // The energy that mdpd tallies is not that of any potential: see the report.
@@ -247,14 +245,6 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let what = "plugin dpd/psi: force against the central difference of compute pe, relative";
     part.at_most("forces.gradient", what, gradient(context)?, 1e-8);
     Ok(part)
-}
-
-fn heading(particles: usize) -> Section {
-    let text = format!(
-        "{particles} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
-         native runner (seed {SEED})."
-    );
-    Section::new("Forces, energy and virial of one configuration", vec![Item::Prose(text)])
 }
 
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.

@@ -38,7 +38,7 @@ impl Viscosity {
         }
         // P:P is `shears` times the mean square of one off-diagonal component.
         let shears = ((d - 1) * (d + 2)) as f64;
-        let first = stress_of(&self.recent, 0);
+        let first = self.recent.front().copied().unwrap_or_default();
         let mut row: Vec<f64> = self.recent.iter().map(|p| contraction(&first, p, d) / shears).collect();
         row.push(temperature);
         self.recent.pop_front();
@@ -49,10 +49,6 @@ impl Viscosity {
     fn integral(row: &[f64], lag: usize, dt: f64) -> f64 {
         if lag == 0 { 0.0 } else { dt * (0.5 * (row[0] + row[lag]) + row[1..lag].iter().sum::<f64>()) }
     }
-}
-
-fn stress_of(recent: &VecDeque<[f64; 6]>, k: usize) -> [f64; 6] {
-    recent.get(k).copied().unwrap_or_default()
 }
 
 fn contraction(a: &[f64; 6], b: &[f64; 6], dimensions: usize) -> f64 {
