@@ -68,10 +68,8 @@ struct Entry {
     skin: f64,
     /// Seconds that a step is expected to take; none where steps are given.
     step: Option<f64>,
-    seconds: Vec<f64>,
-    parts: Vec<BTreeMap<String, f64>>,
-    ghosts: Option<f64>,
-    builds: Option<u64>,
+    /// The timed loop of each round.
+    made: Vec<Loop>,
 }
 
 impl Entry {
@@ -197,10 +195,7 @@ impl Bench<'_> {
                         length: Length { warm_up: 5, steps: self.asked.steps.unwrap_or(FEWEST) },
                         skin: SKIN,
                         step: None,
-                        seconds: Vec::new(),
-                        parts: Vec::new(),
-                        ghosts: None,
-                        builds: None,
+                        made: Vec::new(),
                     });
                 }
             }
@@ -264,8 +259,10 @@ impl Bench<'_> {
         let mut done = 0.0;
         for _ in 0..rounds {
             for &k in &order {
-                self.measure(&mut entries[k])?;
-                done += entries[k].weight();
+                let entry = &mut entries[k];
+                let made = self.once(entry, entry.skin)?;
+                entry.made.push(made);
+                done += entry.weight();
                 bar.set(done as u64);
             }
             // Alternate the order, so that neighbours in time do not matter.
@@ -282,17 +279,6 @@ impl Bench<'_> {
         }
     }
 
-    fn measure(&self, entry: &mut Entry) -> Result<(), ExperimentError> {
-        let made = self.once(entry, entry.skin)?;
-        entry.seconds.push(made.seconds);
-        entry.parts.push(made.parts);
-        if entry.contender.in_lammps() {
-            entry.ghosts = Some(made.ghosts);
-            entry.builds = Some(entry.builds.unwrap_or(0) + made.builds);
-        }
-        Ok(())
-    }
-
     fn runs(&self, entries: &[Entry]) -> Vec<Timed> {
         let median = |values: &[f64]| Spread::of(values).map_or(0.0, |s| s.median);
         let mut runs: Vec<Timed> = entries
@@ -301,14 +287,17 @@ impl Bench<'_> {
                 let case = &self.cases[&(entry.subject.name, entry.size)];
                 let particles = case.start.state.len() * entry.contender.copies();
                 let all = particles as f64 * entry.length.steps as f64;
-                let names = entry.parts.first().into_iter().flat_map(BTreeMap::keys);
+                let names = entry.made.first().into_iter().flat_map(|made| made.parts.keys());
                 let part = |name: &String| {
-                    let of = |p: &BTreeMap<String, f64>| 1e9 * p.get(name).copied().unwrap_or(0.0) / all;
-                    (name.clone(), median(&entry.parts.iter().map(of).collect::<Vec<_>>()))
+                    let of = |made: &Loop| 1e9 * made.parts.get(name).copied().unwrap_or(0.0) / all;
+                    (name.clone(), median(&entry.made.iter().map(of).collect::<Vec<_>>()))
                 };
-                let per_particle = 1e9 * median(&entry.seconds) / all;
+                let seconds: Vec<f64> = entry.made.iter().map(|made| made.seconds).collect();
+                let per_particle = 1e9 * median(&seconds) / all;
                 let settings = entry.contender.settings();
-                let steps = entry.length.steps * entry.seconds.len() as u64;
+                let in_lammps = entry.made.last().filter(|_| entry.contender.in_lammps());
+                let builds: u64 = entry.made.iter().map(|made| made.builds).sum();
+                let steps = entry.length.steps * seconds.len() as u64;
                 let mut run = Timed {
                     fluid: entry.subject.name,
                     size: entry.size,
@@ -321,14 +310,14 @@ impl Bench<'_> {
                     instructions: settings.map(|s| s.instructions.to_string()),
                     skin: entry.contender.in_lammps().then_some(entry.skin),
                     steps: entry.length.steps,
-                    seconds: entry.seconds.clone(),
+                    seconds,
                     mega_particle_steps_per_second: Spread::default(),
                     nanoseconds_per_particle_step: per_particle,
                     nanoseconds_per_pair: per_particle / case.pairs,
                     ratio_to_built_in: None,
                     parts: names.map(part).collect(),
-                    ghosts: entry.ghosts,
-                    steps_between_builds: entry.builds.map(|b| steps as f64 / b.max(1) as f64),
+                    ghosts: in_lammps.map(|made| made.ghosts),
+                    steps_between_builds: in_lammps.map(|_| steps as f64 / builds.max(1) as f64),
                 };
                 run.mega_particle_steps_per_second = Spread::of(&run.rates()).unwrap_or_default();
                 run
