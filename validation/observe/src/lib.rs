@@ -28,7 +28,7 @@ pub use error::ObserveError;
 pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
 pub use observers::Observers;
 pub use options::{Drive, StageNames};
-pub use profile::{DensityProfile, ProfileAccumulator, interface_width};
+pub use profile::{ProfileAccumulator, interface_width};
 pub use request::{Observe, Request, read};
 pub use series::{Measured, Series};
 pub use statistics::{Comparison, Estimate, difference, estimate, threshold};

@@ -175,7 +175,7 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Slab, ExperimentErro
         tension: tension(&trace.pressure)?,
         conservative_tension,
         width: interface_width(&shape),
-        profile: shape.centres.iter().copied().zip(shape.density.iter().copied()).collect(),
+        profile: shape,
     })
 }
 

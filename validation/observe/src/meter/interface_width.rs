@@ -1,6 +1,6 @@
 use super::across::Across;
 use super::*;
-use crate::profile::{DensityProfile, interface, slab_edges};
+use crate::profile::{interface, slab_edges};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {
@@ -47,9 +47,8 @@ impl Meter for InterfaceWidth {
     fn finish(&self) -> Vec<Observation> {
         let centres = self.across.middles();
         let volume = self.across.bin_volume();
-        let profile = |means: &[f64]| {
-            let density = means.iter().map(|n| n / volume).collect();
-            DensityProfile { centres: centres.clone(), density }
+        let profile = |means: &[f64]| -> Vec<(f64, f64)> {
+            centres.iter().zip(means).map(|(z, n)| (*z, n / volume)).collect()
         };
         let mut fit = self.series.jackknife(|means| {
             let profile = profile(means);
