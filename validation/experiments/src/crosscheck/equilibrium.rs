@@ -9,6 +9,7 @@ use crate::code::Code;
 use crate::fluids::{GAMMA, SET5, SET6, WarrenSet};
 use crate::jobs;
 use crate::start::{Filling, equilibrated};
+use psidpd_core::engine::Precision;
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width};
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
@@ -75,7 +76,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut starts = Vec::new();
     for set in &sets {
         let filling = Filling { lengths: [edge, edge, height], thickness };
-        starts.push(equilibrated(&set.fluid, filling, 1000, SEED)?);
+        starts.push(equilibrated(Precision::Double, &set.fluid, filling, 1000, SEED)?);
     }
     let count: usize = sets.iter().map(|set| runs(set, context.full).len()).sum();
     let made = context.progress.overall("equilibrium", steps * count as u64);
@@ -299,7 +300,7 @@ fn law_slug(law: ForceLaw) -> &'static str {
 mod tests {
     use super::super::trace::native;
     use super::*;
-    use psidpd_core::engine::{Fault, Precision};
+    use psidpd_core::engine::Fault;
 
     /// What is measured of a fluid fails the same checks if a force of the engine is 5 % wrong, in shorter runs than those of
     /// `psidpd validate`. The virial moves no particle: `forces` has a check of it.
@@ -307,7 +308,7 @@ mod tests {
     fn physics_tells_of_faults() {
         let (edge, height, thickness, steps) = (5.0, 12.0, 5.2, 2000);
         let filling = Filling { lengths: [edge, edge, height], thickness };
-        let state = equilibrated(&SET6.fluid, filling, 600, SEED).unwrap();
+        let state = equilibrated(Precision::Double, &SET6.fluid, filling, 600, SEED).unwrap();
         let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 10 };
         let setup = Setup {
             precision: Precision::Mixed,

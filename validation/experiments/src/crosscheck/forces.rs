@@ -175,7 +175,7 @@ pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentErr
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let lengths = if context.full { [15.0, 15.0, 20.0] } else { [10.0, 10.0, 15.0] };
     let filling = Filling { lengths, thickness: 0.5 * lengths[2] };
-    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
+    let state = equilibrated(Double, &SET6.fluid, filling, 500, SEED)?;
     let volume = state.domain.volume(3);
     let text = format!(
         "{} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
@@ -204,7 +204,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let setup = |code, law| Setup { seed: SEED, spacing: FINE, ..Setup::new(code, &SET6, law) };
     // These sums go over every pair and its images.
     let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
-    against_plain(&mut part, &equilibrated(&SET6.fluid, small, 500, SEED)?, context.fault)?;
+    against_plain(&mut part, &equilibrated(Double, &SET6.fluid, small, 500, SEED)?, context.fault)?;
     use ForceLaw::{Conservative, LucyLammps};
     let native = |model: &Model, step| point_of(context.simulation(model, 1.0, &state, SEED)?, step);
     let truth = native(&SET6.model(Conservative, 0.0)?, None)?;
@@ -250,7 +250,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.
 fn gradient(context: &Context) -> Result<f64, ExperimentError> {
     let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5 };
-    let state = equilibrated(&SET6.fluid, filling, 300, SEED)?;
+    let state = equilibrated(Double, &SET6.fluid, filling, 300, SEED)?;
     let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
     let lammps = open(context, &setup, &state, "forces-gradient")?;
     let truth = point(&lammps, state.domain.volume(3))?;
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn every_fault_of_the_engine_fails_a_check() {
         let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0 };
-        let state = equilibrated(&SET6.fluid, filling, 100, SEED).unwrap();
+        let state = equilibrated(Double, &SET6.fluid, filling, 100, SEED).unwrap();
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let mut part = Part::default();
             against_plain(&mut part, &state, fault).unwrap();
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn wrong_terms_and_numbers_that_are_none_show() {
         let filling = Filling::cube(4.0);
-        let state = equilibrated(&SET6.fluid, filling, 20, SEED).unwrap();
+        let state = equilibrated(Double, &SET6.fluid, filling, 20, SEED).unwrap();
         let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
         let model = SET6.model(ForceLaw::Conservative, GAMMA).unwrap();
         let right = point_of(Simulation::new(&model, 1.0, state.clone(), SEED).unwrap(), step).unwrap();
