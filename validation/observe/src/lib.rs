@@ -27,7 +27,7 @@ pub use drift::{Drift, drift};
 pub use error::ObserveError;
 pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
 pub use observers::Observers;
-pub use options::{Drive, StageNames};
+pub use options::{Drive, Place};
 pub use profile::{ProfileAccumulator, interface_width};
 pub use request::{Observe, Request, read};
 pub use series::{Measured, Series};
