@@ -91,9 +91,7 @@ pub fn run(
     fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
     let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
-    let outcome = runner.run_to_end(&mut |p| bar.set(p.step));
-    bar.finish();
-    outcome?;
+    runner.run_to_end(&mut |p| bar.set(p.step))?;
     Observed::read(folder)
 }
 

@@ -61,8 +61,6 @@ pub enum ExperimentError {
          tension by surface_tension or drop, and viscosities by viscosity or poiseuille, in its [observe]"
     )]
     Unmeasured(String),
-    #[error("the file has no {0}")]
-    Parameter(String),
     #[error("the model file cannot be edited: {0}")]
     Edit(#[from] toml_edit::TomlError),
     #[error("the model has no [density.{0}]")]

@@ -100,8 +100,8 @@ pub struct WarrenSet {
     pub b: f64,
     /// Error of the density of the liquid.
     pub liquid_error: f64,
-    pub tension: (f64, f64),
-    pub width: (f64, f64),
+    pub tension: [f64; 2],
+    pub width: [f64; 2],
 }
 
 pub const SET5: WarrenSet = WarrenSet {
@@ -115,8 +115,8 @@ pub const SET5: WarrenSet = WarrenSet {
     },
     b: 40.0,
     liquid_error: 0.01,
-    tension: (4.95, 0.03),
-    width: (0.78, 0.05),
+    tension: [4.95, 0.03],
+    width: [0.78, 0.05],
 };
 
 pub const SET6: WarrenSet = WarrenSet {
@@ -124,8 +124,8 @@ pub const SET6: WarrenSet = WarrenSet {
     fluid: MDPD,
     b: 25.0,
     liquid_error: 0.01,
-    tension: (7.45, 0.04),
-    width: (0.66, 0.03),
+    tension: [7.45, 0.04],
+    width: [0.66, 0.03],
 };
 
 pub const RC: f64 = 1.0;
@@ -136,8 +136,13 @@ pub const GAMMA: f64 = 18.0;
 
 impl WarrenSet {
     /// Density of the liquid, tension and width, with their errors.
-    pub fn published(&self) -> [(f64, f64); 3] {
-        [(self.fluid.density, self.liquid_error), self.tension, self.width]
+    pub fn published(&self) -> [[f64; 2]; 3] {
+        [[self.fluid.density, self.liquid_error], self.tension, self.width]
+    }
+
+    /// Its name in files.
+    pub fn slug(&self) -> String {
+        self.name.replace(' ', "")
     }
 
     pub fn pair(&self, gamma: f64) -> WarrenPair {

@@ -1,6 +1,6 @@
 //! Several runs at once.
 
-use psidpd_report::Bar;
+use psidpd_report::Progress;
 use std::sync::{Mutex, PoisonError};
 
 /// Does `work` with numbered items on so many threads. Items are begun in their order; results come in the order of the numbers.
@@ -32,14 +32,17 @@ pub fn each<I: Send, T: Send>(items: Vec<I>, work: impl Fn(I) -> T + Sync) -> Ve
 }
 
 /// The same with a bar of the items that are done.
-pub fn counted<I: Send, T: Send>(items: Vec<I>, bar: &Bar, work: impl Fn(I) -> T + Sync) -> Vec<T> {
-    let results = each(items, |item| {
+pub fn counted<I: Send, T: Send>(
+    (progress, name): (&Progress, &str),
+    items: Vec<I>,
+    work: impl Fn(I) -> T + Sync,
+) -> Vec<T> {
+    let bar = progress.bar(name, items.len() as u64);
+    each(items, |item| {
         let result = work(item);
         bar.advance(1);
         result
-    });
-    bar.finish();
-    results
+    })
 }
 
 #[cfg(test)]

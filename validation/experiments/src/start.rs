@@ -70,17 +70,8 @@ pub fn random(subject: &Subject, filling: Filling, seed: u64) -> Result<State, E
     Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })
 }
 
-/// The same brought to equilibrium by `steps` steps with the thermostat on, after 100 short ones, in double precision.
+/// The same brought to equilibrium by `steps` steps with the thermostat on, after 100 short ones.
 pub fn equilibrated(
-    subject: &Subject,
-    filling: Filling,
-    steps: u64,
-    seed: u64,
-) -> Result<State, ExperimentError> {
-    in_precision(Precision::Double, subject, filling, steps, seed)
-}
-
-fn in_precision(
     precision: Precision,
     subject: &Subject,
     filling: Filling,
@@ -125,7 +116,7 @@ pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, Expe
     if let Some(state) = found.filter(|_| data.is_file() && data_mdpd.is_file()) {
         return Ok(Start { state, data, data_mdpd });
     }
-    let state = in_precision(Precision::Mixed, subject, Filling::of_size(size)?, STEPS, SEED)?;
+    let state = equilibrated(Precision::Mixed, subject, Filling::of_size(size)?, STEPS, SEED)?;
     let text = state.to_data("psidpd bench");
     text.write(&data)?;
     text.write_mdpd(&data_mdpd)?;

@@ -36,7 +36,7 @@ pub fn sums(frame: &Frame) -> [f64; 2] {
 /// Visits `F·F` and `∇²U` of each mobile particle, with its index.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
-    let laplacians = evaluation.laplacians(&frame.evaluator().fluid, frame.view.species);
+    let laplacians = evaluation.laplacians(&frame.evaluator.fluid, frame.view.species);
     for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
             visit(k, [f.iter().map(|f| f * f).sum(), l]);
@@ -50,7 +50,7 @@ fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
 /// gives the error of a single configuration.
 pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
     let view = &frame.view;
-    let range = frame.evaluator().fluid.conservative_range().max(f64::MIN_POSITIVE);
+    let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
     let count: [usize; 3] = std::array::from_fn(|k| match k < view.dimensions {
         true => ((view.domain.height(k) / (BLOCK * range)) as usize).clamp(1, MOST_BLOCKS),
         false => 1,
@@ -68,7 +68,7 @@ pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
 
 /// The mean square frequency of a particle in the field of the others, `⟨Σ ∇²U/m⟩/(dN)`.
 pub fn mean_square_frequency(frame: &Frame) -> f64 {
-    let laplacians = frame.evaluation().laplacians(&frame.evaluator().fluid, frame.view.species);
+    let laplacians = frame.evaluation().laplacians(&frame.evaluator.fluid, frame.view.species);
     let sum: f64 = laplacians.into_iter().enumerate().map(|(k, l)| l / frame.mass(k)).sum();
     sum / (frame.view.dimensions * frame.view.x.len()) as f64
 }

@@ -44,20 +44,16 @@ pub struct View<'a> {
 /// A configuration with cached results that several observables share.
 pub struct Frame<'a> {
     pub view: View<'a>,
-    evaluator: &'a Evaluator,
+    /// It belongs to the fluid of the configuration.
+    pub evaluator: &'a Evaluator,
     evaluation: OnceCell<Evaluation>,
     /// The evaluations of forces that acted at positions other than the present ones.
     earlier: OnceCell<Vec<Option<Evaluation>>>,
 }
 
 impl<'a> Frame<'a> {
-    /// The `evaluator` belongs to the fluid of the configuration.
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
         Frame { view, evaluator, evaluation: OnceCell::new(), earlier: OnceCell::new() }
-    }
-
-    pub fn evaluator(&self) -> &'a Evaluator {
-        self.evaluator
     }
 
     /// Energies and conservative forces.

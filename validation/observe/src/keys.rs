@@ -51,30 +51,3 @@ pub(super) const RECENTRE: Key = key(
             the circle, is at 0: a slab that drifts, or a layer in a mixture that fills the box, is not smeared then.",
     "true",
 );
-
-/// The reference of `[observe]` as Markdown.
-pub fn reference(tables: &[&Table]) -> String {
-    let mut out = String::from(INTRODUCTION);
-    out.push_str("\n## Keys of every observable\n\n");
-    list(&mut out, COMMON);
-    for table in tables {
-        out.push_str(&format!("\n## `{}`: {}\n\n{}\n", table.path, table.title, table.about));
-        if !table.keys.is_empty() {
-            out.push('\n');
-            list(&mut out, table.keys);
-        }
-    }
-    out
-}
-
-fn list(out: &mut String, keys: &[Key]) {
-    out.push_str("| key | value | if left out | meaning |\n|---|---|---|---|\n");
-    for key in keys {
-        // A vertical bar would end the cell.
-        let [value, default, about] =
-            [&key.value.describe(), key.default(), key.about].map(|text| text.replace('|', "\\|"));
-        out.push_str(&format!("| `{}` | {value} | {default} | {about} |\n", key.name));
-    }
-}
-
-const INTRODUCTION: &str = include_str!("introduction.md");

@@ -1,6 +1,6 @@
 //! The results of an observable, and the files that hold them.
 
-use super::series::Measured;
+use super::series::{Measured, Series};
 use serde::{Deserialize, Serialize};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -68,8 +68,10 @@ pub struct Observation {
 }
 
 impl Observation {
-    pub fn new(name: &str, title: &str, kind: Kind) -> Observation {
-        Observation { name: name.into(), title: title.into(), kind, ..Observation::default() }
+    /// An observation without columns of the samples of `series`.
+    pub fn new(name: &str, title: &str, kind: Kind, series: &Series) -> Observation {
+        let (name, title, samples) = (name.into(), title.into(), series.samples());
+        Observation { name, title, kind, samples, ..Observation::default() }
     }
 
     pub fn against(mut self, name: &str, unit: &str, values: Vec<f64>) -> Observation {
@@ -90,11 +92,6 @@ impl Observation {
 
     pub fn exact(self, name: &str, unit: &str, values: impl IntoIterator<Item = f64>) -> Observation {
         self.column(name, unit, values.into_iter().map(|value| Measured { value, error: 0.0 }))
-    }
-
-    pub fn samples(mut self, samples: u64) -> Observation {
-        self.samples = samples;
-        self
     }
 
     pub fn note(mut self, text: impl AsRef<str>) -> Observation {
@@ -193,12 +190,12 @@ mod tests {
     use super::*;
 
     fn example(stage: &str) -> Observation {
-        let mut o = Observation::new("rdf", "g(r)", Kind::Curve)
+        let mut o = Observation::new("rdf", "g(r)", Kind::Curve, &Series::new(1))
             .against("r", "length", vec![0.5, 1.5])
             .column("g", "1", [Measured { value: 1.0, error: 0.25 }, Measured::NONE])
-            .samples(3)
             .note("one.")
             .note("two.");
+        o.samples = 3;
         o.stage = stage.into();
         o
     }

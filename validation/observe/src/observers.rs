@@ -61,19 +61,9 @@ impl Observers {
     }
 
     /// The quantities that the forces of step `step` of stage `stage` must provide for [`Observers::sample`].
-    pub fn wants_in(&self, step: u64, stage: &str) -> Want {
-        let in_stage = |o: &&Observer| o.stages.iter().any(|s| s.stage == stage);
-        Self::needs(self.observers.iter().filter(in_stage), step)
-    }
-
-    /// The quantities that the forces of step `step` must provide, for any stage.
-    pub fn wants(&self, step: u64) -> Want {
-        Self::needs(self.observers.iter(), step)
-    }
-
-    fn needs<'a>(observers: impl Iterator<Item = &'a Observer>, step: u64) -> Want {
+    pub fn wants(&self, step: u64, stage: &str) -> Want {
         let mut want = Want::FORCES;
-        for sampled in observers.filter(|o| step.is_multiple_of(o.every)).filter_map(|o| o.stages.first()) {
+        for sampled in self.due(step, stage) {
             let needs = sampled.meter.needs();
             want.energy |= needs.energy;
             want.virial |= needs.virial;
@@ -83,8 +73,12 @@ impl Observers {
 
     /// Returns true if step `step` of stage `stage` must record the momentum transport.
     pub fn wants_flux(&self, step: u64, stage: &str) -> bool {
-        let due = |o: &&Observer| step.is_multiple_of(o.every) && o.stages.iter().any(|s| s.stage == stage);
-        self.observers.iter().filter(due).flat_map(|o| &o.stages).any(|s| s.meter.needs_flux())
+        self.due(step, stage).any(|sampled| sampled.meter.needs_flux())
+    }
+
+    fn due(&self, step: u64, stage: &str) -> impl Iterator<Item = &Sampled> {
+        let due = self.observers.iter().filter(move |o| step.is_multiple_of(o.every));
+        due.flat_map(|o| &o.stages).filter(move |sampled| sampled.stage == stage)
     }
 
     /// Returns true if [`Observers::sample`] may have work after step `step`.

@@ -21,9 +21,13 @@ pub struct Place<'a> {
     /// The fluid is the model at the temperature of the scene.
     pub fluid: &'a Fluid,
     pub domain: &'a PeriodicBox,
-    pub stages: StageNames<'a>,
+    /// The names of all stages.
+    pub stages: &'a [&'a str],
+    /// Those of the stages whose steps take no time.
+    pub timeless: Vec<&'a str>,
     /// The normal of the slab in the initial state.
     pub slab: Option<usize>,
+    /// The body force of two opposite flows, if the scene has one.
     pub drive: Option<Drive>,
 }
 
@@ -35,13 +39,6 @@ pub struct Drive {
     pub along: usize,
     /// The acceleration in the lower half of the box.
     pub acceleration: f64,
-}
-
-#[derive(Debug, Clone)]
-pub struct StageNames<'a> {
-    pub all: &'a [&'a str],
-    /// The stages whose steps take no time.
-    pub timeless: Vec<&'a str>,
 }
 
 /// The table of one observable. The short form `name = true` sets no key.

@@ -41,15 +41,6 @@ pub struct ProfileAccumulator {
     frames: Vec<Vec<f64>>,
 }
 
-/// The number density against the distance from the centre of the slab.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DensityProfile {
-    /// The middle of each bin from the centre of the slab, in (−L/2, L/2), increasing and evenly spaced; a length (r_c).
-    pub centres: Vec<f64>,
-    /// The mean of n/(A h) over the frames for n particles in the bin of height h; number per volume (r_c⁻³).
-    pub density: Vec<f64>,
-}
-
 impl ProfileAccumulator {
     pub fn new(length: f64, bins: usize, area: f64) -> Self {
         Self { length, bins, area, frames: Vec::new() }
@@ -78,13 +69,12 @@ impl ProfileAccumulator {
         bin as f64 * self.height() - 0.5 * self.length
     }
 
-    pub fn finish(&self) -> DensityProfile {
+    /// The middle of each bin from the centre of the slab, in (−L/2, L/2), increasing and evenly spaced (r_c), with the number
+    /// density there (r_c⁻³): the mean of n/(A h) over the frames for n particles in the bin of height h.
+    pub fn finish(&self) -> Vec<(f64, f64)> {
         let volume = self.area * self.height() * self.frames.len() as f64;
         let density = |bin: usize| self.frames.iter().map(|counts| counts[bin]).sum::<f64>() / volume;
-        DensityProfile {
-            centres: (0..self.bins).map(|bin| self.low(bin) + 0.5 * self.height()).collect(),
-            density: (0..self.bins).map(density).collect(),
-        }
+        (0..self.bins).map(|bin| (self.low(bin) + 0.5 * self.height(), density(bin))).collect()
     }
 
     /// The number density (r_c⁻³) of each frame within `half_width` (r_c), at most L/2, of the centre of the slab. A bin that the
@@ -104,8 +94,8 @@ impl ProfileAccumulator {
     }
 }
 
-/// The width of the interfaces (r_c) by Warren's definition (eq. 19), w = (ρ_L − ρ_V) / max|dρ/dz|; the mean over the two
-/// flanks of the slab.
+/// The width of the interfaces (r_c) of a profile as [`ProfileAccumulator::finish`] gives it, by Warren's definition (eq. 19),
+/// w = (ρ_L − ρ_V) / max|dρ/dz|; the mean over the two flanks of the slab.
 ///
 /// Differences of neighbouring bins would overrate the steepest slope in proportion to their noise. Instead all bins of
 /// each flank are fitted by least squares, with equal weights, with
@@ -118,7 +108,7 @@ impl ProfileAccumulator {
 ///
 /// The result is `None` if the profile is not that of a slab centred on 0: fewer than six bins in a flank, values that are
 /// not finite, no contrast of density, and interfaces beyond the flank, as wide as the flank, or narrower than one bin.
-pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
+pub fn interface_width(profile: &[(f64, f64)]) -> Option<f64> {
     Some(interface(profile)?.width)
 }
 
@@ -134,8 +124,9 @@ pub struct Interface {
 }
 
 /// The fit of [`interface_width`], as the mean of both flanks; `None` under the same conditions.
-pub fn interface(profile: &DensityProfile) -> Option<Interface> {
-    let [a, b] = flanks(profile)?.map(|(points, height)| flank_interface(&points, height));
+pub fn interface(profile: &[(f64, f64)]) -> Option<Interface> {
+    let (height, flanks) = flanks(profile)?;
+    let [a, b] = flanks.map(|points| flank_interface(&points, height));
     let (a, b) = (a?, b?);
     Some(Interface {
         liquid: 0.5 * (a.liquid + b.liquid),
@@ -146,8 +137,9 @@ pub fn interface(profile: &DensityProfile) -> Option<Interface> {
 }
 
 /// The edges of both flanks without a fitted curve, as the mean of both; see [`edges`].
-pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
-    let [a, b] = flanks(profile)?.map(|(points, height)| edges(&points, height));
+pub fn slab_edges(profile: &[(f64, f64)]) -> Option<Edges> {
+    let (height, flanks) = flanks(profile)?;
+    let [a, b] = flanks.map(|points| edges(&points, height));
     let (a, b) = (a?, b?);
     Some(Edges {
         liquid: 0.5 * (a.liquid + b.liquid),
@@ -159,33 +151,24 @@ pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
     })
 }
 
-/// Both flanks as (distance from the centre, density) with increasing distances, and the height of a bin.
-#[allow(clippy::type_complexity)]
-fn flanks(profile: &DensityProfile) -> Option<[(Vec<(f64, f64)>, f64); 2]> {
-    let (centres, density) = (&profile.centres, &profile.density);
-    if centres.len() != density.len() || centres.len() < 2 * FLANK_BINS {
+/// The height of a bin, and both flanks as (distance from the centre, density) with increasing distances.
+fn flanks(profile: &[(f64, f64)]) -> Option<(f64, [Vec<(f64, f64)>; 2])> {
+    let count = profile.len();
+    if count < 2 * FLANK_BINS || !profile.iter().all(|(z, rho)| z.is_finite() && rho.is_finite()) {
         return None;
     }
-    if !centres.iter().chain(density).all(|x| x.is_finite()) {
-        return None;
-    }
-    let span = centres[centres.len() - 1] - centres[0];
-    let height = span / (centres.len() - 1) as f64;
+    let height = (profile[count - 1].0 - profile[0].0) / (count - 1) as f64;
     if !(height.is_finite() && height > 0.0) {
         return None;
     }
     let flank = |sign: f64| {
         // A middle bin at 0 belongs to neither flank.
-        let mut points: Vec<(f64, f64)> = centres
-            .iter()
-            .zip(density)
-            .map(|(z, rho)| (sign * z, *rho))
-            .filter(|(s, _)| *s > 0.25 * height)
-            .collect();
+        let points = profile.iter().map(|(z, rho)| (sign * z, *rho));
+        let mut points: Vec<(f64, f64)> = points.filter(|(s, _)| *s > 0.25 * height).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        (points, height)
+        points
     };
-    Some([flank(1.0), flank(-1.0)])
+    Some((height, [flank(1.0), flank(-1.0)]))
 }
 
 /// The fit to one flank, given as (distance from the centre, density) with distances that increase by `height`.
@@ -295,7 +278,7 @@ mod tests {
         assert!((liquid.mean - 6.0).abs() < 5.0 * liquid.error, "{liquid:?}");
         assert!(liquid.error < 0.03);
         let profile = accumulator.finish();
-        let mean = profile.density.iter().sum::<f64>() / 100.0;
+        let mean = profile.iter().map(|(_, rho)| rho).sum::<f64>() / 100.0;
         let particles = accumulator.liquid_density(LENGTH);
         let expected = particles.iter().sum::<f64>() / 200.0;
         assert!((mean - expected).abs() < 1e-9);
@@ -308,16 +291,13 @@ mod tests {
     fn width_of_an_exact_profile() {
         for bins in [60, 101, 400] {
             let height = LENGTH / f64::from(bins);
-            let centres: Vec<f64> = (0..bins).map(|i| (f64::from(i) + 0.5) * height - 0.5 * LENGTH).collect();
+            let centres = (0..bins).map(|i| (f64::from(i) + 0.5) * height - 0.5 * LENGTH);
             let rho = |z: f64| 3.0 - 2.9 * ((z.abs() - 5.2) / 0.7).tanh();
-            let density = centres
-                .iter()
-                .map(|z| {
-                    let fine = (0..100).map(|k| rho(z + ((f64::from(k) + 0.5) / 100.0 - 0.5) * height));
-                    fine.sum::<f64>() / 100.0
-                })
-                .collect();
-            let profile = DensityProfile { centres, density };
+            let density = |z: f64| {
+                let fine = (0..100).map(|k| rho(z + ((f64::from(k) + 0.5) / 100.0 - 0.5) * height));
+                fine.sum::<f64>() / 100.0
+            };
+            let profile: Vec<(f64, f64)> = centres.map(|z| (z, density(z))).collect();
             let width = interface_width(&profile).unwrap();
             assert!((width - 1.4).abs() < 1e-3, "{bins}: {width}");
         }
@@ -327,10 +307,9 @@ mod tests {
     #[test]
     fn densities_are_not_negative() {
         let height = 0.1;
-        let centres: Vec<f64> = (0..200).map(|i| (f64::from(i) + 0.5) * height - 10.0).collect();
+        let centres = (0..200).map(|i| (f64::from(i) + 0.5) * height - 10.0);
         let rho = |z: f64| (6.0 * ((6.5 - z.abs()) / 3.0).clamp(0.0, 1.0)).powf(1.2);
-        let density = centres.iter().map(|z| rho(*z)).collect();
-        let profile = DensityProfile { centres, density };
+        let profile: Vec<(f64, f64)> = centres.map(|z| (z, rho(z))).collect();
         let found = interface(&profile).unwrap();
         assert!(found.vapour >= 0.0 && found.liquid > 0.0, "{found:?}");
         assert!(slab_edges(&profile).unwrap().vapour >= 0.0);
@@ -338,19 +317,16 @@ mod tests {
 
     #[test]
     fn no_slab_no_width() {
-        let flat = |rho: f64| DensityProfile {
-            centres: (0..40).map(|i| f64::from(i) - 19.5).collect(),
-            density: vec![rho; 40],
-        };
+        let flat = |rho: f64| (0..40).map(|i| (f64::from(i) - 19.5, rho)).collect::<Vec<_>>();
         for rho in [0.0, 3.0, f64::NAN] {
             assert_eq!(interface_width(&flat(rho)), None);
         }
         let mut step = flat(0.0);
-        step.density[10..30].fill(6.0);
+        step[10..30].iter_mut().for_each(|(_, rho)| *rho = 6.0);
         assert_eq!(interface_width(&step), None);
-        step.centres.fill(1.0);
+        step.iter_mut().for_each(|(z, _)| *z = 1.0);
         assert_eq!(interface_width(&step), None);
-        step.density.clear();
+        step.clear();
         assert_eq!(interface_width(&step), None);
     }
 
@@ -378,8 +354,8 @@ mod tests {
             let bins = centres.len();
             let even = (0..bins).map(|i| i as f64 - 0.5 * (bins as f64 - 1.0)).collect();
             for centres in [centres, even] {
-                let density = density[..bins].to_vec();
-                let _ = interface_width(&DensityProfile { centres, density });
+                let profile: Vec<(f64, f64)> = centres.into_iter().zip(density.iter().copied()).collect();
+                let _ = interface_width(&profile);
             }
             let mut accumulator = ProfileAccumulator::new(length, bins, 1.0);
             for _ in 0..9 {

@@ -2,10 +2,8 @@
 
 use super::keys::{COMMON, Key, Table};
 use super::meter::{AnyMeter, KINDS};
-use super::options::{Drive, Options, Place, StageNames};
+use super::options::{Options, Place};
 use psidpd_core::document::{FileError, FileErrorKind, Section};
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::model::Model;
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Observe {
@@ -23,29 +21,18 @@ pub struct Request {
     pub meter: AnyMeter,
 }
 
-/// Reads `[observe]`. `slab` is the normal of the slab in the initial state; `drive` is the body force of two opposite
-/// flows, if the scene has one.
-pub fn read(
-    root: &Section,
-    model: &Model,
-    kt: f64,
-    domain: &PeriodicBox,
-    stages: StageNames,
-    slab: Option<usize>,
-    drive: Option<Drive>,
-) -> Result<Observe, FileError> {
+/// Reads `[observe]`.
+pub fn read(root: &Section, place: &Place) -> Result<Observe, FileError> {
     let Some(value) = root.get("observe") else { return Ok(Observe::default()) };
     let section = value.section()?;
     let names = |keys: &[Key]| -> Vec<&str> { keys.iter().map(|key| key.name).collect() };
     section.only([names(COMMON), KINDS.iter().map(|kind| kind.table.path).collect()].concat())?;
-    let fluid = model.at(kt)?;
-    let last: Vec<String> = stages.all.last().map(|s| (*s).to_owned()).into_iter().collect();
-    let place = Place { fluid: &fluid, domain, stages, slab, drive };
-    let common = Common::read(&section, &place, Common { every: 10, skip: 0, stages: last })?;
+    let last: Vec<String> = place.stages.last().map(|s| (*s).to_owned()).into_iter().collect();
+    let common = Common::read(&section, place, Common { every: 10, skip: 0, stages: last })?;
     let mut observe = Observe::default();
     for kind in KINDS {
         let Some(value) = section.get(kind.table.path) else { continue };
-        let options = Options { section: value.as_section(), value: value.clone(), place: &place };
+        let options = Options { section: value.as_section(), value: value.clone(), place };
         if let Some(section) = &options.section {
             section.only([names(COMMON), names(kind.table.keys)].concat())?;
         }
@@ -54,13 +41,13 @@ pub fn read(
         }
         let preset = Common { every: kind.every.unwrap_or(common.every), ..common.clone() };
         let settings = match &options.section {
-            Some(section) => Common::read(section, &place, preset)?,
+            Some(section) => Common::read(section, place, preset)?,
             None => preset,
         };
         if kind.every_step && settings.every != 1 {
             return Err(options.at("every").error("needs every step: every must be 1 or left out"));
         }
-        let is_timeless = |stage: &String| place.stages.timeless.contains(&stage.as_str());
+        let is_timeless = |stage: &String| place.timeless.contains(&stage.as_str());
         if let Some(stage) = settings.stages.iter().find(|s| kind.of_motion && is_timeless(s)) {
             let message =
                 format!("needs motion in time, but the integrator of stage \"{stage}\" is monte-carlo");
@@ -98,7 +85,7 @@ impl Common {
             common.skip = value.count()?.value;
         }
         if let Some(value) = section.get("stages") {
-            let known = place.stages.all;
+            let known = place.stages;
             common.stages.clear();
             for item in value.array()? {
                 let name = item.string()?.value;

@@ -234,7 +234,7 @@ impl Series {
         Measured { value, error: Measured::mean(&rest).error }
     }
 
-    /// A function of the means with its error from the infinitesimal jackknife (Jaeckel, Bell Laboratories MM 72-1215-11
+    /// Functions of the means with their errors from the infinitesimal jackknife (Jaeckel, Bell Laboratories MM 72-1215-11
     /// (1972); Efron, The Jackknife, the Bootstrap and Other Resampling Plans (1982), chapter 6).
     ///
     /// The series is cut into twenty to forty stretches, or into single rows if there are fewer. The means are moved towards
@@ -242,12 +242,9 @@ impl Series {
     /// stretches may be correlated. For K stretches the step is 1/√K of the distance, about one standard deviation of the
     /// means. A function with small jumps, such as a median or a fit to a varying set of points, then changes by its
     /// variation from run to run. The smaller steps of leaving out one stretch would double the error of such functions.
-    pub fn jackknife(&self, function: impl Fn(&[f64]) -> Option<f64>) -> Measured {
-        self.jackknife_many(|means| function(means).map(|x| vec![x])).pop().unwrap_or(Measured::NONE)
-    }
-
-    /// The jackknife of several functions at once; empty if they have no value at the means.
-    pub fn jackknife_many(&self, function: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Measured> {
+    ///
+    /// The result is empty if the functions have no value at the means.
+    pub fn jackknife(&self, function: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Measured> {
         if self.is_empty() {
             return Vec::new();
         }
@@ -296,6 +293,10 @@ mod tests {
                 x
             })
             .collect()
+    }
+
+    fn jackknife(series: &Series, function: impl Fn(&[f64]) -> f64) -> Measured {
+        series.jackknife(|means| Some(vec![function(means)])).pop().unwrap_or(Measured::NONE)
     }
 
     #[test]
@@ -349,7 +350,7 @@ mod tests {
             let found = [
                 (series.mean(0), 0.0, theory),
                 (series.ratio(|s| s[0], |s| s[1]), 0.0, ratio_theory),
-                (series.jackknife(|m| Some(m[0] / m[1])), 0.0, ratio_theory),
+                (jackknife(&series, |m| m[0] / m[1]), 0.0, ratio_theory),
             ];
             for (k, (m, truth, theory)) in found.into_iter().enumerate() {
                 covered[k] += usize::from((m.value - truth).abs() < 2.0 * m.error);
@@ -370,7 +371,7 @@ mod tests {
                 .map(|_| {
                     let mut series = Series::new(1);
                     exponential(a, 100, &mut rng).iter().for_each(|x| _ = series.push(&[*x]));
-                    series.jackknife(|m| Some(m[0] + 0.01 * m[0] * m[0]))
+                    jackknife(&series, |m| m[0] + 0.01 * m[0] * m[0])
                 })
                 .collect();
             let spread = (found.iter().map(|m| m.value * m.value).sum::<f64>() / 400.0).sqrt();
@@ -400,7 +401,7 @@ mod tests {
                     series.push(&[x]);
                 }
             }
-            series.jackknife(|m| Some(m[0]))
+            jackknife(&series, |m| m[0])
         });
         let swings = ratio(swings.collect());
         assert!((0.8..1.25).contains(&swings), "{swings}");
@@ -410,10 +411,10 @@ mod tests {
                 let row: Vec<f64> = (0..31).map(|_| StandardNormal.sample(&mut rng)).collect();
                 series.push(&row);
             }
-            series.jackknife(|m| {
+            jackknife(&series, |m| {
                 let mut sorted = m.to_vec();
                 sorted.sort_by(f64::total_cmp);
-                Some(sorted[15])
+                sorted[15]
             })
         });
         let medians = ratio(medians.collect());
@@ -427,7 +428,7 @@ mod tests {
         assert!(one.value == 2.0 && one.error.is_nan());
         let two = Measured::mean(&[1.0, 3.0]);
         assert_eq!((two.value, two.error), (2.0, 1.0));
-        assert!(Series::new(1).jackknife(|m| Some(m[0])).value.is_nan());
+        assert!(jackknife(&Series::new(1), |m| m[0]).value.is_nan());
         assert!(Series::new(2).ratio(|s| s[0], |s| s[1]).value.is_nan());
     }
 }

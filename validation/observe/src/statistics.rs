@@ -55,15 +55,15 @@ impl Estimate {
 ///
 /// No estimate detects a correlation time that exceeds the length of the series. No error is below s/N.
 pub fn estimate(series: &[f64]) -> Result<Estimate, ObserveError> {
-    let deviations = Deviations::of(series)?;
+    let (mean, deviations) = deviations(series)?;
     let n = series.len() as f64;
-    let variance = sum_of_squares(&deviations.values) / (n - 1.0);
-    let error = error_by_blocks(&deviations.values).max(variance.sqrt() / n);
+    let variance = sum_of_squares(&deviations) / (n - 1.0);
+    let error = error_by_blocks(&deviations).max(variance.sqrt() / n);
     if !(error.is_finite() && variance.is_finite()) {
         return Err(ObserveError::Overflow);
     }
     let tau = if variance > 0.0 { 0.5 * n * error * error / variance } else { 0.5 };
-    Ok(Estimate { mean: deviations.mean, error, samples: series.len(), tau })
+    Ok(Estimate { mean, error, samples: series.len(), tau })
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -127,32 +127,23 @@ pub fn threshold(checks: usize, family_alarm: f64) -> f64 {
     (-Normal::standard().inverse_cdf(tail)).max(0.0)
 }
 
-/// A validated series minus its mean.
-struct Deviations {
-    mean: f64,
-    values: Vec<f64>,
-}
-
-impl Deviations {
-    fn of(series: &[f64]) -> Result<Self, ObserveError> {
-        if series.len() < MINIMUM_SAMPLES {
-            return Err(ObserveError::TooFew { found: series.len(), least: MINIMUM_SAMPLES });
-        }
-        if let Some(index) = series.iter().position(|x| !x.is_finite()) {
-            return Err(ObserveError::NonFinite { index });
-        }
-        // With the first sample as origin, a constant series has deviations of exactly 0.
-        let origin = series[0];
-        let mut values: Vec<f64> = series.iter().map(|x| x - origin).collect();
-        let shift = values.iter().sum::<f64>() / values.len() as f64;
-        if !shift.is_finite() {
-            return Err(ObserveError::Overflow);
-        }
-        for value in &mut values {
-            *value -= shift;
-        }
-        Ok(Self { mean: origin + shift, values })
+/// The mean of a series, and the series minus its mean.
+fn deviations(series: &[f64]) -> Result<(f64, Vec<f64>), ObserveError> {
+    if series.len() < MINIMUM_SAMPLES {
+        return Err(ObserveError::TooFew { found: series.len(), least: MINIMUM_SAMPLES });
     }
+    if let Some(index) = series.iter().position(|x| !x.is_finite()) {
+        return Err(ObserveError::NonFinite { index });
+    }
+    // With the first sample as origin, a constant series has deviations of exactly 0.
+    let origin = series[0];
+    let mut values: Vec<f64> = series.iter().map(|x| x - origin).collect();
+    let shift = values.iter().sum::<f64>() / values.len() as f64;
+    if !shift.is_finite() {
+        return Err(ObserveError::Overflow);
+    }
+    values.iter_mut().for_each(|value| *value -= shift);
+    Ok((origin + shift, values))
 }
 
 fn sum_of_squares(x: &[f64]) -> f64 {

@@ -23,8 +23,8 @@ pub struct Progress {
     visible: bool,
 }
 
-/// One bar or spinner of a [`Progress`]. Clones share the same bar, and may be sent to other threads. The bar disappears
-/// when it is finished and when the last clone is dropped.
+/// One bar of a [`Progress`]. Clones share the same bar, and may be sent to other threads. The bar disappears when the last
+/// clone is dropped.
 #[derive(Debug, Clone)]
 pub struct Bar {
     inner: ProgressBar,
@@ -107,11 +107,11 @@ impl Progress {
         }
     }
 
-    /// Adds a spinner, for work of unknown length.
-    pub fn spinner(&self, name: &str) -> Bar {
-        let style = style(SPINNER);
+    /// Shows a spinner during work of unknown length.
+    pub fn spinner<T>(&self, name: &str, work: impl FnOnce() -> T) -> T {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
-        self.add(bar, name, style)
+        let _shown = self.add(bar, name, style(SPINNER));
+        work()
     }
 
     /// Prints a line above the bars. It prints nothing if standard error is not a terminal.
@@ -159,10 +159,6 @@ impl Bar {
     pub fn set(&self, n: u64) {
         self.inner.set_position(n);
     }
-
-    pub fn finish(&self) {
-        self.inner.finish_and_clear();
-    }
 }
 
 fn rate(steps_per_second: f64, particles: usize) -> String {
@@ -191,9 +187,8 @@ mod tests {
         bar.advance(3);
         assert_eq!(bar.inner.position(), 7);
         bar.set(20);
-        bar.finish();
         progress.bar("nothing", 0).advance(u64::MAX);
-        progress.spinner("wait\nhere").advance(1);
+        assert_eq!(progress.spinner("wait\nhere", || 1), 1);
         progress.note("a line");
     }
 

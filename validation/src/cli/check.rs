@@ -1,9 +1,7 @@
 use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_dynamics::run::bytes_per_particle;
-use psidpd_experiments::check::{
-    Conditions, Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates,
-};
+use psidpd_experiments::check::{Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates};
 use psidpd_formats::memory::{self, shown};
 use psidpd_report::quantity::{decimal, number};
 
@@ -68,18 +66,16 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let (model, kt) = arguments.settings.model(&arguments.file)?;
         (model, kt.unwrap_or(1.0), None, Vec::new(), None)
     };
-    let conditions = Conditions {
-        kt: arguments.kt.unwrap_or(kt),
-        densities: per_species(&arguments.density, model.species().len()).or(densities),
-    };
-    let mut findings = Findings { steps, cost: taken, ..check(&model, &conditions)? };
+    let kt = arguments.kt.unwrap_or(kt);
+    let densities = per_species(&arguments.density, model.species().len()).or(densities);
+    let mut findings = Findings { steps, cost: taken, ..check(&model, kt, densities.as_deref())? };
     if let Some(warning) = too_long(&findings.steps) {
         findings.warnings.push(warning);
         findings.warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
     }
     mixtures.retain(|rho| Some(rho) != findings.densities.as_ref());
     for rho in mixtures {
-        let other = check(&model, &Conditions { kt: conditions.kt, densities: Some(rho.clone()) })?;
+        let other = check(&model, kt, Some(&rho))?;
         findings.add_at(model.species(), &rho, other.warnings);
     }
     let memory = too_large.map(|error| ("memory", error.to_string()));

@@ -46,17 +46,14 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     let note = |line: &str| progress.tell(line);
     match verb {
         Verb::Install => {
-            let spinner = progress.spinner("installing LAMMPS");
-            let host = install(&note)?;
+            let host = progress.spinner("installing LAMMPS", || install(&note))?;
             let version = host.version()?;
-            spinner.finish();
             say!("LAMMPS {} in {}", version.name, host.root.display());
             let lmp = host.lmp_by_hand();
             say!("run it: {}", lmp.display());
             conclude(json, &json!({"root": host.root, "lmp": lmp, "version": version.number}), true)
         }
         Verb::Plugin { lammps } => {
-            let spinner = progress.spinner("building the plugin");
             let host = match lammps {
                 Some(place) => Host::at(place)?,
                 None => match Host::find() {
@@ -64,10 +61,9 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
                     found => found?,
                 },
             };
-            let path = plugin::build(&host, &note)?;
+            let path = progress.spinner("building the plugin", || plugin::build(&host, &note))?;
             plugin::check(&host, &path)?;
             let built = plugin::built_for(&path)?;
-            spinner.finish();
             say!("plugin for LAMMPS {}: {}", built.lammps_version, path.display());
             let launcher = plugin::launcher(&path);
             match &launcher {

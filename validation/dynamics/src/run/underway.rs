@@ -78,7 +78,7 @@ impl Runner<'_> {
     fn step(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         let number = self.simulation.step_number() + 1;
         let totals = self.is_row(number);
-        let mut want = self.observers.wants_in(number, &stage.name);
+        let mut want = self.observers.wants(number, &stage.name);
         if totals {
             want = Want { energy: true, virial: true, ..want };
         }

@@ -45,7 +45,7 @@ use psidpd_core::document::keys::{of_another_kind, read_known};
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{LocalEnergy, PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
-use psidpd_observe::{self as observe, Observe, StageNames};
+use psidpd_observe::{self as observe, Observe, Place};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -123,8 +123,9 @@ impl Scene {
         let drive = body_forces.iter().find_map(BodyForce::drive);
         let names: Vec<&str> = stages.iter().map(|s| s.name.as_str()).collect();
         let timeless = stages.iter().filter(|s| !s.integrator.has_time()).map(|s| s.name.as_str()).collect();
-        let stages_of = StageNames { all: &names, timeless };
-        let observe = observe::read(&root, &model, kt, &domain, stages_of, initial.slab_axis(), drive)?;
+        let (fluid, slab) = (&model.at(kt)?, initial.slab_axis());
+        let place = Place { fluid, domain: &domain, stages: &names, timeless, slab, drive };
+        let observe = observe::read(&root, &place)?;
         let scene = Scene {
             title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
             model_path,

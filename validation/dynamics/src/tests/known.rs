@@ -220,7 +220,7 @@ fn the_density_of_a_slab_is_that_of_its_middle() {
     let middle = middle.iter().sum::<f64>() / middle.len() as f64;
     assert!((liquid.value - middle).abs() < 3.0 * liquid.error, "{liquid:?} {middle}");
     assert!(liquid.error < 0.003 && out.note.is_empty(), "{liquid:?} {}", out.note);
-    let shape = psidpd_observe::DensityProfile { centres: z.clone(), density: density.clone() };
+    let shape: Vec<(f64, f64)> = z.iter().copied().zip(density.iter().copied()).collect();
     let fit = psidpd_observe::profile::interface(&shape).unwrap();
     assert!(fit.liquid - middle > 4.0 * liquid.error, "{fit:?} {middle} {liquid:?}");
 }

@@ -55,7 +55,7 @@ pub(super) fn run(scene: &Scene) -> (Simulation, Vec<Observation>) {
     for stage in &scene.stages {
         simulation.prepare(stage.dt, Want::TOTALS).unwrap();
         for _ in 0..stage.steps {
-            let want = observers.wants(simulation.step_number() + 1);
+            let want = observers.wants(simulation.step_number() + 1, &stage.name);
             simulation.record_flux(observers.wants_flux(simulation.step_number() + 1, &stage.name));
             simulation.step(stage.dt, stage.integrator, want).unwrap();
             time += stage.dt;

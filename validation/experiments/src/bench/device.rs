@@ -55,9 +55,8 @@ pub fn run(options: &Options, progress: &Progress) -> Result<Outcome, Experiment
     let mut speeds = Vec::new();
     for &size in options.sizes {
         for subject in &SUBJECTS {
-            let spinner = progress.spinner(&format!("{}, {size}", subject.name));
-            speeds.push(speed(options, subject, size)?);
-            spinner.finish();
+            let name = format!("{}, {size}", subject.name);
+            speeds.push(progress.spinner(&name, || speed(options, subject, size))?);
         }
     }
     match found {

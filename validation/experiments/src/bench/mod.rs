@@ -37,7 +37,6 @@ pub use outcome::Asked;
 use outcome::{FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use psidpd_formats::files::write_atomically;
-use psidpd_lammps_host::Host;
 use psidpd_report::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -69,10 +68,8 @@ struct Entry {
     skin: f64,
     /// Seconds that a step is expected to take; none where steps are given.
     step: Option<f64>,
-    seconds: Vec<f64>,
-    parts: Vec<BTreeMap<String, f64>>,
-    ghosts: Option<f64>,
-    builds: Option<u64>,
+    /// The timed loop of each round.
+    made: Vec<Loop>,
 }
 
 impl Entry {
@@ -106,23 +103,17 @@ struct Bench<'a> {
 pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
     let out = files::absolute_folder(&options.out)?;
-    let spinner = progress.spinner("LAMMPS and the plugin");
-    let (place, version) = place(options, &out, progress)?;
-    spinner.finish();
-
+    let prepared = || PluginHost::prepared(options.lammps.as_deref(), &|line| progress.note(line));
+    let (lammps, version) = progress.spinner("LAMMPS and the plugin", prepared)?;
+    let place = Place { lammps, work: out.join("runs") };
     let (choice, missing) = choice(options, &place)?;
     let mut bench = Bench { asked: &options.asked, place, cases: BTreeMap::new(), progress };
     let mut entries = bench.entries(&choice, &out)?;
     bench.calibrate(&mut entries)?;
     bench.time(&mut entries)?;
 
-    let spinner = progress.spinner("memory and threads");
-    let memory = match &options.memory[..] {
-        [] => Vec::new(),
-        sizes => memory::measure(program, sizes)?,
-    };
-    let equal_bits = bench.equal_bits()?;
-    spinner.finish();
+    let memory = progress.spinner("memory", || memory::measure(program, &options.memory))?;
+    let equal_bits = progress.spinner("threads", || bench.equal_bits())?;
 
     let runs = bench.runs(&entries);
     let fluids = SUBJECTS.iter().map(facts).collect::<Result<Vec<_>, _>>()?;
@@ -153,18 +144,6 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     files::write_json(&out.join("bench.json"), &outcome)?;
     write_atomically(out.join("report.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
-}
-
-/// LAMMPS with the plugin, and its version in words.
-fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, String), ExperimentError> {
-    let note = |line: &str| progress.note(line);
-    let host = match &options.lammps {
-        Some(place) => Host::at(place)?,
-        None => psidpd_lammps_host::plugin::install_to_build(&note)?,
-    };
-    let version = host.version()?;
-    let lammps = PluginHost::open(host, &note)?;
-    Ok((Place { lammps, work: out.join("runs") }, version.name))
 }
 
 /// Who can be timed here, and the styles that LAMMPS lacks.
@@ -199,9 +178,9 @@ impl Bench<'_> {
         let mut entries = Vec::new();
         for &size in &self.asked.sizes {
             for subject in SUBJECTS {
-                let spinner = self.progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
-                let start = start::kept(&subject, size, &out.join("starts"))?;
-                spinner.finish();
+                let name = format!("equilibrium: {}, {size}", subject.name);
+                let start =
+                    self.progress.spinner(&name, || start::kept(&subject, size, &out.join("starts")))?;
                 let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
                 let pairs = pairs::pairs_per_particle(&start.state, cutoff);
                 self.cases.insert((subject.name, size), Case { start, pairs });
@@ -216,10 +195,7 @@ impl Bench<'_> {
                         length: Length { warm_up: 5, steps: self.asked.steps.unwrap_or(FEWEST) },
                         skin: SKIN,
                         step: None,
-                        seconds: Vec::new(),
-                        parts: Vec::new(),
-                        ghosts: None,
-                        builds: None,
+                        made: Vec::new(),
                     });
                 }
             }
@@ -254,7 +230,6 @@ impl Bench<'_> {
             (entry.skin, entry.step) = (pace.skin, Some(step));
             entry.length = Length::within(self.asked.seconds, &entry.contender, step);
         }
-        bar.finish();
         Ok(())
     }
 
@@ -284,14 +259,15 @@ impl Bench<'_> {
         let mut done = 0.0;
         for _ in 0..rounds {
             for &k in &order {
-                self.measure(&mut entries[k])?;
-                done += entries[k].weight();
+                let entry = &mut entries[k];
+                let made = self.once(entry, entry.skin)?;
+                entry.made.push(made);
+                done += entry.weight();
                 bar.set(done as u64);
             }
             // Alternate the order, so that neighbours in time do not matter.
             order.reverse();
         }
-        bar.finish();
         Ok(())
     }
 
@@ -303,17 +279,6 @@ impl Bench<'_> {
         }
     }
 
-    fn measure(&self, entry: &mut Entry) -> Result<(), ExperimentError> {
-        let made = self.once(entry, entry.skin)?;
-        entry.seconds.push(made.seconds);
-        entry.parts.push(made.parts);
-        if entry.contender.in_lammps() {
-            entry.ghosts = Some(made.ghosts);
-            entry.builds = Some(entry.builds.unwrap_or(0) + made.builds);
-        }
-        Ok(())
-    }
-
     fn runs(&self, entries: &[Entry]) -> Vec<Timed> {
         let median = |values: &[f64]| Spread::of(values).map_or(0.0, |s| s.median);
         let mut runs: Vec<Timed> = entries
@@ -322,14 +287,17 @@ impl Bench<'_> {
                 let case = &self.cases[&(entry.subject.name, entry.size)];
                 let particles = case.start.state.len() * entry.contender.copies();
                 let all = particles as f64 * entry.length.steps as f64;
-                let names = entry.parts.first().into_iter().flat_map(BTreeMap::keys);
+                let names = entry.made.first().into_iter().flat_map(|made| made.parts.keys());
                 let part = |name: &String| {
-                    let of = |p: &BTreeMap<String, f64>| 1e9 * p.get(name).copied().unwrap_or(0.0) / all;
-                    (name.clone(), median(&entry.parts.iter().map(of).collect::<Vec<_>>()))
+                    let of = |made: &Loop| 1e9 * made.parts.get(name).copied().unwrap_or(0.0) / all;
+                    (name.clone(), median(&entry.made.iter().map(of).collect::<Vec<_>>()))
                 };
-                let per_particle = 1e9 * median(&entry.seconds) / all;
+                let seconds: Vec<f64> = entry.made.iter().map(|made| made.seconds).collect();
+                let per_particle = 1e9 * median(&seconds) / all;
                 let settings = entry.contender.settings();
-                let steps = entry.length.steps * entry.seconds.len() as u64;
+                let in_lammps = entry.made.last().filter(|_| entry.contender.in_lammps());
+                let builds: u64 = entry.made.iter().map(|made| made.builds).sum();
+                let steps = entry.length.steps * seconds.len() as u64;
                 let mut run = Timed {
                     fluid: entry.subject.name,
                     size: entry.size,
@@ -342,14 +310,14 @@ impl Bench<'_> {
                     instructions: settings.map(|s| s.instructions.to_string()),
                     skin: entry.contender.in_lammps().then_some(entry.skin),
                     steps: entry.length.steps,
-                    seconds: entry.seconds.clone(),
+                    seconds,
                     mega_particle_steps_per_second: Spread::default(),
                     nanoseconds_per_particle_step: per_particle,
                     nanoseconds_per_pair: per_particle / case.pairs,
                     ratio_to_built_in: None,
                     parts: names.map(part).collect(),
-                    ghosts: entry.ghosts,
-                    steps_between_builds: entry.builds.map(|b| steps as f64 / b.max(1) as f64),
+                    ghosts: in_lammps.map(|made| made.ghosts),
+                    steps_between_builds: in_lammps.map(|_| steps as f64 / builds.max(1) as f64),
                 };
                 run.mega_particle_steps_per_second = Spread::of(&run.rates()).unwrap_or_default();
                 run

@@ -126,13 +126,6 @@ fn scaling(outcome: &Benchmark) -> Table {
     table
 }
 
-fn ranks_or_threads(outcome: &Benchmark) -> Vec<Item> {
-    let Some((text, table)) = advice::of(outcome) else {
-        return vec![Item::Prose("Not known without runs on two threads and on two ranks.".into())];
-    };
-    vec![Item::Prose(text), Item::Table(table)]
-}
-
 fn memory(outcome: &Benchmark) -> Table {
     let mut table = Table::new(["particles", "bytes per particle", "of these in the engine", "MB"]);
     for m in &outcome.memory {
@@ -187,6 +180,10 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
                     host's order. Integrate: all else.";
     let in_lammps = "Nanoseconds per particle and step, as LAMMPS accounts for them.";
     let under = |text: &str, table: Table| vec![Item::prose(text), Item::Table(table)];
+    let ranks_or_threads = match advice::of(outcome) {
+        Some((text, table)) => under(&text, table),
+        None => vec![Item::prose("Not known without runs on two threads and on two ranks.")],
+    };
     let native = under(natively, parts(outcome, |r| r.instructions.is_some(), &NATIVE_PARTS));
     let lammps = under(in_lammps, parts(outcome, |r| r.skin.is_some(), &LAMMPS_PARTS));
     let sections = vec![
@@ -194,7 +191,7 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
         Section::new("Where the time goes, natively", native),
         Section::new("Where the time goes in LAMMPS", lammps),
         Section::new("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
-        Section::new("Ranks or threads", ranks_or_threads(outcome)),
+        Section::new("Ranks or threads", ranks_or_threads),
         Section::new("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
     let missing = match outcome.lammps.missing.join(", ") {

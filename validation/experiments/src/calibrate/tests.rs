@@ -1,7 +1,7 @@
 use super::search::HIGHEST_DEGREE;
 use super::*;
 use crate::bulk::Observed;
-use psidpd_observe::{Kind, Measured, Observation};
+use psidpd_observe::{Kind, Measured, Observation, Series};
 use std::convert::Infallible;
 
 /// A made-up fluid without noise: ψ′ = A n^(k−2), whose local density is a known function of ρ and of the
@@ -152,7 +152,7 @@ fn a_correction_that_does_not_run_is_damped() {
 /// What a run observes of a distribution of the local density.
 fn histogram(centres: &[f64], masses: &[f64]) -> Observed {
     let of = |values: &[f64]| values.to_vec();
-    let curve = Observation::new("local_density", "Local density", Kind::Curve)
+    let curve = Observation::new("local_density", "Local density", Kind::Curve, &Series::new(1))
         .against("n", "1", of(centres))
         .exact("F", "1", of(masses));
     Observed(vec![curve])

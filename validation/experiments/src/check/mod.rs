@@ -17,16 +17,10 @@ use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
 use psidpd_dynamics::prediction;
 
-#[derive(Debug, Clone, PartialEq)]
-pub struct Conditions {
-    pub kt: f64,
-    /// Number density of each species; `None` leaves out what depends on it.
-    pub densities: Option<Vec<f64>>,
-}
-
-pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, ExperimentError> {
-    let fluid: Fluid = model.at(conditions.kt)?;
-    if let Some(densities) = &conditions.densities
+/// Checks a model at a temperature and at the number density of each species; `None` leaves out what depends on these.
+pub fn check(model: &Model, kt: f64, densities: Option<&[f64]>) -> Result<Findings, ExperimentError> {
+    let fluid: Fluid = model.at(kt)?;
+    if let Some(densities) = densities
         && densities.len() != fluid.species.len()
     {
         return Err(ExperimentError::Densities { given: densities.len(), species: fluid.species.len() });
@@ -40,7 +34,6 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, Experim
             Err(reason @ (TheoryError::NotIntegrable(..) | TheoryError::TooLarge(_))) => (None, Some(reason)),
             Err(other) => return Err(other.into()),
         };
-    let densities = conditions.densities.as_deref();
     let at = theory.as_ref().zip(densities);
     let stability = at.map(|(theory, rho)| theory.stability(rho));
     let pressure = at.map(|(theory, rho)| theory.pressure(rho));
@@ -49,11 +42,11 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, Experim
         title: model.title().to_owned(),
         reference: model.reference().map(str::to_owned),
         plan: plan.to_string(),
-        kt: conditions.kt,
+        kt,
         pressure,
         pressure_slope: at.map(|(theory, rho)| theory.pressure_slope(rho)),
         stability: stability.map(Into::into),
-        densities: conditions.densities.clone(),
+        densities: densities.map(<[f64]>::to_vec),
         steps: Vec::new(),
         cost: None,
         theory: prediction::predict(&fluid, densities.and_then(|rho| (rho.len() == 1).then(|| rho[0])))

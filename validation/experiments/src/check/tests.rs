@@ -3,7 +3,7 @@ use super::*;
 mod time_step;
 
 fn found(text: &str, kt: f64, densities: Option<Vec<f64>>) -> Findings {
-    check(&Model::parse("m.toml", text).unwrap(), &Conditions { kt, densities }).unwrap()
+    check(&Model::parse("m.toml", text).unwrap(), kt, densities.as_deref()).unwrap()
 }
 
 fn has(findings: &Findings, id: &str) -> bool {

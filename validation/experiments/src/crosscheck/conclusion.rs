@@ -33,11 +33,12 @@ pub fn section(results: &Results) -> Section {
         let of = |code: &str| number(results, &format!("nvt.{set}.{code}.{what}"), "mean");
         Some(of("mdpd-lucy")? - of("native-conservative")?)
     };
-    let shifts: Vec<String> = [("set5", "set 5"), ("set6", "set 6")]
+    let shifts: Vec<String> = [SET5, SET6]
         .iter()
-        .filter_map(|(slug, name)| {
-            let (density, tension) = (shift(slug, "liquid-density")?, shift(slug, "surface-tension")?);
-            Some(format!("{name}: density {density:+.2}, tension {tension:+.2}"))
+        .filter_map(|set| {
+            let [density, tension] =
+                ["liquid-density", "surface-tension"].map(|what| shift(&set.slug(), what));
+            Some(format!("{}: density {:+.2}, tension {:+.2}", set.name, density?, tension?))
         })
         .collect();
     let built_in = format!(
@@ -50,19 +51,15 @@ pub fn section(results: &Results) -> Section {
         let (value, error) = (number(results, &key, "mean")?, number(results, &key, "error")?);
         Some(psidpd_report::quantity::with_error(value, Some(error)))
     };
-    let published: Vec<String> = [(SET5, "set5"), (SET6, "set6")]
+    let published: Vec<String> = [SET5, SET6]
         .iter()
-        .filter_map(|(set, slug)| {
-            Some(format!(
-                "{}: liquid density {} (Warren {} ± {}), tension {} (Warren {} ± {})",
-                set.name,
-                found(slug, "liquid-density")?,
-                set.fluid.density,
-                set.liquid_error,
-                found(slug, "surface-tension")?,
-                set.tension.0,
-                set.tension.1
-            ))
+        .filter_map(|set| {
+            let [density, tension] =
+                ["liquid-density", "surface-tension"].map(|what| found(&set.slug(), what));
+            let [liquid, warren, _] =
+                set.published().map(|[value, error]| format!("Warren {value} ± {error}"));
+            let (density, tension) = (density?, tension?);
+            Some(format!("{}: liquid density {density} ({liquid}), tension {tension} ({warren})", set.name))
         })
         .collect();
     let warren = format!("The native runner compared with the published values: {}.", published.join("; "));
@@ -95,7 +92,7 @@ pub fn what_is_compared() -> Section {
         Table::new(["set", "A", "B", "r_c", "r_d", "γ", "kT", "Warren: density", "tension", "width"]);
     for set in [SET5, SET6] {
         let parameters = [A, set.b, RC, RD, GAMMA, 1.0].map(|x| x.to_string());
-        let published = set.published().map(|(value, error)| format!("{value} ± {error}"));
+        let published = set.published().map(|[value, error]| format!("{value} ± {error}"));
         sets.push([set.name.to_owned()].into_iter().chain(parameters).chain(published));
     }
     let mut words = Table::new(["word", "what it means"]);

@@ -25,7 +25,7 @@ const HEATING: f64 = 0.1;
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let edge = if context.full { 12.0 } else { 5.2 };
     let filling = Filling::cube(edge);
-    let state = equilibrated(&SET6.fluid, filling, 1500, SEED)?;
+    let state = equilibrated(Double, &SET6.fluid, filling, 1500, SEED)?;
     let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
     let setups = [
         (Code::Native, Double),
@@ -43,9 +43,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let runs = setups.iter().map(|setup| (setup, bar(setup))).collect();
     let traces = jobs::each(runs, |(setup, bar)| {
         let name = format!("nve-{}", setup.slug());
-        let trace = run_code(context, setup, &state, length, &name, &|s| bar.set(s));
-        bar.finish();
-        trace
+        run_code(context, setup, &state, length, &name, &|s| bar.set(s))
     });
     let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut part = Part::of("energy");

@@ -9,6 +9,7 @@ use crate::code::Code;
 use crate::fluids::{GAMMA, SET5, SET6, WarrenSet};
 use crate::jobs;
 use crate::start::{Filling, equilibrated};
+use psidpd_core::engine::Precision;
 use psidpd_core::model::ForceLaw;
 use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width};
 use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
@@ -75,7 +76,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut starts = Vec::new();
     for set in &sets {
         let filling = Filling { lengths: [edge, edge, height], thickness };
-        starts.push(equilibrated(&set.fluid, filling, 1000, SEED)?);
+        starts.push(equilibrated(Precision::Double, &set.fluid, filling, 1000, SEED)?);
     }
     let count: usize = sets.iter().map(|set| runs(set, context.full).len()).sum();
     let made = context.progress.overall("equilibrium", steps * count as u64);
@@ -84,7 +85,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         for (n, &(code, law, _)) in runs(set, context.full).iter().enumerate() {
             let seed = SEED + (10 * k + n) as u64;
             let setup = Setup { gamma: GAMMA, seed, ..Setup::new(code, set, law) };
-            let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), setup.slug());
+            let folder = format!("nvt-{}-{}-{n}", set.slug(), setup.slug());
             let bar = context.progress.bar(&format!("NVT {}: {}", set.name, name(code, law)), steps);
             slots.push((setup, &starts[k], folder, bar));
         }
@@ -97,7 +98,6 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         };
         let trace = run_code(context, &setup, state, length, &folder, &advance);
         advance(steps);
-        bar.finish();
         trace
     });
     let traces = traces.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -176,7 +176,7 @@ fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Slab, ExperimentErro
         tension: tension(&trace.pressure)?,
         conservative_tension,
         width: interface_width(&shape),
-        profile: shape.centres.iter().copied().zip(shape.density.iter().copied()).collect(),
+        profile: shape,
     })
 }
 
@@ -193,7 +193,7 @@ fn report_set(
     measured: &[Slab],
     comparisons: usize,
 ) -> Result<(), ExperimentError> {
-    let slug = set.name.replace(' ', "");
+    let slug = set.slug();
     let quantities = QUANTITIES.iter().map(|(name, ..)| *name);
     let mut table = Table::new(std::iter::once("code").chain(quantities).chain(["width"]));
     let levels = vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))];
@@ -212,7 +212,7 @@ fn report_set(
             part.values.push((id, json!(get(m))));
         }
     }
-    let published = set.published().map(|(value, error)| format!("{value} ± {error}"));
+    let published = set.published().map(|[value, error]| format!("{value} ± {error}"));
     table.push(["Warren, Table 2", "", "", ""].map(str::to_owned).into_iter().chain(published));
     for ((code, law, other), m) in RUNS.iter().zip(measured) {
         let Some(other) = other else { continue };
@@ -262,7 +262,7 @@ fn report_set(
 
 fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Slab) -> Check {
     Check::at_most(
-        format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), Setup::new(code, set, law).slug()),
+        format!("nvt.{}.{}.thermostat", set.slug(), Setup::new(code, set, law).slug()),
         "equilibrium",
         format!("{}: temperature of {} against kT", set.name, name(code, law)),
         found.temperature.mean - 1.0,
@@ -273,9 +273,9 @@ fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Slab) -> Check
 
 /// Density and tension of the native runner against Warren's.
 fn against_published(set: &WarrenSet, native: &Slab) -> [Check; 2] {
-    let published = |what: &str, found: &Estimate, (value, error): (f64, f64)| {
+    let published = |what: &str, found: &Estimate, [value, error]: [f64; 2]| {
         Check::agreement(
-            format!("nvt.{}.published.{what}", set.name.replace(' ', "")),
+            format!("nvt.{}.published.{what}", set.slug()),
             "equilibrium",
             format!("{}: {what} of native against Warren's Table 2, with his error and ours", set.name),
             found.mean - value,
@@ -285,10 +285,8 @@ fn against_published(set: &WarrenSet, native: &Slab) -> [Check; 2] {
         )
     };
     let tension = native.conservative_tension.as_ref().unwrap_or(&native.tension);
-    [
-        published("density", &native.liquid, (set.fluid.density, set.liquid_error)),
-        published("tension", tension, set.tension),
-    ]
+    let [liquid, of_surface, _] = set.published();
+    [published("density", &native.liquid, liquid), published("tension", tension, of_surface)]
 }
 
 fn law_slug(law: ForceLaw) -> &'static str {
@@ -302,7 +300,7 @@ fn law_slug(law: ForceLaw) -> &'static str {
 mod tests {
     use super::super::trace::native;
     use super::*;
-    use psidpd_core::engine::{Fault, Precision};
+    use psidpd_core::engine::Fault;
 
     /// What is measured of a fluid fails the same checks if a force of the engine is 5 % wrong, in shorter runs than those of
     /// `psidpd validate`. The virial moves no particle: `forces` has a check of it.
@@ -310,7 +308,7 @@ mod tests {
     fn physics_tells_of_faults() {
         let (edge, height, thickness, steps) = (5.0, 12.0, 5.2, 2000);
         let filling = Filling { lengths: [edge, edge, height], thickness };
-        let state = equilibrated(&SET6.fluid, filling, 600, SEED).unwrap();
+        let state = equilibrated(Precision::Double, &SET6.fluid, filling, 600, SEED).unwrap();
         let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 10 };
         let setup = Setup {
             precision: Precision::Mixed,

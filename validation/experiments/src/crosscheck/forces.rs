@@ -64,15 +64,6 @@ impl Point {
     }
 }
 
-fn native(
-    context: &Context,
-    model: &Model,
-    state: &State,
-    step: Option<Step>,
-) -> Result<Point, ExperimentError> {
-    point_of(context.simulation(model, 1.0, state, SEED)?, step)
-}
-
 pub(super) fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ExperimentError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
@@ -184,9 +175,15 @@ pub(super) fn point(lammps: &Lammps, volume: f64) -> Result<Point, ExperimentErr
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let lengths = if context.full { [15.0, 15.0, 20.0] } else { [10.0, 10.0, 15.0] };
     let filling = Filling { lengths, thickness: 0.5 * lengths[2] };
-    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
+    let state = equilibrated(Double, &SET6.fluid, filling, 500, SEED)?;
     let volume = state.domain.volume(3);
-    let mut part = Part { section: heading(state.len()), ..Part::of("forces") };
+    let text = format!(
+        "{} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
+         native runner (seed {SEED}).",
+        state.len()
+    );
+    let heading = "Forces, energy and virial of one configuration";
+    let mut part = Part { section: Section::new(heading, vec![Item::Prose(text)]), ..Part::of("forces") };
     let mut table = Table::new(["code", "law", "against", "force", "energy", "virial"]);
     let mut compare =
         |part: &mut Part, setup: Setup, id: &str, truth: &Point, limits: [f64; 3], note: &str| {
@@ -207,9 +204,10 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let setup = |code, law| Setup { seed: SEED, spacing: FINE, ..Setup::new(code, &SET6, law) };
     // These sums go over every pair and its images.
     let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
-    against_plain(&mut part, &equilibrated(&SET6.fluid, small, 500, SEED)?, context.fault)?;
+    against_plain(&mut part, &equilibrated(Double, &SET6.fluid, small, 500, SEED)?, context.fault)?;
     use ForceLaw::{Conservative, LucyLammps};
-    let truth = native(context, &SET6.model(Conservative, 0.0)?, &state, None)?;
+    let native = |model: &Model, step| point_of(context.simulation(model, 1.0, &state, SEED)?, step);
+    let truth = native(&SET6.model(Conservative, 0.0)?, None)?;
     let tight = [1e-12; 3];
     let plugin = setup(Code::Psi, Conservative);
     compare(&mut part, plugin, "psi", &truth, tight, "native")?;
@@ -225,9 +223,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     part.bound("forces.native-mixed", of, "double precision", &mixed, loose);
     part.values.push(("forces.native-mixed".into(), json!(mixed)));
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
-    let noisy = native(context, &SET6.model(Conservative, GAMMA)?, &state, Some(step))?;
+    let noisy = native(&SET6.model(Conservative, GAMMA)?, Some(step))?;
     compare(&mut part, Setup { gamma: GAMMA, ..plugin }, "psi-noise", &noisy, tight, "native, noise on")?;
-    let lucy = native(context, &SET6.model(LucyLammps, 0.0)?, &state, None)?;
+    let lucy = native(&SET6.model(LucyLammps, 0.0)?, None)?;
     compare(&mut part, setup(Code::MdpdPsi, LucyLammps), "mdpd-psi-lucy", &lucy, tight, "native")?;
     let built_in = setup(Code::Mdpd, LucyLammps);
     // The energy that mdpd tallies is not that of any potential: see the report.
@@ -249,18 +247,10 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     Ok(part)
 }
 
-fn heading(particles: usize) -> Section {
-    let text = format!(
-        "{particles} particles of Warren's set 6: a slab of liquid with two interfaces, equilibrated by the \
-         native runner (seed {SEED})."
-    );
-    Section::new("Forces, energy and virial of one configuration", vec![Item::Prose(text)])
-}
-
 /// Forces of the plugin against central differences of `compute pe`, particle by particle.
 fn gradient(context: &Context) -> Result<f64, ExperimentError> {
     let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5 };
-    let state = equilibrated(&SET6.fluid, filling, 300, SEED)?;
+    let state = equilibrated(Double, &SET6.fluid, filling, 300, SEED)?;
     let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
     let lammps = open(context, &setup, &state, "forces-gradient")?;
     let truth = point(&lammps, state.domain.volume(3))?;
@@ -310,7 +300,7 @@ mod tests {
     #[test]
     fn every_fault_of_the_engine_fails_a_check() {
         let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0 };
-        let state = equilibrated(&SET6.fluid, filling, 100, SEED).unwrap();
+        let state = equilibrated(Double, &SET6.fluid, filling, 100, SEED).unwrap();
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let mut part = Part::default();
             against_plain(&mut part, &state, fault).unwrap();
@@ -332,7 +322,7 @@ mod tests {
     #[test]
     fn wrong_terms_and_numbers_that_are_none_show() {
         let filling = Filling::cube(4.0);
-        let state = equilibrated(&SET6.fluid, filling, 20, SEED).unwrap();
+        let state = equilibrated(Double, &SET6.fluid, filling, 20, SEED).unwrap();
         let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
         let model = SET6.model(ForceLaw::Conservative, GAMMA).unwrap();
         let right = point_of(Simulation::new(&model, 1.0, state.clone(), SEED).unwrap(), step).unwrap();

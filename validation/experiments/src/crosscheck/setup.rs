@@ -2,7 +2,7 @@
 
 use super::Context;
 use crate::ExperimentError;
-use crate::code::{Code, Host, Told};
+use crate::code::{Code, Told};
 use crate::fluids::WarrenSet;
 use crate::lammps::deck::Deck;
 use crate::lammps::style::GRID;
@@ -98,9 +98,5 @@ impl<'a> Setup<'a> {
         }
         let (plugin, newton) = (context.lammps.plugin.as_deref(), self.newton);
         Ok(Deck { plugin, newton, ..Deck::new(&style, self.seed, place("start.data")) }.text())
-    }
-
-    pub fn is_native(&self) -> bool {
-        self.code.host() == Host::Native
     }
 }

@@ -7,7 +7,7 @@ use crate::fluids::{SET6, dpd_model};
 use crate::lammps::deck::Deck;
 use crate::lammps::style::PairStyle;
 use crate::start::{Filling, equilibrated, periodic};
-use psidpd_core::engine::{Step, Want};
+use psidpd_core::engine::{Precision, Step, Want};
 use psidpd_dynamics::run::State;
 use psidpd_observe::{Measured, threshold};
 use psidpd_report::quantity::with_error;
@@ -54,7 +54,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let mut part = Part::of("thermostat");
     let mut forces = Table::new(["", "force", "energy", "virial"]);
     let filling = Filling::cube(6.0);
-    let state = equilibrated(&SET6.fluid, filling, 100, SEED)?;
+    let state = equilibrated(Precision::Double, &SET6.fluid, filling, 100, SEED)?;
     let volume = state.domain.volume(3);
     for (id, strength, gamma) in [("pair force", 25.0, 0.0), ("drag", 0.0, 18.0), ("both", 25.0, 4.5)] {
         let kt = if gamma > 0.0 { COLD } else { 1.0 };

@@ -4,6 +4,7 @@ use super::Context;
 use super::LOG;
 use super::setup::Setup;
 use crate::ExperimentError;
+use crate::code::Host;
 use crate::files;
 use crate::start::simulation;
 use psidpd_core::engine::{Fault, Want};
@@ -72,7 +73,7 @@ pub fn run(
     name: &str,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
-    if setup.is_native() {
+    if setup.code.host() == Host::Native {
         native(setup, state, length, context.fault, advance)
     } else {
         lammps(context, setup, state, length, &context.work.join(name), advance)

@@ -8,7 +8,7 @@ use crate::ExperimentError;
 use crate::code::Code;
 use crate::fluids::{GAMMA, SET6};
 use crate::start::{Filling, equilibrated};
-use psidpd_core::engine::Want;
+use psidpd_core::engine::{Precision, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::{Integrator, State};
@@ -26,7 +26,7 @@ const LARGEST: f64 = 1e-10;
 
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0 };
-    let state = equilibrated(&SET6.fluid, filling, 500, SEED)?;
+    let state = equilibrated(Precision::Double, &SET6.fluid, filling, 500, SEED)?;
     let ours = native(context, &state)?;
     let mut part = Part::of("trajectory");
     let mut table = Table::new(["code", "ranks", "newton", "largest distance from native"]);

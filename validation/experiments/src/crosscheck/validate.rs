@@ -33,13 +33,8 @@ pub struct Validation {
 pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, ExperimentError> {
     let start = Instant::now();
     let out = files::absolute_folder(&options.out)?;
-    let spinner = progress.spinner("LAMMPS");
-    let host = psidpd_lammps_host::plugin::install_to_build(&|line| progress.note(line))?;
-    let version = host.version()?;
-    spinner.finish();
-    let spinner = progress.spinner("plugin");
-    let lammps = PluginHost::open(host, &|line| progress.note(line))?;
-    spinner.finish();
+    let prepared = || PluginHost::prepared(None, &|line| progress.note(line));
+    let (lammps, version) = progress.spinner("LAMMPS and the plugin", prepared)?;
     let context = Context {
         lammps: &lammps,
         work: out.join("runs"),
@@ -51,7 +46,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, Ex
     let mut results = Results::new("psidpd cross-code validation", env!("CARGO_PKG_VERSION"));
     let facts = [
         ("psidpd", env!("CARGO_PKG_VERSION").to_owned()),
-        ("LAMMPS", version.name.clone()),
+        ("LAMMPS", version),
         ("mode", if options.full { "full" } else { "quick" }.to_owned()),
         ("machine", machine()),
     ];
@@ -77,9 +72,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, Ex
         ("equilibrium", equilibrium::run),
     ];
     for (name, run) in parts.into_iter().filter(|(name, _)| options.only.is_none_or(|only| only == *name)) {
-        let spinner = progress.spinner(name);
-        let part = run(&context)?;
-        spinner.finish();
+        let part = progress.spinner(name, || run(&context))?;
         for check in part.checks {
             results.push(check);
         }

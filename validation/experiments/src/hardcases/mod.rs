@@ -111,8 +111,8 @@ pub fn run(
             }
         }
     }
-    let bar = progress.bar("hard cases", runs.len() as u64);
-    let verdicts = jobs::counted(runs, &bar, |(case, lammps, integrator, precision, must, place)| {
+    let bar = (progress, "hard cases");
+    let verdicts = jobs::counted(bar, runs, |(case, lammps, integrator, precision, must, place)| {
         std::fs::create_dir_all(&place).map_err(ExperimentError::io(&place))?;
         let (host, found) = match lammps {
             None => (Host::Native, native::carry_out(case, integrator, precision, &place, fault)?),

@@ -26,6 +26,13 @@ impl PluginHost {
         })
     }
 
+    /// The LAMMPS in `place`, or one that is installed if it is missing, with the plugin, and its version in words.
+    pub fn prepared(place: Option<&Path>, note: &dyn Fn(&str)) -> Result<(PluginHost, String), LammpsError> {
+        let host = place.map_or_else(|| plugin::install_to_build(note), Host::at)?;
+        let version = host.version()?;
+        Ok((PluginHost::open(host, note)?, version.name))
+    }
+
     /// The LAMMPS that is installed, with the plugin.
     pub fn find(note: &dyn Fn(&str)) -> Result<PluginHost, LammpsError> {
         PluginHost::open(Host::find()?, note)

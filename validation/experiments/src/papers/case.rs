@@ -79,7 +79,7 @@ impl Compared {
 pub struct Reproduction {
     pub values: Vec<Compared>,
     /// File names without extension, and plots.
-    pub plots: Vec<(&'static str, Plot)>,
+    pub plots: Vec<(String, Plot)>,
 }
 
 impl Reproduction {
@@ -120,8 +120,8 @@ impl Reproduction {
         self.values.push_mut(Compared { name, measured, published, rule, own: false, allowance: None })
     }
 
-    pub fn plot(&mut self, file: &'static str, title: &str, axes: [&str; 2], series: Vec<Series>) {
-        self.plots.push((file, Plot::new(title, axes, series)));
+    pub fn plot(&mut self, file: impl Into<String>, title: &str, axes: [&str; 2], series: Vec<Series>) {
+        self.plots.push((file.into(), Plot::new(title, axes, series)));
     }
 }
 

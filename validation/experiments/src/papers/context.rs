@@ -5,7 +5,7 @@ use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::Begin;
-use psidpd_dynamics::scene::Scene;
+use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use psidpd_observe::Measured;
 use psidpd_report::run::SeriesTable;
 use std::cell::RefCell;
@@ -32,9 +32,6 @@ pub struct Context {
     /// What is wrong with the forces of its runs: for tests that values tell of it.
     pub fault: Option<Fault>,
 }
-
-/// A change of a scene: the path of a key, through tables and by the number of an array's entry, and its value.
-pub type Change<'a, V = i64> = (&'a str, V);
 
 /// A homogeneous fluid of one species that a case measures.
 pub struct Fluid<'a> {
@@ -106,23 +103,23 @@ impl Context {
         densities.iter().map(at).collect()
     }
 
-    /// Runs a scene, the text of which does not name its model.
+    /// Runs a scene with a model; the text may name another.
     pub fn scene(&self, name: &str, model: &str, scene: &str) -> Result<Observed, ExperimentError> {
         let path = self.write(name, model)?;
-        let text = format!("model = \"{name}.model.toml\"\n{scene}");
+        let text = edited(scene, &[format!("model=\"{name}.model.toml\"")])?;
         let scene =
             Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
         let folder = self.folder.join(name);
         Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
-    /// Runs a scene of `scenes/full`, as it is at full size and with `changes` at quick size.
-    pub fn shipped<V: Into<toml_edit::Value> + Clone>(
+    /// Runs a scene of `scenes/full`, as it is at full size and with `changes`, each as KEY=VALUE, at quick size.
+    pub fn shipped(
         &self,
         name: &str,
         model: &str,
         scene: &str,
-        changes: &[Change<V>],
+        changes: &[&str],
     ) -> Result<Observed, ExperimentError> {
         self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
     }
@@ -155,25 +152,10 @@ impl Context {
     }
 }
 
-/// A scene without its model and with other values.
-fn edited<V: Into<toml_edit::Value> + Clone>(
-    scene: &str,
-    changes: &[Change<V>],
-) -> Result<String, ExperimentError> {
-    let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
-    let mut document: toml_edit::DocumentMut = scene.parse().map_err(|_| missing("scene"))?;
-    document.remove("model");
-    for (path, value) in changes {
-        let mut item = document.as_item_mut();
-        for step in path.split('.') {
-            item = match step.parse::<usize>() {
-                Ok(k) => item.get_mut(k).ok_or_else(|| missing(step))?,
-                Err(_) => &mut item[step],
-            };
-        }
-        *item = toml_edit::value(value.clone());
-    }
-    Ok(document.to_string())
+/// A scene or model with other values of its keys, as `--set` has them.
+fn edited(text: &str, changes: &[impl AsRef<str>]) -> Result<String, ExperimentError> {
+    let edits: Result<Vec<Edit>, String> = changes.iter().map(|change| change.as_ref().parse()).collect();
+    Ok(edit_model(text, &edits.map_err(ExperimentError::Conditions)?)?)
 }
 
 pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
@@ -181,13 +163,8 @@ pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
 }
 
 pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, ExperimentError> {
-    let missing = |name: &str| ExperimentError::Parameter(name.to_owned());
-    let mut document: toml_edit::DocumentMut = model.parse().map_err(|_| missing("parameters"))?;
-    for (name, value) in parameters {
-        let entry = document.get_mut("parameters").and_then(|table| table.get_mut(name));
-        *entry.ok_or_else(|| missing(name))? = toml_edit::value(*value);
-    }
-    Ok(document.to_string())
+    let change = |(name, value): &(&str, f64)| format!("parameters.{name}={value:?}");
+    edited(model, &parameters.iter().map(change).collect::<Vec<String>>())
 }
 
 #[cfg(test)]
@@ -197,14 +174,18 @@ mod tests {
     #[test]
     fn a_scene_is_changed_where_the_path_leads_and_nowhere_else() {
         let scene = "model = \"m.toml\"\nsteps = 1\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 3\n[output]\nthermo = 4\n";
-        let changes: [Change; 3] = [("steps", 10), ("stage.1.steps", 30), ("output.thermo", 0)];
-        let text = edited(scene, &changes).unwrap();
-        let expected = "steps = 10\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 30\n[output]\nthermo = 0\n";
+        let text = edited(scene, &["steps=10", "stage.2.steps=30", "output.thermo=0"]).unwrap();
+        let expected = "model = \"m.toml\"\nsteps = 10\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 30\n[output]\nthermo = 0\n";
         assert_eq!(text, expected);
-        assert!(edited(scene, &[("stage.2.steps", 1i64)]).is_err());
-        assert_eq!(
-            edited(scene, &[] as &[Change]).unwrap(),
-            scene.trim_start_matches("model = \"m.toml\"\n")
-        );
+        assert!(edited(scene, &["stage.3.steps=1"]).is_err());
+        assert_eq!(edited(scene, &[] as &[&str]).unwrap(), scene);
+        // The model of a case replaces that of its scene, and is added where there is none.
+        let model = "model = \"n.toml\"\n";
+        for (scene, expected) in [(scene, scene.replace("m.toml", "n.toml")), ("", model.to_owned())] {
+            assert_eq!(edited(scene, &["model=\"n.toml\""]).unwrap(), expected);
+        }
+        let of = |name| with_parameters("[parameters]\nA = 1.0\n", &[(name, 2.5)]);
+        assert_eq!(of("A").unwrap(), "[parameters]\nA = 2.5\n");
+        assert!(of("B").is_err());
     }
 }

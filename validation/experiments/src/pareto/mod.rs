@@ -79,9 +79,8 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
     let out = files::absolute_folder(&options.out)?;
     let seconds = 60.0 * options.minutes;
     let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let spinner = progress.spinner("start");
-    let origin = Origin::of(scene, Duration::from_secs_f64(START * seconds), all)?;
-    spinner.finish();
+    let limit = Duration::from_secs_f64(START * seconds);
+    let origin = progress.spinner("start", || Origin::of(scene, limit, all))?;
     let known = known(&origin)?;
     let mut left_out = Vec::new();
     let open = || LammpsRuns::open(&origin, &out.join("runs"), &|line| progress.note(line));
@@ -217,12 +216,11 @@ fn sample_all(
     effort: Effort,
     progress: &Progress,
 ) -> Result<(References, Vec<Sampled>), ExperimentError> {
-    let bar = progress.bar("errors", physics.len() as u64 + 2);
     let references = [Physics::reference(), Physics::small_steps()];
     let longer = references.iter().map(|physics| (physics, effort.times(REFERENCE)));
     let runs = longer.chain(physics.iter().map(|physics| (physics, effort))).collect();
     let sample = |(physics, effort)| sample::sample(origin, physics, effort);
-    let mut found = jobs::counted(runs, &bar, sample).into_iter();
+    let mut found = jobs::counted((progress, "errors"), runs, sample).into_iter();
     // A model without energy, or a flow, has no Monte Carlo.
     let configurations = found.next().map_or(Err(String::new()), |found| found.map_err(|e| e.to_string()));
     let mut rest: Vec<Sampled> = found.collect::<Result<_, _>>()?;
@@ -243,8 +241,8 @@ fn drifts(
     }
     let schemes = drift::schemes();
     let effort = Effort::Seconds(seconds / schemes.len() as f64);
-    let bar = progress.bar("energy", schemes.len() as u64);
-    jobs::counted(schemes, &bar, |scheme| drift::drift(origin, &scheme, effort)).into_iter().collect()
+    let drift = |scheme: Physics| drift::drift(origin, &scheme, effort);
+    jobs::counted((progress, "energy"), schemes, drift).into_iter().collect()
 }
 
 fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Deviation>) -> Point {
@@ -331,9 +329,9 @@ fn own_points(
         Some((Effort::Samples(n), _)) => Effort::Samples(n),
         _ => Effort::Seconds(WORKERS * seconds / OWN.len() as f64),
     };
-    let bar = progress.bar("LAMMPS's own style", OWN.len() as u64);
+    let bar = (progress, "LAMMPS's own style");
     let sample = |k: usize| lammps.sample(origin, &physics[k], effort, step, &format!("own-{k}"));
-    let sampled = jobs::counted((0..OWN.len()).collect(), &bar, sample);
+    let sampled = jobs::counted(bar, (0..OWN.len()).collect(), sample);
     let sampled: Vec<Sampled> = sampled.into_iter().collect::<Result<_, _>>()?;
     let mut known = known;
     let (reference, first) = match (&sampled[0], is_another_law(own)) {

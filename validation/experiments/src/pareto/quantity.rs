@@ -155,17 +155,19 @@ pub struct Known {
 }
 
 /// The error of a quantity, in the unit of its class, with an error of its own.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Deviation {
+    #[serde(skip)]
     pub class: Class,
+    #[serde(skip)]
     pub name: String,
-    /// What was measured, in the unit of the model.
-    pub measured: Measured,
     pub value: f64,
     /// One standard deviation of that, the reference's among it.
     pub error: f64,
     /// Whether the error is larger than two of these.
     pub resolved: bool,
+    /// What was measured, in the unit of the model.
+    pub measured: Measured,
 }
 
 /// How many standard deviations an error is taken to be larger than it was found, where it must be within bounds.
@@ -194,16 +196,7 @@ impl Deviation {
 
 /// By name; the order of the table is not kept.
 pub fn by_name<S: Serializer>(deviations: &[Deviation], serializer: S) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Entry {
-        value: f64,
-        error: f64,
-        resolved: bool,
-        measured: Measured,
-    }
-    let entry =
-        |d: &Deviation| Entry { value: d.value, error: d.error, resolved: d.resolved, measured: d.measured };
-    serializer.collect_map(deviations.iter().map(|d| (&d.name, entry(d))))
+    serializer.collect_map(deviations.iter().map(|d| (&d.name, d)))
 }
 
 /// The errors of `run` against what is known, and against `reference` otherwise.

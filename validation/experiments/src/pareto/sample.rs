@@ -9,7 +9,7 @@ use psidpd_core::document::Document;
 use psidpd_core::engine::Want;
 use psidpd_dynamics::run::{RunError, Simulation};
 use psidpd_observe::meter::AnyMeter;
-use psidpd_observe::{Observe, Observers, Request, Series, StageNames, read};
+use psidpd_observe::{Observe, Observers, Place, Request, Series, read};
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
@@ -69,15 +69,10 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
     let text = format!("[observe]\n{forces}rdf = {{ bins = 100 }}\n{motion}");
     let document = Document::parse("pareto", &text)?;
     let names = [stage.name.as_str()];
-    let mut found = read(
-        &document.root(),
-        &scene.model,
-        stage.kt,
-        &scene.domain,
-        StageNames { all: &names, timeless: Vec::new() },
-        scene.initial.slab_axis(),
-        None,
-    )?;
+    let (fluid, slab) = (&scene.model.at(stage.kt)?, scene.initial.slab_axis());
+    let timeless = Vec::new();
+    let place = Place { fluid, domain: &scene.domain, stages: &names, timeless, slab, drive: None };
+    let mut found = read(&document.root(), &place)?;
     let own = scene.observe.requests.iter().filter(|request| match request.meter {
         AnyMeter::InterfaceWidth(_) => true,
         AnyMeter::Viscosity(_) | AnyMeter::Poiseuille(_) => with_forces && has_time,

@@ -54,7 +54,6 @@ pub fn time(
             bar.advance(1);
         }
     }
-    bar.finish();
     Ok(found)
 }
 

@@ -33,7 +33,7 @@ pub struct Options {
     pub overwrite: bool,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Point {
     #[serde(serialize_with = "shown")]
     pub edits: Vec<Edit>,
@@ -126,13 +126,7 @@ fn mixed(bytes: &[u8]) -> u32 {
 
 fn run_point(options: &Options, edits: &[Edit], stop: &AtomicUsize) -> Point {
     let folder = options.out.join(name(edits));
-    let mut point = Point {
-        edits: edits.to_vec(),
-        folder: folder.clone(),
-        headline: Headline::default(),
-        error: None,
-        finished: false,
-    };
+    let mut point = Point { edits: edits.to_vec(), folder: folder.clone(), ..Point::default() };
     let all = [&options.edits[..], edits].concat();
     match attempt(options, &all, &folder, stop) {
         Ok(finished) => point.finished = finished,
@@ -183,9 +177,8 @@ mod tests {
         let point = |edits: &Vec<Edit>| Point {
             edits: edits.clone(),
             folder: options.out.join(name(edits)),
-            headline: Headline::default(),
-            error: None,
             finished: true,
+            ..Point::default()
         };
         let points: Vec<Point> = combinations(&options.axes).unwrap().iter().map(point).collect();
         write(&options, "t", &points).unwrap();

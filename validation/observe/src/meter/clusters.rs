@@ -61,11 +61,9 @@ impl Meter for Clusters {
 
     fn finish(&self) -> Vec<Observation> {
         let names = ["count", "largest", "mean_size"];
-        let mut scalar =
-            Observation::new("clusters", "Clusters", Kind::Scalar).samples(self.series.samples());
-        let mut series = Observation::new("clusters_series", "Clusters", Kind::Series)
-            .against("time", "time", self.series.channel(0))
-            .samples(self.series.samples());
+        let mut scalar = Observation::new("clusters", "Clusters", Kind::Scalar, &self.series);
+        let mut series = Observation::new("clusters_series", "Clusters", Kind::Series, &self.series);
+        series = series.against("time", "time", self.series.channel(0));
         for (k, name) in names.into_iter().enumerate() {
             scalar = scalar.column(name, "1", [self.series.mean(1 + k)]);
             let values = self.series.channel(1 + k).into_iter();

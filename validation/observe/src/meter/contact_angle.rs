@@ -283,17 +283,16 @@ impl Meter for ContactAngle {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let found = self.series.jackknife_many(|field| self.cap(field));
+        let new = |name, title, kind| Observation::new(name, title, kind, &self.series);
+        let found = self.series.jackknife(|field| self.cap(field));
         let at = |k: usize| [found.get(k).copied().unwrap_or(Measured::NONE)];
-        let samples = self.series.samples();
         let surface = self.surface();
         let note = match found.is_empty() {
             true => "No circle fits the contour.".to_owned(),
             false => format!("The wall's surface is {surface:.4} above the end of the box."),
         };
         let mut out = vec![
-            Observation::new("contact_angle", "Drop on a wall", Kind::Scalar)
-                .samples(samples)
+            new("contact_angle", "Drop on a wall", Kind::Scalar)
                 .column("angle", "degree", at(0))
                 .column("radius", "length", at(1))
                 .column("base", "length", at(2))
@@ -310,15 +309,14 @@ impl Meter for ContactAngle {
         let level = |field: &[f64]| self.isodensity.unwrap_or(0.5 * self.liquid(field));
         let [rows, _] = self.contour(&field, level(&field));
         let heights: Vec<f64> = rows.iter().map(|p| p[1]).collect();
-        let radii = self.series.jackknife_many(|field| {
+        let radii = self.series.jackknife(|field| {
             let [rows, _] = self.contour(field, level(field));
             let near = |z: f64| rows.iter().find(|p| (p[1] - z).abs() < 0.5 * self.width[1]);
             Some(heights.iter().map(|z| near(*z).map_or(f64::NAN, |p| p[0])).collect())
         });
         out.push(
-            Observation::new("contact_angle_profile", "Contour of a drop on a wall", Kind::Profile)
+            new("contact_angle_profile", "Contour of a drop on a wall", Kind::Profile)
                 .against("height", "length", heights.iter().map(|z| z - surface).collect())
-                .samples(samples)
                 .column("radius", "length", radii)
                 .note(format!(
                     "Where the density is {:.4}; heights are above the wall's surface.",
@@ -327,8 +325,7 @@ impl Meter for ContactAngle {
         );
         let cells = || (0..self.bins[1]).flat_map(|k| (0..self.bins[0]).map(move |j| (k, j)));
         out.push(
-            Observation::new("contact_angle_field", "Density field of a drop on a wall", Kind::Field)
-                .samples(samples)
+            new("contact_angle_field", "Density field of a drop on a wall", Kind::Field)
                 .exact("r", "length", cells().map(|(_, j)| (j as f64 + 0.5) * self.width[0]))
                 .exact("height", "length", cells().map(|(k, _)| (k as f64 + 0.5) * self.width[1] - surface))
                 .column("density", "1/volume", (0..field.len()).map(|k| self.series.mean(k))),

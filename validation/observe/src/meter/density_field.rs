@@ -87,8 +87,7 @@ impl Meter for DensityField {
         let kinds = self.series.width() / cells;
         let total =
             (0..cells).map(|c| self.series.linear(|row| (0..kinds).map(|s| row[s * cells + c]).sum()));
-        let mut out = Observation::new("density_field", "Density on a plane", Kind::Field)
-            .samples(self.series.samples())
+        let mut out = Observation::new("density_field", "Density on a plane", Kind::Field, &self.series)
             .exact(names[0], "length", (0..cells).map(|c| middle(0, c / self.bins[1])))
             .exact(names[1], "length", (0..cells).map(|c| middle(1, c % self.bins[1])))
             .column("density", "1/volume", total);

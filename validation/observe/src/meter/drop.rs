@@ -262,7 +262,7 @@ impl Meter for Drop {
         if !known {
             return false;
         }
-        let percolates = f64::from(u8::from(linked.percolates(largest)));
+        let percolates = f64::from(u8::from(linked.percolates[largest]));
         self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares, percolates])
     }
 
@@ -274,7 +274,7 @@ impl Meter for Drop {
 
     fn finish(&self) -> Vec<Observation> {
         let rest = (self.dimensions - 1) as f64;
-        let found = self.shells.jackknife_many(|means| {
+        let found = self.shells.jackknife(|means| {
             let s = self.shape(means)?;
             let laplace = s.inside - s.outside;
             let tension = laplace * s.radius / rest;
@@ -285,9 +285,7 @@ impl Meter for Drop {
         let squares = self.size.mean(2);
         let radius = ((d + 2.0) / d * squares.value).sqrt();
         let gyration = Measured { value: radius, error: 0.5 * radius * squares.error / squares.value };
-        let samples = self.shells.samples();
-        let scalar = Observation::new("drop", "Drop", Kind::Scalar)
-            .samples(samples)
+        let scalar = Observation::new("drop", "Drop", Kind::Scalar, &self.shells)
             .column("radius", "length", at(0))
             .column("radius_gyration", "length", [gyration])
             .column("width", "length", at(1))
@@ -310,17 +308,16 @@ impl Meter for Drop {
                 .map(|k| self.shells.linear(|row| f(&row[k * WIDTH..(k + 1) * WIDTH], self.volume(k))))
                 .collect()
         };
-        let profile = Observation::new("drop_profile", "Radial profile of a drop", Kind::Profile)
-            .against("r", "length", middles)
-            .samples(samples)
-            .column("density", "1/volume", column(&|p, volume| p[0] / volume))
-            .column("normal", "energy/volume", column(&|p, _| p[1] + p[3]))
-            .column("tangential", "energy/volume", column(&|p, _| p[2] + p[4]));
+        let profile =
+            Observation::new("drop_profile", "Radial profile of a drop", Kind::Profile, &self.shells)
+                .against("r", "length", middles)
+                .column("density", "1/volume", column(&|p, volume| p[0] / volume))
+                .column("normal", "energy/volume", column(&|p, _| p[1] + p[3]))
+                .column("tangential", "energy/volume", column(&|p, _| p[2] + p[4]));
         let radius = self.size.channel(2).into_iter().map(|r| ((d + 2.0) / d * r).sqrt());
         let unknown = |value| Measured { value, error: f64::NAN };
-        let series = Observation::new("drop_series", "Size of the drop", Kind::Series)
+        let series = Observation::new("drop_series", "Size of the drop", Kind::Series, &self.size)
             .against("time", "time", self.size.channel(0))
-            .samples(self.size.samples())
             .column("radius_gyration", "length", radius.map(unknown))
             .column("particles", "1", self.size.channel(1).into_iter().map(unknown));
         vec![scalar, profile, series]

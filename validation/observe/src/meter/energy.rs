@@ -31,7 +31,7 @@ impl Meter for Energy {
     fn sample(&mut self, frame: &Frame) -> bool {
         let count = frame.view.x.len() as f64;
         let evaluation = frame.evaluation();
-        let pair_energies = evaluation.pair_energies(&frame.evaluator().fluid);
+        let pair_energies = evaluation.pair_energies(&frame.evaluator.fluid);
         let terms = evaluation.excess.iter().chain(&pair_energies);
         let all: Vec<f64> =
             std::iter::once(&frame.view.kinetic_energy).chain(terms).map(|e| e / count).collect();
@@ -43,8 +43,7 @@ impl Meter for Energy {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let mut out = Observation::new("energy", "Energy per particle", Kind::Scalar)
-            .samples(self.series.samples())
+        let mut out = Observation::new("energy", "Energy per particle", Kind::Scalar, &self.series)
             .column("total", "energy", [self.series.linear(|s| s.iter().sum())])
             .column("kinetic", "energy", [self.series.mean(0)])
             .column("potential", "energy", [self.series.linear(|s| s[1..].iter().sum())]);

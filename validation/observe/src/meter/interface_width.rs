@@ -1,6 +1,6 @@
 use super::across::Across;
 use super::*;
-use crate::profile::{DensityProfile, interface, slab_edges};
+use crate::profile::{interface, slab_edges};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {
@@ -47,11 +47,10 @@ impl Meter for InterfaceWidth {
     fn finish(&self) -> Vec<Observation> {
         let centres = self.across.middles();
         let volume = self.across.bin_volume();
-        let profile = |means: &[f64]| {
-            let density = means.iter().map(|n| n / volume).collect();
-            DensityProfile { centres: centres.clone(), density }
+        let profile = |means: &[f64]| -> Vec<(f64, f64)> {
+            centres.iter().zip(means).map(|(z, n)| (*z, n / volume)).collect()
         };
-        let mut fit = self.series.jackknife_many(|means| {
+        let mut fit = self.series.jackknife(|means| {
             let profile = profile(means);
             let found = slab_edges(&profile)?;
             let fit = interface(&profile);
@@ -81,8 +80,7 @@ impl Meter for InterfaceWidth {
         };
         let at = |k: usize| [fit.get(k).copied().unwrap_or(Measured::NONE)];
         vec![
-            Observation::new("interface_width", "Interfaces of a slab", Kind::Scalar)
-                .samples(self.series.samples())
+            Observation::new("interface_width", "Interfaces of a slab", Kind::Scalar, &self.series)
                 .column("width", "length", at(0))
                 .column("liquid", "1/volume", at(1))
                 .column("vapour", "1/volume", at(2))

@@ -64,7 +64,7 @@ pub(super) struct Linked {
     /// For each cluster, the number of its members.
     pub sizes: Vec<usize>,
     /// For each cluster: true if it crosses the periodic box and meets its own image.
-    percolates: Vec<bool>,
+    pub percolates: Vec<bool>,
 }
 
 impl Linked {
@@ -97,10 +97,6 @@ impl Linked {
 
     pub fn is_in(&self, particle: usize, cluster: usize) -> bool {
         self.labels[particle] == Some(cluster)
-    }
-
-    pub fn percolates(&self, cluster: usize) -> bool {
-        self.percolates[cluster]
     }
 }
 
@@ -227,9 +223,9 @@ mod tests {
             let mut x: Vec<[f64; 3]> = (0..20).map(|k| [5.0, 0.5 * f64::from(k), 5.0]).collect();
             x.shuffle(&mut rng);
             let linked = Linked::new(&x, &domain, 3, 0.6, |_| true);
-            assert!(linked.largest().is_some_and(|k| linked.percolates(k)));
+            assert!(linked.largest().is_some_and(|k| linked.percolates[k]));
             let cut = Linked::new(&x[1..], &domain, 3, 0.6, |_| true);
-            assert!(cut.largest().is_some_and(|k| !cut.percolates(k) && cut.sizes[k] == 19));
+            assert!(cut.largest().is_some_and(|k| !cut.percolates[k] && cut.sizes[k] == 19));
         }
     }
 
@@ -279,9 +275,9 @@ mod tests {
         let drop = linked.largest().unwrap();
         let members = (0..inside).filter(|k| linked.is_in(*k, drop)).count();
         assert!(members > 590 && linked.sizes[drop] < 680, "{members} {}", linked.sizes[drop]);
-        assert!(!linked.percolates(drop));
+        assert!(!linked.percolates[drop]);
         // The range of the interaction, the obvious distance, links everything.
         let wide = Linked::new(&x, &domain, 3, fluid_range, |_| true);
-        assert!(wide.largest().is_some_and(|k| wide.sizes[k] > 950 && wide.percolates(k)));
+        assert!(wide.largest().is_some_and(|k| wide.sizes[k] > 950 && wide.percolates[k]));
     }
 }

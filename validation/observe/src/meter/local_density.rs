@@ -91,7 +91,7 @@ impl Meter for LocalDensity {
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let (evaluation, species) = (frame.evaluation(), view.species);
-        let fluid = &frame.evaluator().fluid;
+        let fluid = &frame.evaluator.fluid;
         let kinds = self.species.len();
         let density = &fluid.densities[self.density];
         let at = |i: usize, beta: usize| evaluation.densities_of(i)[self.density * kinds + beta];
@@ -155,16 +155,11 @@ impl Meter for LocalDensity {
         let range = self.found.unwrap_or(1.0);
         let width = range / self.bins as f64;
         let middles = (0..self.bins).map(|k| (k as f64 + 0.5) * width).collect();
-        let mut curve = Observation::new(
-            "local_density",
-            &format!("Distribution of the local density {}", self.name),
-            Kind::Curve,
-        )
-        .against(&self.name, "1/volume", middles)
-        .samples(self.series.samples());
-        let mut means =
-            Observation::new("local_density_means", "Local densities and kernel integrals", Kind::Scalar)
-                .samples(self.series.samples());
+        let title = format!("Distribution of the local density {}", self.name);
+        let mut curve = Observation::new("local_density", &title, Kind::Curve, &self.series)
+            .against(&self.name, "1/volume", middles);
+        let title = "Local densities and kernel integrals";
+        let mut means = Observation::new("local_density_means", title, Kind::Scalar, &self.series);
         let mut beyond: f64 = 0.0;
         for (s, species) in self.species.iter().enumerate() {
             let first = s * (self.bins + 1);

@@ -44,6 +44,9 @@ pub trait Meter: Sized {
     /// True if the observable must see every step.
     const EVERY_STEP: bool = false;
 
+    /// The quantities that the forces of a sampled step must provide.
+    const NEEDS: Want = Want::FORCES;
+
     /// True if a sample needs the momentum transport of its step.
     const NEEDS_FLUX: bool = false;
 
@@ -51,11 +54,6 @@ pub trait Meter: Sized {
     const OF_MOTION: bool = false;
 
     fn read(options: &Options) -> Result<Self, FileError>;
-
-    /// The quantities that the forces of a sampled step must provide.
-    fn needs(&self) -> Want {
-        Want::FORCES
-    }
 
     /// Takes a sample; returns false if the configuration allows none.
     fn sample(&mut self, frame: &Frame) -> bool;
@@ -86,7 +84,7 @@ macro_rules! meters {
 
         impl AnyMeter {
             pub fn needs(&self) -> Want {
-                match self { $(AnyMeter::$variant(meter) => meter.needs()),+ }
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::NEEDS),+ }
             }
 
             pub fn needs_flux(&self) -> bool {

@@ -36,10 +36,6 @@ impl Clock {
     pub fn spacing(&self) -> f64 {
         (self.last - self.first) / self.samples.saturating_sub(1) as f64
     }
-
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
 }
 
 /// A configuration from which displacements are measured.
@@ -97,7 +93,7 @@ impl Msd {
                 .collect();
             self.diffusion.push(&slope);
         }
-        if (self.clock.samples() - 1).is_multiple_of(self.spacing as u64) {
+        if (self.clock.samples - 1).is_multiple_of(self.spacing as u64) {
             self.origins.push(Origin { x, curve: Vec::new() });
         }
         true
@@ -175,12 +171,13 @@ impl Meter for Msd {
         let spacing = self.clock.spacing();
         let seen = self.lags.iter().take_while(|lag| !lag.is_empty()).count();
         let times = (1..=seen).map(|k| k as f64 * spacing).collect();
-        let mut curve = Observation::new("msd", "Mean-square displacement", Kind::Curve)
-            .against("time", "time", times)
-            .samples(self.clock.samples());
-        let mut diffusion = Observation::new("diffusion", "Diffusion coefficient", Kind::Scalar)
-            .samples(self.diffusion.samples())
-            .note("Samples are origins that were followed to the end.");
+        let mut curve = Observation::new("msd", "Mean-square displacement", Kind::Curve, &self.diffusion)
+            .against("time", "time", times);
+        // Its samples are configurations, not origins.
+        curve.samples = self.clock.samples;
+        let mut diffusion =
+            Observation::new("diffusion", "Diffusion coefficient", Kind::Scalar, &self.diffusion)
+                .note("Samples are origins that were followed to the end.");
         for (s, name) in self.species.iter().enumerate() {
             let name = |what: &str| {
                 if self.species.len() == 1 { what.to_owned() } else { format!("{what}_{name}") }

@@ -188,11 +188,10 @@ impl Meter for Pendant {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let found = self.series.jackknife_many(|field| self.shape(field));
+        let new = |name, title, kind| Observation::new(name, title, kind, &self.series);
+        let found = self.series.jackknife(|field| self.shape(field));
         let at = |k: usize| [found.get(k).copied().unwrap_or(Measured::NONE)];
-        let samples = self.series.samples();
-        let mut scalar = Observation::new("pendant", "Hanging drop", Kind::Scalar)
-            .samples(samples)
+        let mut scalar = new("pendant", "Hanging drop", Kind::Scalar)
             .column("bond", "1", at(0))
             .column("apex_radius", "length", at(1))
             .column("apex", "length", at(2))
@@ -212,7 +211,7 @@ impl Meter for Pendant {
         // The radius of the mean surface at each height. Its error comes from the jackknife.
         let top = self.bins[1] as f64 * self.width[1];
         let heights: Vec<f64> = self.surface(&field, level).iter().map(|p| p.1).collect();
-        let radii = self.series.jackknife_many(|field| {
+        let radii = self.series.jackknife(|field| {
             let level = self.isodensity.unwrap_or(0.5 * self.liquid(field));
             let points = self.surface(field, level);
             let near = |z: f64| points.iter().find(|p| (p.1 - z).abs() < 0.5 * self.width[1]);
@@ -226,16 +225,14 @@ impl Meter for Pendant {
         surface.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (z, radii): (Vec<f64>, Vec<Measured>) = surface.into_iter().unzip();
         out.push(
-            Observation::new("pendant_profile", "Surface of a hanging drop", Kind::Profile)
+            new("pendant_profile", "Surface of a hanging drop", Kind::Profile)
                 .against("height", "length", z)
-                .samples(samples)
                 .column("radius", "length", radii)
                 .note(format!("The surface where the density is {level:.4}.")),
         );
         let cells = || (0..self.bins[1]).flat_map(|k| (0..self.bins[0]).map(move |j| (k, j)));
         out.push(
-            Observation::new("pendant_field", "Density field of a hanging drop", Kind::Field)
-                .samples(samples)
+            new("pendant_field", "Density field of a hanging drop", Kind::Field)
                 .exact("r", "length", cells().map(|(_, j)| (j as f64 + 0.5) * self.width[0]))
                 .exact("z", "length", cells().map(|(k, _)| self.origin + (k as f64 + 0.5) * self.width[1]))
                 .column("density", "1/volume", (0..field.len()).map(|k| self.series.mean(k))),

@@ -116,19 +116,17 @@ impl Meter for Poiseuille {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let found = self.series.jackknife_many(|means| self.fit(means));
+        let found = self.series.jackknife(|means| self.fit(means));
         let at = |k: usize| found.get(k).copied().unwrap_or(Measured::NONE);
-        let samples = self.series.samples();
         let velocity = (0..self.across.bins).map(|k| self.series.ratio(|s| s[2 * k + 1], |s| s[2 * k]));
         let fit = self.parabolas().into_iter().map(|f| at(2).times(f));
+        let title = "Shear viscosity from Poiseuille flow";
         vec![
-            Observation::new("poiseuille", "Shear viscosity from Poiseuille flow", Kind::Scalar)
-                .samples(samples)
+            Observation::new("poiseuille", title, Kind::Scalar, &self.series)
                 .column("viscosity", "mass/(r_c time)", [at(0)])
                 .column("deviation", "1", [at(1)]),
-            Observation::new("poiseuille_profile", "Poiseuille flow", Kind::Profile)
+            Observation::new("poiseuille_profile", "Poiseuille flow", Kind::Profile, &self.series)
                 .against(self.across.name(), "length", self.across.middles())
-                .samples(samples)
                 .column("velocity", "r_c/time", velocity)
                 .column("fit", "r_c/time", fit),
         ]

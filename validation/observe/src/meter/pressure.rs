@@ -28,14 +28,11 @@ impl Meter for Pressure {
         ..PLAIN
     };
 
+    const NEEDS: Want = Want::TOTALS;
     const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<Pressure, FileError> {
         Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(19) })
-    }
-
-    fn needs(&self) -> Want {
-        Want::TOTALS
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
@@ -55,7 +52,7 @@ impl Meter for Pressure {
 
     fn finish(&self) -> Vec<Observation> {
         let d = self.dimensions;
-        let mut out = Observation::new("pressure", "Pressure", Kind::Scalar).samples(self.series.samples());
+        let mut out = Observation::new("pressure", "Pressure", Kind::Scalar, &self.series);
         for (what, first) in [("carried", 12), ("conservative", 6), ("total", 0)] {
             let trace = self.series.linear(|s| s[first..first + d].iter().sum::<f64>() / d as f64);
             out = out.column(what, "energy/volume", [trace]);

@@ -62,9 +62,8 @@ impl Bins {
 
     /// An observation against the coordinate, without columns.
     fn observation(&self, name: &str, title: &str) -> Observation {
-        Observation::new(name, title, Kind::Profile)
+        Observation::new(name, title, Kind::Profile, &self.series)
             .against(self.across.name(), "length", self.across.middles())
-            .samples(self.series.samples())
             .note(self.across.note())
     }
 
@@ -187,7 +186,7 @@ impl Quantity for Temperature {
 
     fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
         let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
-        let temperature = bins.series.jackknife_many(|means| {
+        let temperature = bins.series.jackknife(|means| {
             let of = |at: &[f64]| {
                 let flow: f64 = at[count + 1..count + 1 + d].iter().map(|p| p * p).sum::<f64>() / at[count];
                 (at[count + 1 + d] - flow) / (d as f64 * at[count + 2 + d])

@@ -79,9 +79,8 @@ impl Meter for Rdf {
     fn finish(&self) -> Vec<Observation> {
         let width = self.range / self.bins as f64;
         let middles = (0..self.bins).map(|b| (b as f64 + 0.5) * width).collect();
-        let mut out = Observation::new("rdf", "Radial distribution function", Kind::Curve)
-            .against("r", "length", middles)
-            .samples(self.series.samples());
+        let mut out = Observation::new("rdf", "Radial distribution function", Kind::Curve, &self.series)
+            .against("r", "length", middles);
         for (k, name) in self.pairs.names("g").iter().enumerate() {
             out = out.column(name, "1", (0..self.bins).map(|b| self.series.mean(k * self.bins + b)));
         }

@@ -89,18 +89,18 @@ impl Meter for StressProfile {
         let integral = (0..self.across.bins)
             .map(|bin| self.series.linear(|row| 0.5 * (upto(row, bin) + upto(row, bin + 1))));
         let unit = "energy/volume";
-        let profile = Observation::new("stress_profile", "Pressure tensor profile", Kind::Profile)
-            .against(self.across.name(), "length", self.across.middles())
-            .samples(self.series.samples())
-            .column("normal", unit, column(&|p| p[0] + p[2]))
-            .column("tangential", unit, column(&|p| p[1] + p[3]))
-            .column("ideal", unit, column(&|p| p[0]))
-            .column("difference", unit, column(&|p| p[0] + p[2] - p[1] - p[3]))
-            .column("integral", "energy/area", integral)
-            .note(self.across.note());
-        let whole = Observation::new("stress_profile_integral", "Integral of P_N − P_T", Kind::Scalar)
-            .samples(self.series.samples())
-            .column("integral", "energy/area", [self.series.linear(|row| upto(row, self.across.bins))]);
+        let profile =
+            Observation::new("stress_profile", "Pressure tensor profile", Kind::Profile, &self.series)
+                .against(self.across.name(), "length", self.across.middles())
+                .column("normal", unit, column(&|p| p[0] + p[2]))
+                .column("tangential", unit, column(&|p| p[1] + p[3]))
+                .column("ideal", unit, column(&|p| p[0]))
+                .column("difference", unit, column(&|p| p[0] + p[2] - p[1] - p[3]))
+                .column("integral", "energy/area", integral)
+                .note(self.across.note());
+        let whole =
+            Observation::new("stress_profile_integral", "Integral of P_N − P_T", Kind::Scalar, &self.series)
+                .column("integral", "energy/area", [self.series.linear(|row| upto(row, self.across.bins))]);
         vec![profile, whole]
     }
 }

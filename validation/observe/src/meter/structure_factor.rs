@@ -148,9 +148,8 @@ impl Meter for StructureFactor {
 
     fn finish(&self) -> Vec<Observation> {
         let shells = self.lengths.len();
-        let mut out = Observation::new("structure_factor", "Structure factor", Kind::Curve)
-            .against("k", "1/r_c", self.lengths.clone())
-            .samples(self.series.samples());
+        let mut out = Observation::new("structure_factor", "Structure factor", Kind::Curve, &self.series)
+            .against("k", "1/r_c", self.lengths.clone());
         for (p, name) in self.pairs.names("s").iter().enumerate() {
             out = out.column(name, "1", (0..shells).map(|b| self.series.mean(p * shells + b)));
         }

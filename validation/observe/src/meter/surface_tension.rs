@@ -32,7 +32,7 @@ pub fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
     let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
     let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
     let x: Vec<[f64; 3]> = view.x.iter().map(|x| stretched.point(domain.fraction(*x))).collect();
-    frame.evaluator().energy(&x, view.species, &stretched)
+    frame.evaluator.energy(&x, view.species, &stretched)
 }
 
 impl Meter for SurfaceTension {
@@ -59,6 +59,7 @@ impl Meter for SurfaceTension {
         ..PLAIN
     };
 
+    const NEEDS: Want = Want::TOTALS;
     const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
@@ -76,10 +77,6 @@ impl Meter for SurfaceTension {
             kt: 0.0,
             series: Series::new(4),
         })
-    }
-
-    fn needs(&self) -> Want {
-        Want::TOTALS
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
@@ -117,8 +114,7 @@ impl Meter for SurfaceTension {
             free_energy.error = self.series.linear(linear).error;
         }
         vec![
-            Observation::new("surface_tension", "Surface tension", Kind::Scalar)
-                .samples(self.series.samples())
+            Observation::new("surface_tension", "Surface tension", Kind::Scalar, &self.series)
                 .column("stress", "energy/area", [self.series.mean(0)])
                 .column("stress_conservative", "energy/area", [self.series.mean(1)])
                 .column("free_energy", "energy/area", [free_energy]),

@@ -42,9 +42,8 @@ impl Meter for Temperature {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        let mut out = Observation::new("temperature", "Temperature kT", Kind::Scalar)
-            .samples(self.series.samples())
-            .column("kinetic", "energy", [self.series.mean(0)]);
+        let mut out = Observation::new("temperature", "Temperature kT", Kind::Scalar, &self.series);
+        out = out.column("kinetic", "energy", [self.series.mean(0)]);
         if self.missing.is_empty() {
             out = out.column("configurational", "energy", [self.series.ratio(|s| s[1], |s| s[2])]);
         } else {

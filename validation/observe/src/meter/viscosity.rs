@@ -38,7 +38,7 @@ impl Viscosity {
         }
         // P:P is `shears` times the mean square of one off-diagonal component.
         let shears = ((d - 1) * (d + 2)) as f64;
-        let first = stress_of(&self.recent, 0);
+        let first = self.recent.front().copied().unwrap_or_default();
         let mut row: Vec<f64> = self.recent.iter().map(|p| contraction(&first, p, d) / shears).collect();
         row.push(temperature);
         self.recent.pop_front();
@@ -49,10 +49,6 @@ impl Viscosity {
     fn integral(row: &[f64], lag: usize, dt: f64) -> f64 {
         if lag == 0 { 0.0 } else { dt * (0.5 * (row[0] + row[lag]) + row[1..lag].iter().sum::<f64>()) }
     }
-}
-
-fn stress_of(recent: &VecDeque<[f64; 6]>, k: usize) -> [f64; 6] {
-    recent.get(k).copied().unwrap_or_default()
 }
 
 fn contraction(a: &[f64; 6], b: &[f64; 6], dimensions: usize) -> f64 {
@@ -87,6 +83,8 @@ impl Meter for Viscosity {
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;
 
+    const NEEDS: Want = Want { virial: true, ..Want::FORCES };
+
     const OF_MOTION: bool = true;
 
     fn read(options: &Options) -> Result<Viscosity, FileError> {
@@ -95,10 +93,6 @@ impl Meter for Viscosity {
         options.require_periodic()?;
         let length = options.count("length", 2, 100_000)?.unwrap_or(400);
         Ok(Viscosity::new(dimensions, length, place.domain.volume(dimensions)))
-    }
-
-    fn needs(&self) -> Want {
-        Want { virial: true, ..Want::FORCES }
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
@@ -120,15 +114,12 @@ impl Meter for Viscosity {
         let lags = if self.series.is_empty() { 0 } else { self.length + 1 };
         let last = if lags == 0 { Measured::NONE } else { viscosity(self.length) };
         let times = (0..lags).map(|k| k as f64 * dt).collect();
-        let samples = self.series.samples();
-        let curve =
-            Observation::new("stress_correlation", "Stress autocorrelation and its integral", Kind::Curve)
-                .against("time", "time", times)
-                .samples(samples)
-                .column("correlation", "(energy/volume)^2", (0..lags).map(|k| self.series.mean(k)))
-                .column("viscosity", "mass/(r_c time)", (0..lags).map(viscosity));
-        let scalar = Observation::new("viscosity", "Shear viscosity", Kind::Scalar)
-            .samples(samples)
+        let title = "Stress autocorrelation and its integral";
+        let curve = Observation::new("stress_correlation", title, Kind::Curve, &self.series)
+            .against("time", "time", times)
+            .column("correlation", "(energy/volume)^2", (0..lags).map(|k| self.series.mean(k)))
+            .column("viscosity", "mass/(r_c time)", (0..lags).map(viscosity));
+        let scalar = Observation::new("viscosity", "Shear viscosity", Kind::Scalar, &self.series)
             .column("viscosity", "mass/(r_c time)", [last])
             .column("kT", "energy", [self.series.mean(self.length + 1)]);
         vec![scalar, curve]

@@ -4,7 +4,7 @@ use super::IMMISCIBLE;
 use crate::ExperimentError;
 use crate::machine::peak_kilobytes;
 use crate::papers::case::{Reproduction, bare, curve, points};
-use crate::papers::context::{Change, Context};
+use crate::papers::context::Context;
 
 const SMALL: &str = include_str!("../../../../scenes/drop-collision.toml");
 const FULL: &str = include_str!("../../../../scenes/full/drop-collision.toml");
@@ -34,7 +34,7 @@ pub fn tension(context: &Context, outcome: &mut Reproduction) -> Result<(), Expe
 }
 
 pub fn merge(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[] as &[Change])?;
+    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[])?;
     let largest = observed.profile("clusters_series", "largest");
     let drops = context.pick(2.0_f64, 15.0).powi(3) * 10.0 * 8.0 / 3.0 * std::f64::consts::PI;
     if let [(_, first), .., (_, last)] = largest[..] {
@@ -47,15 +47,14 @@ pub fn merge(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
 }
 
 pub fn size(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let box_: toml_edit::Value =
-        [60.0, 60.0, 104.1667].into_iter().map(|l| l / 100_f64.cbrt()).collect::<toml_edit::Array>().into();
+    let smaller = format!("box={:?}", [60.0, 60.0, 104.1667].map(|l| l / 100_f64.cbrt()));
     // A few steps of the scene, with nothing observed; at quick size one liquid fills a smaller box.
     let head = FULL.split("[[part]]").next().unwrap_or(FULL).replace("steps   = 5000", "steps = 20");
     let text = format!(
         "{head}[initial]\nkind = \"lattice\"\nspecies = \"D\"\n[output]\nthermo = 20\n[observe]\nevery = 10\ntemperature = true\n"
     );
     let begun = std::time::Instant::now();
-    context.shipped("size", IMMISCIBLE, &text, &[("box", box_)])?;
+    context.shipped("size", IMMISCIBLE, &text, &[&smaller])?;
     let seconds = begun.elapsed().as_secs_f64();
     let particles = context.pick(3.75e4, 3.75e6);
     // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.

@@ -4,7 +4,7 @@ use super::BINARY;
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
-use crate::papers::context::{Change, Context, mean_field};
+use crate::papers::context::{Context, mean_field};
 use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 
@@ -21,8 +21,7 @@ const RHO: f64 = 10.0;
 const BOXES: [f64; 2] = [10.0, 3.0];
 
 fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, ExperimentError> {
-    let changes: [Change; 4] =
-        [("equilibrate", 3000), ("steps", 40_000), ("output.dump", 0), ("observe.every", 20)];
+    let changes = ["equilibrate=3000", "steps=40000", "output.dump=0", "observe.every=20"];
     context.shared("pagonabarraga-binary").shipped(name, BINARY, scene, &changes)
 }
 

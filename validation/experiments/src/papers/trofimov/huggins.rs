@@ -6,7 +6,7 @@ use crate::bulk::Observed;
 use crate::calibrate::Point;
 use crate::models::HUGGINS;
 use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
-use crate::papers::context::{Change, Context, mean_field, with_parameters};
+use crate::papers::context::{Context, mean_field, with_parameters};
 use psidpd_observe::Measured;
 
 pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
@@ -49,7 +49,7 @@ fn demixed(context: &Context, strength: f64) -> Result<Observed, ExperimentError
          composition_profile = { recentre = \"A\" }\n",
         SCENE,
     );
-    context.shipped(&format!("e{strength}"), &model, scene, &[] as &[Change])
+    context.shipped(&format!("e{strength}"), &model, scene, &[])
 }
 
 /// Fraction of A in the layer of B and in that of A, which is in the middle of the profile: a quarter of the box amid

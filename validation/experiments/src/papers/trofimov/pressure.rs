@@ -1,7 +1,7 @@
 //! Figures 1, 2, 3, 6 and 7: pressures, with and without the corrected density.
 
 use super::density::compare_line;
-use super::{FIT_DENSITIES, K2, K3, K3_CORRECTED, K4, LENNARD_JONES, fluid, point};
+use super::{FIT_DENSITIES, K2, K4, LENNARD_JONES, fluid, point};
 use crate::ExperimentError;
 use crate::calibrate::DUMMY_SLOPE;
 use crate::papers::case::{Reproduction, curve, line, points};
@@ -44,7 +44,7 @@ fn pressures(
     Ok(measured.into_iter().map(|(rho, p)| (rho, p.times(1.0 / pressure(rho)))).collect())
 }
 
-fn too_low(
+pub fn too_low(
     context: &Context,
     outcome: &mut Reproduction,
     model: &str,
@@ -57,24 +57,12 @@ fn too_low(
     Ok(())
 }
 
-pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    too_low(context, outcome, K3, 0.20)
-}
-
-pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    too_low(context, outcome, K4, 0.40)
-}
-
-fn agrees(context: &Context, outcome: &mut Reproduction, model: &str) -> Result<(), ExperimentError> {
+pub fn agrees(context: &Context, outcome: &mut Reproduction, model: &str) -> Result<(), ExperimentError> {
     for (rho, p) in pressures(context, outcome, model, &[4.0, 6.0, 8.0, 10.0])? {
         // The paper states an error of 1 % of the pressure.
         outcome.equal(format!("pressure over the wanted one at density {rho}"), p, [1.0, 0.01]);
     }
     Ok(())
-}
-
-pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    agrees(context, outcome, K3_CORRECTED)
 }
 
 pub fn fig7(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {

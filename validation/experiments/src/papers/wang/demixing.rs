@@ -4,7 +4,7 @@ use super::{STRONG, WEAK};
 use crate::ExperimentError;
 use crate::models::SPLINE;
 use crate::papers::case::{Reproduction, bare, curve};
-use crate::papers::context::{Change, Context};
+use crate::papers::context::Context;
 use psidpd_core::model::Model;
 use psidpd_core::theory::thermodynamic_limit;
 use psidpd_observe::Measured;
@@ -20,12 +20,7 @@ fn gathered(
     scene: &str,
     outcome: &mut Reproduction,
 ) -> Result<Measured, ExperimentError> {
-    let changes: [Change<toml_edit::Value>; 4] = [
-        ("box", 10.0.into()),
-        ("steps", 2500.into()),
-        ("output.dump", 0.into()),
-        ("observe.every", 20.into()),
-    ];
+    let changes = ["box=10.0", "steps=2500", "output.dump=0", "observe.every=20"];
     let s = context.shipped("demixing", model, scene, &changes)?.profile("structure_factor", "s");
     outcome.plot("structure", "Structure factor", ["k", "S"], vec![curve("S", bare(&s))]);
     let particles = 2.0 * context.pick(1e3, 8e3);

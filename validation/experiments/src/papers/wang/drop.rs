@@ -4,7 +4,7 @@ use crate::ExperimentError;
 use crate::bulk::Observed;
 use crate::models::SPLINE;
 use crate::papers::case::{Reproduction, bare, curve, points};
-use crate::papers::context::{Change, Context};
+use crate::papers::context::Context;
 use psidpd_observe::Measured;
 
 const SCENES: [(usize, &str); 7] = [
@@ -26,9 +26,8 @@ fn drop(context: &Context, which: usize) -> Result<Observed, ExperimentError> {
     let context = context.shared("wang-drop");
     let (count, scene) = SCENES[which];
     // Smaller drops come to rest sooner, and need more samples for the same error.
-    let steps = (36_000_000 / count) as i64;
-    let changes: [Change; 4] =
-        [("equilibrate", 2000), ("steps", steps), ("output.dump", 0), ("observe.every", 20)];
+    let steps = format!("steps={}", 36_000_000 / count);
+    let changes = ["equilibrate=2000", &steps, "output.dump=0", "observe.every=20"];
     context.shipped(&format!("drop-{count}"), SPLINE, scene, &changes)
 }
 

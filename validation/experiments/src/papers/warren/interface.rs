@@ -2,7 +2,7 @@
 
 use crate::ExperimentError;
 use crate::bulk::Observed;
-use crate::models::{SET5, SET6};
+use crate::fluids::{SET5, SET6, WarrenSet};
 use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::{Context, Fluid};
 use psidpd_observe::Measured;
@@ -11,13 +11,11 @@ const BIN: f64 = 0.05;
 /// How far from the liquid the densities are of which the pressures give its compressibility; the third derivative of the
 /// pressure makes 0.1 of this.
 const NEAR: f64 = 0.2;
-/// A parameter set: name, model, and for each temperature a density of the liquid to start from.
-type Set = (&'static str, &'static str, [(f64, f64); 3]);
+/// A parameter set, and for each temperature a density of the liquid to start from.
+type Set = (WarrenSet, [(f64, f64); 3]);
 
-const SETS: [Set; 2] = [
-    ("set 5", SET5, [(0.5, 5.3), (1.0, 5.08), (2.0, 4.6)]),
-    ("set 6", SET6, [(0.5, 6.3), (1.0, 6.05), (2.0, 5.6)]),
-];
+const SETS: [Set; 2] =
+    [(SET5, [(0.5, 5.3), (1.0, 5.08), (2.0, 4.6)]), (SET6, [(0.5, 6.3), (1.0, 6.05), (2.0, 5.6)])];
 
 /// Eq. (19) with the slope between bins 0.25 wide, two apart: the largest of the profile and its mirror image.
 fn width_by_bins(observed: &Observed) -> Measured {
@@ -39,12 +37,7 @@ fn width_by_bins(observed: &Observed) -> Measured {
 }
 
 /// A slab of a set between two surfaces; figures and the table share the runs.
-fn slab(
-    context: &Context,
-    set: &str,
-    model: &str,
-    (kt, rho): (f64, f64),
-) -> Result<Observed, ExperimentError> {
+fn slab(context: &Context, set: &WarrenSet, (kt, rho): (f64, f64)) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-slab");
     let [edge, height] = context.pick([7.0, 18.0], [10.0, 30.0]);
     let scene = format!(
@@ -57,16 +50,13 @@ fn slab(
         0.5 * height,
         (height / BIN) as u32,
     );
-    context.scene(&format!("{}-kT{kt}", set.replace(' ', "")), model, &scene)
+    context.scene(&format!("{}-kT{kt}", set.slug()), set.fluid.text, &scene)
 }
 
 pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let printed = [
-        ("set 5", SET5, [5.08, 0.01], [0.78, 0.05], [4.95, 0.03], [49.0, 2.0]),
-        ("set 6", SET6, [6.05, 0.01], [0.66, 0.03], [7.45, 0.04], [47.0, 2.0]),
-    ];
-    for (set, model, liquid, width, tension, slope) in printed {
-        let observed = slab(context, set, model, (1.0, liquid[0]))?;
+    for (of, slope) in [(SET5, [49.0, 2.0]), (SET6, [47.0, 2.0])] {
+        let (set, [liquid, tension, width]) = (of.name, of.published());
+        let observed = slab(context, &of, (1.0, liquid[0]))?;
         let shape = |column| observed.scalar("interface_width", column);
         outcome.equal(format!("liquid density of {set}"), shape("liquid"), liquid);
         outcome.equal(format!("width of {set}"), shape("width"), width);
@@ -75,8 +65,8 @@ pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), Exper
         outcome.equal(format!("tension of {set}"), observed.scalar("surface_tension", "stress"), tension);
         // The paper has it from eq. (18), which is fitted to such pressures.
         let pressure = |rho: f64| -> Result<Measured, ExperimentError> {
-            let name = format!("{}-rho{rho:.2}", set.replace(' ', ""));
-            Ok(context.bulk(&name, &Fluid::of(model), &[rho])?.pressure())
+            let name = format!("{}-rho{rho:.2}", of.slug());
+            Ok(context.bulk(&name, &Fluid::of(of.fluid.text), &[rho])?.pressure())
         };
         let rise = pressure(liquid[0] + NEAR)?.minus(pressure(liquid[0] - NEAR)?).times(0.5 / NEAR);
         outcome.equal(format!("dp/drho of {set} at the density of its liquid"), rise, slope);
@@ -86,11 +76,12 @@ pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), Exper
 
 pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut plotted = Vec::new();
-    for (set, model, states) in SETS {
+    for (of, states) in SETS {
+        let set = of.name;
         let mut gaps = Vec::new();
         let mut ends = Vec::new();
         for state in states {
-            let observed = slab(context, set, model, state)?;
+            let observed = slab(context, &of, state)?;
             let [vapour, liquid] =
                 ["vapour", "liquid"].map(|column| observed.scalar("interface_width", column));
             if state.0 <= 1.0 {
@@ -111,10 +102,11 @@ pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
 }
 
 pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    for (set, model, states) in SETS {
+    for (of, states) in SETS {
+        let set = of.name;
         let mut lines = Vec::new();
         for (state, name) in states.into_iter().zip(["kT = 0.5", "kT = 1", "kT = 2"]) {
-            let observed = slab(context, set, model, state)?;
+            let observed = slab(context, &of, state)?;
             let density = observed.profile("density_profile", "density");
             // Two bins together, and both sides: as wide as the layers are told apart.
             let count = density.len();
@@ -124,25 +116,25 @@ pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
             let liquid = observed.scalar("interface_width", "liquid");
             let noise = density.iter().map(|(_, d)| d.error).fold(0.0, f64::max) / 2.0;
             let excess = Measured { value: highest / liquid.value - 1.0, error: noise / liquid.value };
-            let of = format!("height of the layers of {set}, {name}");
+            let what = format!("height of the layers of {set}, {name}");
             match state.0 < 0.75 {
-                true => outcome.equal(of, excess, [0.10, 0.01]),
-                false => outcome.at_most(of, excess, 0.02),
+                true => outcome.equal(what, excess, [0.10, 0.01]),
+                false => outcome.at_most(what, excess, 0.02),
             }
             lines.push(curve(name, bare(&density)));
         }
-        let file = if set == "set 5" { "profiles-set5" } else { "profiles-set6" };
-        outcome.plot(file, &format!("Warren, {set}"), ["z", "density"], lines);
+        outcome.plot(format!("profiles-{}", of.slug()), &format!("Warren, {set}"), ["z", "density"], lines);
     }
     Ok(())
 }
 
 pub fn fig5(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let mut plotted = Vec::new();
-    for (set, model, states) in SETS {
+    for (of, states) in SETS {
+        let set = of.name;
         let (mut tensions, mut widths) = (Vec::new(), Vec::new());
         for state in states {
-            let observed = slab(context, set, model, state)?;
+            let observed = slab(context, &of, state)?;
             tensions.push((state.0, observed.scalar("surface_tension", "stress")));
             widths.push((state.0, observed.scalar("interface_width", "width")));
         }

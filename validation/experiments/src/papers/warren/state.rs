@@ -2,14 +2,15 @@
 
 use super::ALPHA;
 use crate::ExperimentError;
-use crate::models::{SET5, SET6, STANDARD};
+use crate::fluids::{A, SET5, SET6};
+use crate::models::STANDARD;
 use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid, with_parameters};
 use psidpd_observe::Measured;
 
 /// Set 6 with other A, B r_d⁴ and r_d.
 fn with([a, many]: [f64; 2], rd: f64) -> Result<String, ExperimentError> {
-    with_parameters(SET6, &[("A", a), ("B", many / rd.powi(4)), ("rd", rd)])
+    with_parameters(SET6.fluid.text, &[("A", a), ("B", many / rd.powi(4)), ("rd", rd)])
 }
 
 /// F B r_d⁴ = p − ρ − αAρ² − 2αBr_d⁴ρ³; the slope of F against ρ² is −2αc.
@@ -153,18 +154,17 @@ fn eq18(a: f64, b: f64, rho: f64) -> Measured {
 }
 
 pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    for (set, model, b, densities) in
-        [("set 5", SET5, 40.0, [5.5, 6.5, 7.5]), ("set 6", SET6, 25.0, [6.5, 7.0, 7.5])]
-    {
-        let name = format!("{}-", set.replace(' ', ""));
-        let measured = context.pressures(&name, &Fluid::of(model), &densities)?;
+    for (of, densities) in [(SET5, [5.5, 6.5, 7.5]), (SET6, [6.5, 7.0, 7.5])] {
+        let (set, b) = (of.name, of.b);
+        let name = format!("{}-", of.slug());
+        let measured = context.pressures(&name, &Fluid::of(of.fluid.text), &densities)?;
         for &(rho, p) in &measured {
-            outcome.equal(format!("pressure of {set} at density {rho}"), p, eq18(-40.0, b, rho));
+            outcome.equal(format!("pressure of {set} at density {rho}"), p, eq18(A, b, rho));
         }
-        let file = if b == 40.0 { "pressure-set5" } else { "pressure-set6" };
-        let published = curve("eq. (18)", line(5.0, 8.0, |rho| eq18(-40.0, b, rho).value));
+        let published = curve("eq. (18)", line(5.0, 8.0, |rho| eq18(A, b, rho).value));
         let series = vec![points("measured", &measured), published];
-        outcome.plot(file, &format!("Warren, {set}"), ["density", "pressure"], series);
+        let title = format!("Warren, {set}");
+        outcome.plot(format!("pressure-{}", of.slug()), &title, ["density", "pressure"], series);
     }
     Ok(())
 }
