@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         bar.set(p.step);
         p.deviations.iter().for_each(|deviation| warn(&deviation.to_string()));
     });
-    bar.finish();
+    drop(bar);
     // A failure to write the page does not change the outcome of the run.
     if *report
         && outcome.as_ref().err().is_none_or(|e| e.is_stop())
