@@ -98,7 +98,7 @@ impl Evaluator {
             let (dimensions, range) = (self.fluid.dimensions, self.fluid.conservative_range());
             let finite = |k: usize| x[k].iter().all(|c| c.is_finite());
             BoxSearch::default().find(x, x.len(), finite, domain, dimensions, range, |i, j, d| {
-                pairs.push_in_box(i, j, d, species);
+                pairs.force.push(i, j, d, species);
             });
         }
         pair_forces.resize(pairs.force.len(), 0.0);

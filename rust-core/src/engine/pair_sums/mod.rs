@@ -141,7 +141,7 @@ impl PairSums {
                 check_reach(domain, dimensions, cutoff, owned)?;
                 pairs.clear(owned, Newton::On);
                 box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
-                    pairs.push_in_box(i, j, d, species);
+                    pairs.force.push(i, j, d, species);
                 });
             }
             Surroundings::Ghosts(Around { domain, images }, newton) if is_closed(domain) => {

@@ -31,7 +31,7 @@ pub fn scale(
     }
     let key = |i: u32, j: u32| (i.min(j), i.max(j));
     let factors: HashMap<_, _> = special.iter().map(|p| (key(p.i, p.j), p.factor)).collect();
-    for list in pairs.lists_mut() {
+    for list in [&mut pairs.force, &mut pairs.density_only] {
         let factor = |(i, j): (&u32, &u32)| match exclusions.excludes(*i as usize, *j as usize) {
             true => 0.0,
             false => factors.get(&key(*i, *j)).copied().unwrap_or(1.0),

@@ -84,7 +84,7 @@ impl SweepPairs {
                     images.find_nearest(&mut d);
                     let d = d.map(|[d]| d);
                     if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < *range * *range {
-                        pairs.push_in_box(places.host(i), places.host(j), d, species);
+                        pairs.force.push(places.host(i), places.host(j), d, species);
                     }
                 }
             }
