@@ -3,7 +3,7 @@
 use crate::domain::PeriodicBox;
 
 /// A parallelepiped with its first edge along x and its second in the xy plane, as in LAMMPS.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct BoxGeometry {
     pub dimensions: usize,
     pub origin: [f64; 3],

@@ -31,7 +31,7 @@ impl SearchPlan {
 /// two dimensions a plane is one column, and planes follow each other along y. A particle pairs with
 /// later particles in its column, with the next column of its plane, and with three columns of the next
 /// plane: half of its neighbourhood, so that every pair is found once.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct CellGrid {
     pub cells_per_column: usize,
     pub columns_per_plane: usize,

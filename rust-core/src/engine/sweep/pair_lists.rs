@@ -56,7 +56,7 @@ impl PairLists {
         PairLists {
             set,
             dimensions,
-            cells: CellOrder::new(dimensions),
+            cells: CellOrder::default(),
             particles: SortedParticles::default(),
             buffers: Vec::new(),
             place: Vec::new(),

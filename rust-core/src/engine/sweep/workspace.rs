@@ -71,7 +71,7 @@ impl<P: PairPrecision> Workspace<P> {
         let threads = (0..threads).map(|_| ThreadState::new(terms.passes.len(), set)).collect();
         Workspace {
             fluid: FluidConstants { set, terms, variables },
-            order: CellOrder::new(plan.dimensions),
+            order: CellOrder::default(),
             particles: SortedParticles::default(),
             excluded: ExcludedPairs::default(),
             accumulators: AccumulatorArrays::default(),

@@ -27,7 +27,7 @@ const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
 /// The particles of each cell: in each plane owned particles come first, then ghosts. If planes are periodic, copies of
 /// the first plane follow the last plane.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct CellOrder {
     pub geometry: BoxGeometry,
     pub grid: CellGrid,
@@ -49,33 +49,6 @@ pub struct CellOrder {
 }
 
 impl CellOrder {
-    pub fn new(dimensions: usize) -> CellOrder {
-        CellOrder {
-            geometry: BoxGeometry::enclosing([0.0; 3], [1.0; 3], dimensions, 1.0),
-            grid: CellGrid {
-                cells_per_column: 1,
-                columns_per_plane: 1,
-                planes: 1,
-                column_axis: 1,
-                plane_axis: 2,
-                search_cutoff: 1.0,
-                range_half_width: 1.0,
-                layers: 1,
-                interior: [0, 1],
-                i_cluster_size: 4,
-                i_cluster_extent: 1.0,
-            },
-            fixed32: Vec::new(),
-            start: Vec::new(),
-            order: Vec::new(),
-            owned: 0,
-            all: 0,
-            cell: Vec::new(),
-            counts: Vec::new(),
-            sums: Vec::new(),
-        }
-    }
-
     /// Sorts the particles into the cells of `grid`: by cell, and within a cell by the host's number. Ghosts are in cells of
     /// their own.
     pub fn sort(
