@@ -29,12 +29,9 @@ pub struct PairLists {
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
-    /// Sorted index by index of the host, or [`NOWHERE`].
+    /// Sorted index by index of the host, by [`CellOrder::find_places`].
     place: Vec<u32>,
 }
-
-/// The sorted index of particles that are left out.
-pub const NOWHERE: u32 = u32::MAX;
 
 impl Clone for PairLists {
     /// Copies the order; the clone has scratch arrays of its own.
@@ -68,7 +65,7 @@ impl PairLists {
         &self.cells.order
     }
 
-    /// The sorted index of each particle of the host; [`NOWHERE`] for particles that are left out.
+    /// The sorted index of each particle of the host, beyond all for particles that are left out.
     pub fn place(&self) -> &[u32] {
         &self.place
     }
@@ -145,7 +142,7 @@ impl PairLists {
     /// Takes over the order of a sweep.
     pub fn follow(&mut self, cells: &CellOrder) {
         self.cells.order.clone_from(&cells.order);
-        self.find_places(cells.all);
+        cells.find_places(&mut self.place);
     }
 
     /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag
@@ -184,16 +181,7 @@ impl PairLists {
                 order[from - first..to - first].sort_unstable_by_key(|k| tags[*k as usize]);
             }
         });
-        self.find_places(tags.len());
-    }
-
-    /// Finds the sorted index of each of the host's particles.
-    fn find_places(&mut self, all: usize) {
-        self.place.clear();
-        self.place.resize(all, NOWHERE);
-        for (sorted, k) in self.cells.order.iter().enumerate() {
-            self.place[*k as usize] = sorted as u32;
-        }
+        self.cells.find_places(&mut self.place);
     }
 
     /// Fills the arrays in the order of cells.

@@ -25,6 +25,9 @@ pub use fractions::TWO_TO_32;
 /// Up to this number of particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
+/// The sorted index of particles that are left out.
+pub const NOWHERE: u32 = u32::MAX;
+
 /// The particles of each cell: in each plane owned particles come first, then ghosts. If planes are periodic, copies of
 /// the first plane follow the last plane.
 #[derive(Clone, Default)]
@@ -128,6 +131,15 @@ impl CellOrder {
             return Err(EngineError::Host("a rank has 2^25 particles and ghosts or more"));
         }
         Ok(())
+    }
+
+    /// Finds the sorted index of each of the host's particles; [`NOWHERE`] for those that are left out.
+    pub fn find_places(&self, place: &mut Vec<u32>) {
+        place.clear();
+        place.resize(self.all, NOWHERE);
+        for (sorted, k) in (0..).zip(&self.order) {
+            place[*k as usize] = sorted;
+        }
     }
 
     /// Number of particles.
