@@ -246,9 +246,16 @@ impl Sweep {
             return Err(EngineError::Host("the force array is too short"));
         }
         particles.check_images(images)?;
-        let input =
-            Input::new(&particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
-                .excluding(&self.exclusions);
+        let input = Input {
+            particles,
+            images,
+            v,
+            species_of_type: &self.species_of_type,
+            added_densities: &self.added_densities,
+            exclusions: Some(&self.exclusions),
+            thermostat,
+            totals: want.energy || want.virial,
+        };
         let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
         let listed = self.asked.take().filter(|_| can_list);
         self.has_listed = false;

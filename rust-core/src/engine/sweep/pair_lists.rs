@@ -19,7 +19,6 @@ use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
-use psidpd_passes::tally::Want;
 use psidpd_threads::{Pool, part};
 
 /// Sorted particles, and scratch arrays.
@@ -88,7 +87,8 @@ impl PairLists {
         [range, margin]: [f64; 2],
         planes: &mut Vec<PlanePairs>,
     ) -> Result<(), EngineError> {
-        let input = Input::new(particles, images, &[], species_of_kind, &[], None, Want::FORCES);
+        let input =
+            Input { particles: *particles, images, species_of_type: species_of_kind, ..Input::default() };
         let set = self.set;
         let range = self.range_within(domain, range, margin)?;
         let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
