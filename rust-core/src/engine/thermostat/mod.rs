@@ -20,6 +20,7 @@
 
 mod bodies;
 mod effort;
+mod encounter;
 mod exchange;
 mod forces;
 mod listed;
@@ -48,6 +49,7 @@ use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
+use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
 use listed::{FromForces, Listed};
 use masses::Masses;
@@ -65,7 +67,7 @@ pub enum Update {
     Midpoint,
     /// Drag alone, by the implicit Euler rule over all pairs: `(M + ½ΔtG) v′ = M v`.
     ImplicitDrag,
-    /// The exact Ornstein–Uhlenbeck process of each pair in turn; see `sequential.rs`.
+    /// The exact Ornstein–Uhlenbeck process of each pair in turn; see `encounter.rs`.
     OrnsteinUhlenbeck,
     /// Half an explicit and half an implicit step, for each pair in turn.
     Shardlow {
@@ -205,9 +207,9 @@ impl PairThermostat {
         match update {
             Update::Midpoint => self.implicit(pool, v, true),
             Update::ImplicitDrag => self.implicit(pool, v, false),
-            Update::OrnsteinUhlenbeck => self.ornstein_uhlenbeck(pool, v),
-            Update::Shardlow { reversed } => self.shardlow(pool, v, reversed),
-            Update::LoweAndersen => self.lowe_andersen(pool, v),
+            Update::OrnsteinUhlenbeck => self.in_turn(pool, v, ornstein_uhlenbeck, false, false),
+            Update::Shardlow { reversed } => self.in_turn(pool, v, shardlow, reversed, false),
+            Update::LoweAndersen => self.in_turn(pool, v, lowe_andersen, false, true),
         }
     }
 
