@@ -24,7 +24,6 @@ mod encounter;
 mod exchange;
 mod forces;
 mod listed;
-mod masses;
 mod measure;
 mod midpoint;
 mod of_forces;
@@ -52,8 +51,7 @@ use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
 use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
 use listed::{FromForces, Listed};
-use masses::Masses;
-use pass::Sums;
+use pass::{Sums, fill};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::plane::list::ListTerms;
@@ -90,7 +88,9 @@ pub struct PairThermostat {
     planes: Vec<PlanePairs>,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
-    masses: Masses,
+    /// Mass of each sorted particle; 0 where it is infinite.
+    inertia: Vec<f64>,
+    inverse_mass: Vec<f64>,
     sums: Sums,
     solution: Solution,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
@@ -124,7 +124,8 @@ impl PairThermostat {
             lists: PairLists::new(set, plan.dimensions),
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
-            masses: Masses::default(),
+            inertia: Vec::new(),
+            inverse_mass: Vec::new(),
             sums: Sums::default(),
             solution: Solution::default(),
             impulses: Vec::new(),
@@ -177,7 +178,12 @@ impl PairThermostat {
             lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
         }
         self.measure(pool, around.domain, particles, species_of_kind);
-        self.masses.sort(pool, self.lists.order(), mass);
+        let order = self.lists.order();
+        fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
+        fill(pool, &mut self.inertia, order, |k| {
+            let m = mass(k);
+            if m.is_finite() { m } else { 0.0 }
+        });
         Ok(())
     }
 
@@ -216,7 +222,7 @@ impl PairThermostat {
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let moving = self.masses.inertia.iter().filter(|m| **m > 0.0).count();
+        let moving = self.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
@@ -224,7 +230,7 @@ impl PairThermostat {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let inverse = self.masses.inverse[i] + self.masses.inverse[j];
+                let inverse = self.inverse_mass[i] + self.inverse_mass[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     squares += along * along / inverse;
