@@ -31,6 +31,7 @@ use super::solution::{End, Move, Progress, Solution, TOLERANCE, TOLERANCE_OF_DRA
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_threads::take;
 
 /// The data of one plane during a step of the solver.
 struct Share<'a> {
@@ -42,11 +43,6 @@ struct Share<'a> {
     inverse_mass: &'a [f64],
     residual: &'a mut [Wide],
     solution: &'a mut [Wide],
-}
-
-/// Takes the first `count` vectors off `rest`.
-fn first<'a>(rest: &mut &'a mut [Wide], count: usize) -> &'a mut [Wide] {
-    rest.split_off_mut(..count).unwrap_or_default()
 }
 
 impl PairThermostat {
@@ -63,7 +59,7 @@ impl PairThermostat {
             .zip(planes.iter())
             .map(|((image, below), plane)| {
                 let own = plane.own.clone();
-                let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
+                let [p, residual, solution] = rest.each_mut().map(|rest| take(rest, own.len()));
                 let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
                 (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
             })

@@ -8,6 +8,7 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{PairList, pairs_of_each};
 pub use psidpd_passes::plane::pair_sums::Wide;
 use psidpd_passes::plane::pair_sums::add_pairs;
+use psidpd_threads::take;
 
 /// The vectors of the particles, and the sums over their pairs.
 #[derive(Debug, Clone, Default)]
@@ -133,20 +134,8 @@ pub fn fill<T: Copy + Default + Send>(
     order: &[u32],
     value: impl Fn(usize) -> T + Sync,
 ) {
-    let (count, threads) = (order.len(), pool.threads());
-    to.resize(count, T::default());
-    let mut rest = &mut to[..];
-    let mut parts: Vec<_> = (0..threads)
-        .map(|number| {
-            let range = part(count, number, threads);
-            (rest.split_off_mut(..range.len()).unwrap_or_default(), &order[range])
-        })
-        .collect();
-    pool.each(&mut parts, |(to, order)| {
-        for (to, k) in to.iter_mut().zip(*order) {
-            *to = value(*k as usize);
-        }
-    });
+    to.resize(order.len(), T::default());
+    each_with(pool, to, order, |to, k| *to = value(k));
 }
 
 /// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not left out.
@@ -162,18 +151,25 @@ pub fn each_of_host(
     to: &mut [[f64; 3]],
     change: impl Fn(&mut [f64; 3], &Wide) + Sync,
 ) {
+    each_with(pool, to, place, |to, place| {
+        if let Some(from) = from.get(place) {
+            change(to, from);
+        }
+    });
+}
+
+/// Does `work` with each element of an array and its number, divided among the threads.
+fn each_with<T: Send>(pool: &Pool, to: &mut [T], numbers: &[u32], work: impl Fn(&mut T, usize) + Sync) {
     let (count, mut rest, threads) = (to.len(), to, pool.threads());
     let mut parts: Vec<_> = (0..threads)
         .map(|number| {
             let range = part(count, number, threads);
-            (rest.split_off_mut(..range.len()).unwrap_or_default(), &place[range])
+            (take(&mut rest, range.len()), &numbers[range])
         })
         .collect();
-    pool.each(&mut parts, |(to, place)| {
-        for (to, place) in to.iter_mut().zip(*place) {
-            if let Some(from) = from.get(*place as usize) {
-                change(to, from);
-            }
+    pool.each(&mut parts, |(to, numbers)| {
+        for (to, number) in to.iter_mut().zip(*numbers) {
+            work(to, *number as usize);
         }
     });
 }
