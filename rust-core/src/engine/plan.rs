@@ -8,7 +8,10 @@ use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SearchPlan;
+use psidpd_passes::ground::species_pairs::SpeciesPairTable;
+use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::noise::PairNoise;
+use psidpd_passes::simd::Scalar;
 use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
@@ -297,6 +300,18 @@ impl ThermostatPlan {
             gamma,
             range,
         })
+    }
+
+    /// The exponent of `w_R`, by pairs of species; pairs without drag may have any.
+    pub fn exponent_of_weights<T: Scalar>(&self) -> Exponent<T> {
+        let all = |e: f64| self.exponent.iter().zip(&self.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
+        if all(1.0) {
+            Exponent::One
+        } else if all(2.0) {
+            Exponent::Two
+        } else {
+            Exponent::Any(SpeciesPairTable::new(self.exponent.iter().map(|x| T::of(*x))))
+        }
     }
 }
 
