@@ -14,7 +14,6 @@ use crate::model::expression::TooLarge;
 use crate::model::pair::PairForm;
 use crate::model::{Fluid, PairTerm};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::tally::Tally;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Evaluates configurations of one fluid at one temperature.
@@ -118,13 +117,8 @@ impl Evaluator {
     fn of_pairs(&self, pairs: Pairs, mut pair_forces: Vec<f64>, species: &[i32]) -> Evaluation {
         let (owned, (densities, psi)) = (species.len(), self.excess(&pairs, species));
         let mut forces = vec![[0.0; 3]; owned];
-        let mut output = ForceOutput {
-            force: &mut forces,
-            particle_energy: &mut [],
-            particle_virial: &mut [],
-            pair_force: &mut pair_forces,
-            tally: Tally::default(),
-        };
+        let mut output =
+            ForceOutput { force: &mut forces, pair_force: &mut pair_forces, ..ForceOutput::default() };
         let input = ForceInput::conservative(&self.plan, &pairs.force, owned, &psi.slopes);
         add_forces(&input, &mut output);
         let tally = output.tally;

@@ -42,12 +42,13 @@ impl<'a> ForceInput<'a> {
     }
 }
 
-/// Arrays that a force pass adds to.
+/// Arrays that a force pass adds to; empty where they are not wanted.
+#[derive(Default)]
 pub struct ForceOutput<'a> {
     pub force: &'a mut [[f64; 3]],
     pub particle_energy: &'a mut [f64],
     pub particle_virial: &'a mut [[f64; 6]],
-    /// The conservative force of each pair along `ê_ij`, positive if repulsive; empty if it is not wanted.
+    /// The conservative force of each pair along `ê_ij`, positive if repulsive.
     pub pair_force: &'a mut [f64],
     pub tally: Tally,
 }

@@ -312,8 +312,7 @@ impl Evaluate for PairSums {
             force,
             particle_energy: &mut self.particle_energy,
             particle_virial: &mut self.particle_virial,
-            pair_force: &mut [],
-            tally: Tally::default(),
+            ..ForceOutput::default()
         };
         add_forces(&input, &mut output);
         let mut tally = output.tally;

@@ -137,13 +137,7 @@ impl Corrections {
             thermostat,
             want,
         };
-        let mut output = ForceOutput {
-            force: &mut force[..self.owned],
-            particle_energy: &mut [],
-            particle_virial: &mut [],
-            pair_force: &mut [],
-            tally: Tally::default(),
-        };
+        let mut output = ForceOutput { force: &mut force[..self.owned], ..ForceOutput::default() };
         add_forces(&input, &mut output);
         let tally = output.tally;
         // If one force is not finite, neither is the sum.
