@@ -167,11 +167,11 @@ impl Engine {
     /// # Errors
     /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        self.pair_sums.map_kinds(kinds)?;
+        self.pair_sums.plan.map_kinds(kinds)?;
         if let Some(device) = &mut self.device {
             device.map_kinds(kinds);
         }
-        self.sweep.sweep.map_kinds(kinds)
+        self.sweep.sweep.plan.map_kinds(kinds)
     }
 
     /// Makes later evaluations on a GPU, or on none, and returns the one before. The host then maps its types again.

@@ -37,6 +37,9 @@ pub struct Plan {
     /// Deliberate fault of the sweep, for tests.
     pub(super) fault: Option<Fault>,
     title: String,
+    /// The species of each of the host's types, negative for particles that do not interact; at first types are species
+    /// indices.
+    pub(super) species_of_type: Vec<i32>,
     /// Whether the forces have a potential.
     pub conservative: bool,
 }
@@ -132,6 +135,7 @@ impl Plan {
             pairs: fluid.pairs.clone(),
             thermostat: ThermostatPlan::new(fluid),
             title: fluid.title.clone(),
+            species_of_type: (0..fluid.species.len() as i32).collect(),
             conservative: fluid.is_conservative(),
         })
     }
@@ -179,12 +183,13 @@ impl Plan {
         self.thermostat.is_some()
     }
 
-    /// Fails for types that are mapped to a species out of range.
-    pub(super) fn check_kinds(&self, kinds: &[i32]) -> Result<(), EngineError> {
-        match kinds.iter().any(|s| *s >= self.species.len() as i32) {
-            true => Err(EngineError::Host("a type is mapped to a species the model does not have")),
-            false => Ok(()),
+    /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
+    pub(super) fn map_kinds(&mut self, species_of_type: &[i32]) -> Result<(), EngineError> {
+        if species_of_type.iter().any(|s| *s >= self.species.len() as i32) {
+            return Err(EngineError::Host("a type is mapped to a species the model does not have"));
         }
+        self.species_of_type = species_of_type.to_vec();
+        Ok(())
     }
 
     /// The noise of a step and its `Δt^{−1/2}`, if drag and noise act in it.

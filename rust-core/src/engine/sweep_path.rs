@@ -75,15 +75,9 @@ impl SweepPath {
     /// Computes the contributions of special pairs, and adds those to the densities.
     fn begin(&mut self, around: Around, request: &Request) -> Result<(), EngineError> {
         let SweepPath { sweep, special, corrections, excludes_special, .. } = self;
-        let (plan, species_of_type, exclusions, densities) = sweep.beside_mut();
+        let Sweep { plan, exclusions, added_densities, .. } = sweep;
         exclusions.check(request.particles.x.len())?;
-        corrections.find(
-            (plan, species_of_type),
-            (special, exclusions),
-            around,
-            &request.particles,
-            densities,
-        )?;
+        corrections.find(plan, (special, exclusions), around, &request.particles, added_densities)?;
         if !*excludes_special {
             exclusions.set(special);
             *excludes_special = true;

@@ -57,8 +57,7 @@ use special::scale;
 /// the arrays of the computation.
 #[derive(Debug, Clone, Default)]
 pub struct PairSums {
-    plan: Plan,
-    kinds: Vec<i32>,
+    pub(super) plan: Plan,
     search: CellSearch,
     box_search: BoxSearch,
     pairs: Pairs,
@@ -81,27 +80,15 @@ pub struct PairSums {
 }
 
 impl PairSums {
-    /// Creates the sums of a given plan; types are species indices unless [`PairSums::map_kinds`] maps them.
+    /// Creates the sums of a given plan.
     pub fn of_plan(plan: Plan) -> PairSums {
-        let kinds = (0..plan.species.len() as i32).collect();
-        PairSums { plan, kinds, ..PairSums::default() }
+        PairSums { plan, ..PairSums::default() }
     }
 
     /// Numbers of evaluations of ψ with a density below its bounds, and above, since the sums were
     /// created. Only densities that the particle's ψ depends on nonlinearly count.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         self.excess_pass.out_of_bounds
-    }
-
-    /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
-    /// particles that do not interact.
-    ///
-    /// # Errors
-    /// Fails for a species index out of range.
-    pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        self.plan.check_kinds(kinds)?;
-        self.kinds = kinds.to_vec();
-        Ok(())
     }
 
     /// Sets the pairs with reduced strength for later evaluations, by the host's numbers. Within the
@@ -184,7 +171,7 @@ impl PairSums {
         particles.check(31)?;
         self.species.clear();
         for ((kind, tag), x) in particles.kind.iter().zip(particles.tag).zip(particles.x) {
-            let species = usize::try_from(*kind).ok().and_then(|k| self.kinds.get(k));
+            let species = usize::try_from(*kind).ok().and_then(|k| self.plan.species_of_type.get(k));
             let Some(species) = species else { return Err(EngineError::Kind { tag: *tag, kind: *kind }) };
             if *tag < 1 {
                 return Err(EngineError::Tag { tag: *tag });

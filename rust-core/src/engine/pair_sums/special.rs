@@ -59,7 +59,7 @@ impl Corrections {
     /// Fails for a pair of particles that do not exist, and for a pair without an owned particle.
     pub fn find(
         &mut self,
-        (plan, species_of_type): (&Plan, &[i32]),
+        plan: &Plan,
         (special, exclusions): (&[SpecialPair], &Exclusions),
         around: Around,
         particles: &Particles,
@@ -73,7 +73,7 @@ impl Corrections {
         let is_periodic = domain.periodic() != [false; 3];
         let (squared, depth) = (plan.cutoff * plan.cutoff, if plan.dimensions == 2 { 0.0 } else { 1.0 });
         let square = |d: &[f64; 3]| d[0] * d[0] + d[1] * d[1] + depth * d[2] * d[2];
-        let species = |k: usize| species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
+        let species = |k: usize| plan.species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
         for pair in special {
             let (i, j) = (pair.i as usize, pair.j as usize);
             if i >= owned || j >= x.len() {
