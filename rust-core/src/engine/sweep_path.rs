@@ -18,9 +18,9 @@ pub struct SweepPath {
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
     corrections: Corrections,
-    /// ψ of owned particles and their densities in the last evaluation, if they have been fetched.
+    /// ψ of owned particles and their densities in the last evaluation, if they have been fetched or summed.
     excess: Vec<f64>,
-    densities: Vec<f64>,
+    pub densities: Vec<f64>,
 }
 
 impl SweepPath {
@@ -65,11 +65,6 @@ impl SweepPath {
             self.sweep.local_densities(&mut self.excess, &mut self.densities);
         }
         !self.densities.is_empty()
-    }
-
-    /// The densities of owned particles, for those that the sweep did not sum.
-    pub fn densities_mut(&mut self) -> &mut Vec<f64> {
-        &mut self.densities
     }
 
     /// Computes the contributions of special pairs, and adds those to the densities.

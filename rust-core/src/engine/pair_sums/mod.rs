@@ -73,7 +73,7 @@ pub struct PairSums {
     slopes: Vec<f64>,
     particle_energy: Vec<f64>,
     particle_virial: Vec<[f64; 6]>,
-    excess_pass: ExcessPass,
+    pub(super) excess_pass: ExcessPass,
     /// Number of runs of each pass.
     pub counts: PassCounts,
     owned: usize,
@@ -83,12 +83,6 @@ impl PairSums {
     /// Creates the sums of a given plan.
     pub fn of_plan(plan: Plan) -> PairSums {
         PairSums { plan, ..PairSums::default() }
-    }
-
-    /// Numbers of evaluations of ψ with a density below its bounds, and above, since the sums were
-    /// created. Only densities that the particle's ψ depends on nonlinearly count.
-    pub fn out_of_bounds(&self) -> [u64; 2] {
-        self.excess_pass.out_of_bounds
     }
 
     /// Sets the pairs with reduced strength for later evaluations, by the host's numbers. Within the

@@ -323,7 +323,7 @@ impl Sweep {
     /// The host's numbers of its particles in the order of cells; a host that keeps its particles in
     /// this order makes sorting cheap.
     pub fn order(&self) -> &[u32] {
-        with!(&self.workspace, m => m.order())
+        with!(&self.workspace, m => &m.order.order)
     }
 
     /// Size in bytes of the arrays over particles and pairs.

@@ -28,8 +28,8 @@ pub struct PairLists {
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
-    /// Sorted index by index of the host, by [`CellOrder::find_places`].
-    place: Vec<u32>,
+    /// The sorted index of each particle of the host, beyond all for particles that are left out.
+    pub place: Vec<u32>,
 }
 
 impl Clone for PairLists {
@@ -62,11 +62,6 @@ impl PairLists {
     /// The host's index of each sorted particle.
     pub fn order(&self) -> &[u32] {
         &self.cells.order
-    }
-
-    /// The sorted index of each particle of the host, beyond all for particles that are left out.
-    pub fn place(&self) -> &[u32] {
-        &self.place
     }
 
     /// Finds the pairs of `particles` within `range`, extended by the fraction `margin` where the box

@@ -31,7 +31,7 @@ impl PairThermostat {
                 own.iter().zip(below).map(|(a, b)| Wide([0, 1, 2, 3].map(|c| a[c] + b[c])))
             })
             .collect();
-        add_to_host(pool, lists.place(), &all, -factor, force);
+        add_to_host(pool, &lists.place, &all, -factor, force);
         virial
     }
 }

@@ -147,12 +147,12 @@ impl PairThermostat {
 
     /// Adds `p` to the velocities `v`: after the last iteration, δ without its residual.
     pub(super) fn add_direction(&self, pool: &Pool, v: &mut [[f64; 3]]) {
-        add_to_host(pool, self.lists.place(), &self.sums.p, 1.0, v);
+        add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, v);
     }
 
     /// Adds `factor` times the solution to the velocities `v`.
     pub(super) fn add_solution(&self, pool: &Pool, factor: f64, v: &mut [[f64; 3]]) {
-        add_to_host(pool, self.lists.place(), &self.solution.change, factor, v);
+        add_to_host(pool, &self.lists.place, &self.solution.change, factor, v);
     }
 
     /// The virial of drag at the velocities `v`, and of noise.

@@ -129,13 +129,13 @@ impl PairThermostat {
     }
 
     fn check(&self, vectors: &[[f64; 3]]) -> Result<(), EngineError> {
-        if vectors.len() == self.lists.place().len() { Ok(()) } else { Err(CHANGED) }
+        if vectors.len() == self.lists.place.len() { Ok(()) } else { Err(CHANGED) }
     }
 
     /// Asks for the direction of ghosts.
     fn show_direction(&mut self, pool: &Pool, vectors: &mut [[f64; 3]]) -> Need {
         let owned = &mut vectors[..self.exchange.owned];
-        each_of_host(pool, self.lists.place(), &self.sums.p, owned, |to, p| *to = [p[0], p[1], p[2]]);
+        each_of_host(pool, &self.lists.place, &self.sums.p, owned, |to, p| *to = [p[0], p[1], p[2]]);
         self.exchange.round = Round::Direction;
         Need::Ghosts
     }
@@ -147,7 +147,7 @@ impl PairThermostat {
     }
 
     fn take_ghosts(&mut self, vectors: &[[f64; 3]]) {
-        for ([x, y, z], place) in vectors.iter().zip(self.lists.place()).skip(self.exchange.owned) {
+        for ([x, y, z], place) in vectors.iter().zip(&self.lists.place).skip(self.exchange.owned) {
             // Particles that are left out have no place.
             if let Some(p) = self.sums.p.get_mut(*place as usize) {
                 *p = Wide([*x, *y, *z, 0.0]);
