@@ -323,24 +323,17 @@ impl ThermostatPlan {
 /// Prints the plan for `psidpd check` and the LAMMPS log.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = self.species.len();
-        writeln!(
-            f,
-            "fluid         {} ({}-D; species {})",
-            self.title,
-            self.dimensions,
-            self.species.join(", ")
-        )?;
-        writeln!(f, "cut-off       {}", self.cutoff)?;
+        let Plan { title, dimensions, cutoff, .. } = self;
+        let (count, species) = (self.species.len(), self.species.join(", "));
+        writeln!(f, "fluid         {title} ({dimensions}-D; species {species})")?;
+        writeln!(f, "cut-off       {cutoff}")?;
+        let kernel_of = |density: &WeightedDensity| {
+            let WeightedDensity { name, kernel, .. } = density;
+            format!("{name}: {} kernel, range {}", kernel.kind().name(), kernel.range())
+        };
         for &d in &self.passes {
             let density = &self.densities[d];
-            write!(
-                f,
-                "density pass  {}: {} kernel, range {}",
-                density.name,
-                density.kernel.kind().name(),
-                density.kernel.range()
-            )?;
+            write!(f, "density pass  {}", kernel_of(density))?;
             if density.force_kernel != density.kernel {
                 write!(f, "; force by the {} kernel: NOT CONSERVATIVE", density.force_kernel.kind().name())?;
             }
@@ -371,24 +364,14 @@ impl fmt::Display for Plan {
             SearchPlan::DEFAULT.sparse
         )?;
         for term in &self.linear {
-            let density = &self.densities[term.density];
-            writeln!(
-                f,
-                "pair term     psi is linear in {}: {} kernel, range {}, no density pass",
-                density.name,
-                density.kernel.kind().name(),
-                density.kernel.range()
-            )?;
+            let density = kernel_of(&self.densities[term.density]);
+            writeln!(f, "pair term     psi is linear in {density}, no density pass")?;
         }
         for term in &self.pairs {
             use crate::model::pair::PairForm;
             let [a, b] = term.between.map(|s| &self.species[s]);
-            writeln!(
-                f,
-                "pair term     {a}-{b}: {}, range {}",
-                term.potential.name(),
-                term.potential.range()
-            )?;
+            let (form, range) = (term.potential.name(), term.potential.range());
+            writeln!(f, "pair term     {a}-{b}: {form}, range {range}")?;
         }
         // With one species n is its density; with several there are n_A, n_B …
         let names: Vec<String> = self
@@ -410,13 +393,8 @@ impl fmt::Display for Plan {
                     let what = if stated.is_some() { "energy" } else { "psi" };
                     writeln!(f, "{:<13} {}", format!("{what} of {name}"), plan.formula.with_names(&names))?;
                     for (variable, slope) in stated.into_iter().flatten() {
-                        writeln!(
-                            f,
-                            "{:<13} {}: {}; NOT CONSERVATIVE",
-                            format!("slope of {name}"),
-                            names[variable],
-                            slope.with_names(&names)
-                        )?;
+                        let (of, slope) = (format!("slope of {name}"), slope.with_names(&names));
+                        writeln!(f, "{of:<13} {}: {slope}; NOT CONSERVATIVE", names[variable])?;
                     }
                 }
                 ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
