@@ -22,6 +22,7 @@ use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs}
 use psidpd_threads::{Pool, part};
 
 /// Sorted particles, and scratch arrays.
+#[derive(Debug, Default)]
 pub struct PairLists {
     set: InstructionSet,
     dimensions: usize,
@@ -35,28 +36,18 @@ pub struct PairLists {
 impl Clone for PairLists {
     /// Copies the order; the clone has scratch arrays of its own.
     fn clone(&self) -> PairLists {
-        let PairLists { set, dimensions, cells, particles, place, .. } = self;
         PairLists {
-            set: *set,
-            dimensions: *dimensions,
-            cells: cells.clone(),
-            particles: particles.clone(),
-            buffers: Vec::new(),
-            place: place.clone(),
+            cells: self.cells.clone(),
+            particles: self.particles.clone(),
+            place: self.place.clone(),
+            ..PairLists::new(self.set, self.dimensions)
         }
     }
 }
 
 impl PairLists {
     pub fn new(set: InstructionSet, dimensions: usize) -> PairLists {
-        PairLists {
-            set,
-            dimensions,
-            cells: CellOrder::default(),
-            particles: SortedParticles::default(),
-            buffers: Vec::new(),
-            place: Vec::new(),
-        }
+        PairLists { set, dimensions, ..PairLists::default() }
     }
 
     /// The host's index of each sorted particle.

@@ -77,7 +77,7 @@ pub enum Update {
 }
 
 /// Drag and noise of the pairs of one fluid.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct PairThermostat {
     plan: ThermostatPlan,
     dimensions: usize,
@@ -102,12 +102,6 @@ pub struct PairThermostat {
     exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
-}
-
-impl std::fmt::Debug for PairThermostat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("PairThermostat").field("kt", &self.kt).field("dt", &self.dt).finish_non_exhaustive()
-    }
 }
 
 impl PairThermostat {

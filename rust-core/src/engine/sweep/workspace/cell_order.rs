@@ -30,7 +30,7 @@ pub const NOWHERE: u32 = u32::MAX;
 
 /// The particles of each cell: in each plane owned particles come first, then ghosts. If planes are periodic, copies of
 /// the first plane follow the last plane.
-#[derive(Clone, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct CellOrder {
     pub geometry: BoxGeometry,
     pub grid: CellGrid,
