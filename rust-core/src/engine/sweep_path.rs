@@ -11,7 +11,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
 
 /// The forces of one fluid by a sweep, with special pairs.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct SweepPath {
     pub sweep: Sweep,
     pub special: Vec<SpecialPair>,

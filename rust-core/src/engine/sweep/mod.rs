@@ -98,13 +98,6 @@ impl std::fmt::Debug for Sweep {
     }
 }
 
-impl Clone for Sweep {
-    /// Creates a new sweep for the same fluid, with the same threads, before any evaluation.
-    fn clone(&self) -> Sweep {
-        Sweep::of_plan(self.plan.clone(), self.settings, self.pool.clone())
-    }
-}
-
 impl Sweep {
     /// Creates a sweep for `fluid`, whose types are species indices.
     ///

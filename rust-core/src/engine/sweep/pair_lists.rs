@@ -33,18 +33,6 @@ pub struct PairLists {
     pub place: Vec<u32>,
 }
 
-impl Clone for PairLists {
-    /// Copies the order; the clone has scratch arrays of its own.
-    fn clone(&self) -> PairLists {
-        PairLists {
-            cells: self.cells.clone(),
-            particles: self.particles.clone(),
-            place: self.place.clone(),
-            ..PairLists::new(self.set, self.dimensions)
-        }
-    }
-}
-
 impl PairLists {
     pub fn new(set: InstructionSet, dimensions: usize) -> PairLists {
         PairLists { set, dimensions, ..PairLists::default() }

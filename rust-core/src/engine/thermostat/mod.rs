@@ -77,7 +77,7 @@ pub enum Update {
 }
 
 /// Drag and noise of the pairs of one fluid.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct PairThermostat {
     plan: ThermostatPlan,
     dimensions: usize,
