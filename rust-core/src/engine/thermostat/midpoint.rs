@@ -25,25 +25,13 @@
 //! known from the coefficients of the iterations; they then go on until it is below 1 %.
 
 use super::PairThermostat;
-use super::particle_loops::{Advance, Finish, Multiply, Start};
+use super::particle_loops::{Advance, Finish, Multiply, Share, Start};
 use super::pass::{Sums, Wide, add_to_host, virial};
 use super::solution::{End, Move, Progress, Solution, TOLERANCE, TOLERANCE_OF_DRAG};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_threads::take;
-
-/// The data of one plane during a step of the solver.
-struct Share<'a> {
-    p: &'a mut [Wide],
-    /// Sums over pairs, of the plane itself and of the plane below.
-    image: &'a mut [Wide],
-    below: &'a [Wide],
-    inertia: &'a [f64],
-    inverse_mass: &'a [f64],
-    residual: &'a mut [Wide],
-    solution: &'a mut [Wide],
-}
 
 impl PairThermostat {
     /// Does `work` for every plane; returns the sums of the scalar products, in the order of the planes.
@@ -101,10 +89,7 @@ impl PairThermostat {
         }
         sums.gather(pool, lists.order(), v);
         sums.compute(pool, *set, planes, if noise { kt.sqrt() } else { 0.0 });
-        let [first, _] =
-            self.on_planes(pool, |Share { p, image: own, below, inverse_mass, residual, .. }, set| {
-                [vectors::run(set, Start { inverse_mass, own, below, residual, p }), 0.0]
-            });
+        let [first, _] = self.on_planes(pool, |share, set| [vectors::run(set, Start(share)), 0.0]);
         first
     }
 
@@ -112,9 +97,7 @@ impl PairThermostat {
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
         self.sums.compute(pool, self.set, &self.planes, 0.0);
-        self.on_planes(pool, |Share { p, image, below, inertia, inverse_mass, .. }, set| {
-            vectors::run(set, Multiply { p, inertia, inverse_mass, image, below })
-        })
+        self.on_planes(pool, |share, set| vectors::run(set, Multiply(share)))
     }
 
     /// Moves along the direction, and computes the next one; returns false after the last iteration. The totals are the
@@ -128,17 +111,10 @@ impl PairThermostat {
         if let Some(end) = outcome {
             self.effort.add(self.iterations(), self.from_forces.are_present, end == End::Inaccurate);
         }
-        self.on_planes(pool, |Share { p, image, inverse_mass, residual, solution, .. }, set| {
+        self.on_planes(pool, |share, set| {
             match outcome {
-                None => {
-                    let advance =
-                        Advance { is_first, alpha, beta, inverse_mass, image, solution, residual, p };
-                    vectors::run(set, advance);
-                }
-                Some(_) => {
-                    let finish = Finish { is_first, alpha, rest, inverse_mass, p, image, residual, solution };
-                    vectors::run(set, finish);
-                }
+                None => vectors::run(set, Advance { share, is_first, alpha, beta }),
+                Some(_) => vectors::run(set, Finish { share, is_first, alpha, rest }),
             }
             [0.0; 2]
         });
