@@ -57,13 +57,6 @@ impl BoxGeometry {
         self
     }
 
-    /// Whether a point is inside the box along all open directions.
-    #[inline(always)]
-    pub fn contains(&self, x: &[f64; 3]) -> bool {
-        (0..self.dimensions)
-            .all(|c| self.periodic[c] || (0.0..=self.length[c]).contains(&(x[c] - self.origin[c])))
-    }
-
     pub fn is_fully_periodic(&self) -> bool {
         self.periodic[..self.dimensions].iter().all(|p| *p)
     }

@@ -247,11 +247,6 @@ impl PairThermostat {
     pub fn effort(&self) -> Effort {
         self.effort
     }
-
-    /// Number of pairs in range.
-    pub fn pairs(&self) -> usize {
-        self.planes.iter().map(|plane| plane.lists.own.count() + plane.lists.with_ghosts.count()).sum()
-    }
 }
 
 /// Temperature of the particles as the thermostat measures it, and its rate.
