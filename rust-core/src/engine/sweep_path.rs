@@ -80,11 +80,6 @@ impl SweepPath {
         Ok(())
     }
 
-    /// Adds the forces of special pairs to those of a sweep, whose slopes are complete.
-    fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
-        self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)
-    }
-
     /// Stores the densities if the request includes them.
     fn fetch(&mut self, want: Want) {
         if want.densities {
@@ -94,7 +89,7 @@ impl SweepPath {
 
     /// Size in bytes of the arrays over particles and pairs.
     pub fn memory(&self) -> usize {
-        let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.memory();
+        let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.pairs.bytes();
         let numbers = self.excess.capacity() + self.densities.capacity();
         self.sweep.memory() + special + numbers * size_of::<f64>()
     }
@@ -110,9 +105,9 @@ impl Evaluate for SweepPath {
     ) -> Result<Tally, EngineError> {
         self.begin(Around { domain, images: &[] }, request)?;
         let mut tally = self.sweep.evaluate(domain, request, force, add)?;
-        if !self.corrections.is_empty() {
+        if self.corrections.pairs.len() > 0 {
             self.sweep.fetch_slopes(request.particles.owned);
-            tally += self.correct(request, force)?;
+            tally += self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)?;
         }
         self.fetch(request.want);
         let factor = Fault::factor(Fault::Virial, self.sweep.plan.fault);
@@ -137,8 +132,8 @@ impl Evaluate for SweepPath {
 
     fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         let mut tally = self.sweep.second(&request.particles, force)?;
-        if !self.corrections.is_empty() {
-            tally += self.correct(request, force)?;
+        if self.corrections.pairs.len() > 0 {
+            tally += self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)?;
         }
         self.fetch(request.want);
         Ok(tally)

@@ -47,7 +47,7 @@ pub fn scale(
 #[derive(Debug, Clone, Default)]
 pub struct Corrections {
     /// Special pairs within the cut-off with a factor above 0.
-    pairs: PairList,
+    pub pairs: PairList,
     owned: usize,
 }
 
@@ -107,11 +107,6 @@ impl Corrections {
         Ok(())
     }
 
-    /// Whether there are no contributions.
-    pub fn is_empty(&self) -> bool {
-        self.pairs.len() == 0
-    }
-
     /// Adds the forces on owned particles, and returns the contribution to the totals. A pair with a
     /// ghost counts half, as in a sweep.
     ///
@@ -140,21 +135,11 @@ impl Corrections {
         let mut output = ForceOutput { force: &mut force[..self.owned], ..ForceOutput::default() };
         add_forces(&input, &mut output);
         let tally = output.tally;
-        // If one force is not finite, neither is the sum.
-        let of = |list: &[u32]| list.iter().filter_map(|k| force.get(*k as usize)).flatten().sum::<f64>();
-        if (of(&self.pairs.i) + of(&self.pairs.j)).is_finite() {
-            return Ok(tally);
-        }
         let members = self.pairs.i.iter().chain(&self.pairs.j).map(|k| *k as usize);
         let is_lost = |k: &usize| *k < self.owned && !force[*k].iter().all(|f| f.is_finite());
         match members.filter(is_lost).map(|k| particles.tag[k]).min() {
             None => Ok(tally),
             Some(tag) => Err(EngineError::Force { tag }),
         }
-    }
-
-    /// Size in bytes of the arrays over pairs.
-    pub fn memory(&self) -> usize {
-        self.pairs.bytes()
     }
 }
