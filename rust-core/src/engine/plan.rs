@@ -7,7 +7,7 @@ use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
-use psidpd_passes::ground::cell_grid::SearchPlan;
+use psidpd_passes::ground::cell_grid::SPARSE;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::noise::PairNoise;
@@ -360,8 +360,8 @@ impl fmt::Display for Plan {
         }
         writeln!(
             f,
-            "pair search   i-clusters of 4 particles; of 8 in columns with fewer than {} particles per cut-off",
-            SearchPlan::DEFAULT.sparse
+            "pair search   i-clusters of 4 particles; of 8 in columns with fewer than {SPARSE} particles \
+             per cut-off"
         )?;
         for term in &self.linear {
             let density = kernel_of(&self.densities[term.density]);
