@@ -68,19 +68,8 @@ pub struct ThermostatPlan {
     pub longest: f64,
 }
 
-/// Storage of the pairs that the first pass finds for the second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PairStorage {
-    /// For each density, a compact list of the pairs within its range.
-    InRange,
-    /// A cache of all pairs with their separations and forces: each force is added once, in the second pass.
-    FullCache,
-}
-
-impl PairStorage {
-    /// The full cache is faster if a density's range exceeds this fraction of the cutoff; otherwise the list is short.
-    pub const FULL_CACHE_FROM: f64 = 0.7;
-}
+/// The full pair cache is faster if a density's range exceeds this fraction of the cutoff; otherwise lists are short.
+const FULL_CACHE_FROM: f64 = 0.7;
 
 impl Plan {
     /// Derives the plan of a fluid.
@@ -155,12 +144,12 @@ impl Plan {
         without_linear(fluid, alpha, &self.passes, psi.clone())
     }
 
-    /// Storage of pairs for the second pass, if there is one.
-    pub fn pair_storage(&self) -> Option<PairStorage> {
-        let longest = self.passes.iter().map(|d| self.densities[*d].force_kernel.range()).reduce(f64::max)?;
+    /// Whether the first pass caches all pairs with their separations and forces, so that each force is added once, in the
+    /// second pass; otherwise it lists the pairs within the range of each density.
+    pub fn caches_all_pairs(&self) -> bool {
+        let ranges = self.passes.iter().map(|d| self.densities[*d].force_kernel.range());
         // With one variable the density is added together with the force, and the cache saves nothing.
-        let full = self.slope_width() > 1 && longest > PairStorage::FULL_CACHE_FROM * self.cutoff;
-        Some(if full { PairStorage::FullCache } else { PairStorage::InRange })
+        self.slope_width() > 1 && ranges.fold(0.0, f64::max) > FULL_CACHE_FROM * self.cutoff
     }
 
     /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear in.
@@ -347,16 +336,11 @@ impl fmt::Display for Plan {
             }
             writeln!(f)?;
         }
-        match self.pair_storage() {
-            None => {}
-            Some(PairStorage::InRange) => {
-                writeln!(f, "second pass   over compact lists of the pairs in range of each density")?;
-            }
-            Some(PairStorage::FullCache) => writeln!(
-                f,
-                "second pass   over all pairs, kept in full: a density reaches further than {} of the cut-off",
-                PairStorage::FULL_CACHE_FROM
-            )?,
+        if self.caches_all_pairs() {
+            write!(f, "second pass   over all pairs, kept in full: a density reaches further than ")?;
+            writeln!(f, "{FULL_CACHE_FROM} of the cut-off")?;
+        } else if !self.passes.is_empty() {
+            writeln!(f, "second pass   over compact lists of the pairs in range of each density")?;
         }
         writeln!(
             f,

@@ -1,7 +1,7 @@
 //! The plan of a fluid as tables of numbers in the precision of the pairs.
 
 use crate::engine::fault::Fault;
-use crate::engine::plan::{PairStorage, Plan};
+use crate::engine::plan::Plan;
 use crate::model::PairTerm;
 use crate::model::kernel::Kernel;
 use crate::model::pair::{PairForm, PairPotential, SplineAttractive};
@@ -51,7 +51,7 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
             pass(&density.kernel, &density.force_kernel, factor(Fault::ManyBodyForce))
         })
         .collect();
-    terms.full_cache = plan.pair_storage() == Some(PairStorage::FullCache);
+    terms.full_cache = plan.caches_all_pairs();
     terms.thermostat = plan.thermostat.as_ref().map(|t| ThermostatTables {
         gamma: SpeciesPairTable::new(t.gamma.iter().map(|x| T::of(factor(Fault::Drag) * x))),
         sigma: SpeciesPairTable::new(t.sigma.iter().map(|x| T::of(factor(Fault::Noise) * x))),
