@@ -71,10 +71,11 @@ impl PairThermostat {
         let mut virial = [0.0; 6];
         if self.wants_virial {
             let mut at = v.to_vec();
-            self.add_direction(pool, &mut at);
+            // After the last iteration, `p` is δ without its residual.
+            add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut at);
             virial = self.virial_at(pool, &at, noise);
         }
-        self.add_solution(pool, factor, v);
+        add_to_host(pool, &self.lists.place, &self.solution.change, factor, v);
         virial
     }
 
@@ -119,16 +120,6 @@ impl PairThermostat {
             [0.0; 2]
         });
         outcome.is_none()
-    }
-
-    /// Adds `p` to the velocities `v`: after the last iteration, δ without its residual.
-    pub(super) fn add_direction(&self, pool: &Pool, v: &mut [[f64; 3]]) {
-        add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, v);
-    }
-
-    /// Adds `factor` times the solution to the velocities `v`.
-    pub(super) fn add_solution(&self, pool: &Pool, factor: f64, v: &mut [[f64; 3]]) {
-        add_to_host(pool, &self.lists.place, &self.solution.change, factor, v);
     }
 
     /// The virial of drag at the velocities `v`, and of noise.

@@ -6,7 +6,7 @@
 
 use super::PairThermostat;
 use super::exchange::Round;
-use super::pass::{Wide, each_of_host};
+use super::pass::{Wide, add_to_host, each_of_host};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
@@ -115,7 +115,7 @@ impl PairThermostat {
                 true => Ok(self.show_direction(pool, vectors)),
                 false if self.wants_virial => {
                     vectors[..v.len()].copy_from_slice(v);
-                    self.add_direction(pool, &mut vectors[..v.len()]);
+                    add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut vectors[..v.len()]);
                     self.exchange.round = Round::Middle;
                     Ok(Need::Ghosts)
                 }
@@ -141,7 +141,7 @@ impl PairThermostat {
     }
 
     fn end(&mut self, pool: &Pool, v: &mut [[f64; 3]], virial: [f64; 6]) -> Need {
-        self.add_solution(pool, 2.0, v);
+        add_to_host(pool, &self.lists.place, &self.solution.change, 2.0, v);
         self.exchange.round = Round::Start;
         Need::Nothing(virial)
     }
