@@ -278,17 +278,8 @@ impl Evaluate for PairSums {
         self.counts.noise += thermostat.is_some() as u64;
         self.counts.energy += (want.energy || want.particle_energy) as u64;
         self.counts.virial += (want.virial || want.particle_virial) as u64;
-        let input = ForceInput {
-            plan: &self.plan,
-            list: &self.pairs.force,
-            newton,
-            owned: self.owned,
-            slopes: &self.slopes,
-            v,
-            tag: particles.tag,
-            thermostat,
-            want,
-        };
+        let (plan, list, slopes) = (&self.plan, &self.pairs.force, &self.slopes[..]);
+        let input = ForceInput { plan, list, newton, slopes, request: *request, thermostat };
         let mut output = ForceOutput {
             force,
             particle_energy: &mut self.particle_energy,

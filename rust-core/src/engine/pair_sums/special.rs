@@ -48,7 +48,6 @@ pub fn scale(
 pub struct Corrections {
     /// Special pairs within the cut-off with a factor above 0.
     pub pairs: PairList,
-    owned: usize,
 }
 
 impl Corrections {
@@ -66,7 +65,6 @@ impl Corrections {
         densities: &mut Vec<f64>,
     ) -> Result<(), EngineError> {
         self.pairs.clear();
-        self.owned = particles.owned;
         densities.clear();
         let Particles { x, kind, owned, .. } = *particles;
         let Around { domain, images } = around;
@@ -98,10 +96,10 @@ impl Corrections {
         }
         if self.pairs.len() > 0 {
             let width = plan.slope_width();
-            densities.resize(width * self.owned, 0.0);
+            densities.resize(width * owned, 0.0);
             for (k, density) in plan.passes.iter().enumerate() {
                 let kernel = &plan.densities[*density].kernel;
-                add_density(&self.pairs, kernel, self.owned, densities, width, k * plan.species.len());
+                add_density(&self.pairs, kernel, owned, densities, width, k * plan.species.len());
             }
         }
         Ok(())
@@ -119,24 +117,15 @@ impl Corrections {
         request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<Tally, EngineError> {
-        let Request { particles, v, step, want } = *request;
+        let Request { particles, v, step, .. } = *request;
+        let (list, newton) = (&self.pairs, Newton::Off);
         let thermostat = plan.noise_of(step, v, particles.x.len())?;
-        let input = ForceInput {
-            plan,
-            list: &self.pairs,
-            newton: Newton::Off,
-            owned: self.owned,
-            slopes,
-            v,
-            tag: particles.tag,
-            thermostat,
-            want,
-        };
-        let mut output = ForceOutput { force: &mut force[..self.owned], ..ForceOutput::default() };
+        let input = ForceInput { plan, list, newton, slopes, request: *request, thermostat };
+        let mut output = ForceOutput { force: &mut force[..particles.owned], ..ForceOutput::default() };
         add_forces(&input, &mut output);
         let tally = output.tally;
         let members = self.pairs.i.iter().chain(&self.pairs.j).map(|k| *k as usize);
-        let is_lost = |k: &usize| *k < self.owned && !force[*k].iter().all(|f| f.is_finite());
+        let is_lost = |k: &usize| *k < particles.owned && !force[*k].iter().all(|f| f.is_finite());
         match members.filter(is_lost).map(|k| particles.tag[k]).min() {
             None => Ok(tally),
             Some(tag) => Err(EngineError::Force { tag }),
