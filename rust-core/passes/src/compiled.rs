@@ -49,13 +49,13 @@ macro_rules! precisions {
             unsafe fn first(passes: &Passes<$precision>, pass: First<$precision>) -> Tally {
                 // SAFETY: the scheduler starts a first pass after it has filled this plane and the next, and
                 // lets no other thread have its sums.
-                unsafe { passes.first(pass) }
+                unsafe { passes.run(pass) }
             }
 
             #[inline(never)]
             unsafe fn second(passes: &Passes<$precision>, pass: Second<$precision>) {
                 // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
-                unsafe { passes.second(pass) }
+                unsafe { passes.run(pass) }
             }
         }
     )+};
@@ -77,30 +77,19 @@ impl<P: PairPrecision> Passes<P> {
         Passes { set, multispecies: terms.species > 1 || terms.full_cache, tally, precision: PhantomData }
     }
 
-    /// Runs the loops of the first pass for this fluid.
+    /// Runs the loops of a pass for this fluid.
     ///
     /// # Safety
-    /// The caller fulfils the contract of [`first_pass`].
+    /// The caller fulfils the contract of the pass.
     #[inline(always)]
-    unsafe fn first(&self, pass: First<P>) -> Tally {
-        // SAFETY: the caller fulfils the contract of `first_pass`; `set` exists only for instructions of this processor.
-        unsafe {
-            match (self.multispecies, self.tally) {
-                (false, false) => run(self.set, With::<_, false, false>(pass)),
-                (false, true) => run(self.set, With::<_, false, true>(pass)),
-                (true, false) => run(self.set, With::<_, true, false>(pass)),
-                (true, true) => run(self.set, With::<_, true, true>(pass)),
-            }
-        }
-    }
-
-    /// Runs the loops of the second pass for this fluid.
-    ///
-    /// # Safety
-    /// The caller fulfils the contract of [`second_pass`].
-    #[inline(always)]
-    unsafe fn second(&self, pass: Second<P>) {
-        // SAFETY: the caller fulfils the contract of `second_pass`; `set` exists only for instructions of this processor.
+    unsafe fn run<K, O>(&self, pass: K) -> O
+    where
+        With<K, false, false>: Kernel<Out = O>,
+        With<K, false, true>: Kernel<Out = O>,
+        With<K, true, false>: Kernel<Out = O>,
+        With<K, true, true>: Kernel<Out = O>,
+    {
+        // SAFETY: the caller fulfils the contract of the pass; `set` exists only for instructions of this processor.
         unsafe {
             match (self.multispecies, self.tally) {
                 (false, false) => run(self.set, With::<_, false, false>(pass)),

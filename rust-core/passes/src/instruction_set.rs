@@ -21,3 +21,9 @@ impl InstructionSet {
         self.0
     }
 }
+
+impl Default for InstructionSet {
+    fn default() -> InstructionSet {
+        InstructionSet::best()
+    }
+}

@@ -28,17 +28,6 @@ impl Want {
     pub const ALL: Want =
         Want { particle_energy: true, particle_virial: true, densities: true, ..Want::TOTALS };
 
-    /// The results that either of the two asks for.
-    pub fn or(self, other: Want) -> Want {
-        Want {
-            energy: self.energy || other.energy,
-            virial: self.virial || other.virial,
-            particle_energy: self.particle_energy || other.particle_energy,
-            particle_virial: self.particle_virial || other.particle_virial,
-            densities: self.densities || other.densities,
-        }
-    }
-
     /// Whether energies or virials of each particle are asked for.
     pub fn of_particles(self) -> bool {
         self.particle_energy || self.particle_virial

@@ -49,7 +49,7 @@ struct BoundedVariable {
 }
 
 /// Scratch arrays of [`ExcessPlan::evaluate`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ExcessWork {
     set: InstructionSet,
     registers: Vec<f64>,
@@ -158,17 +158,7 @@ impl ExcessPlan {
 impl ExcessWork {
     /// Creates scratch arrays for an instruction set.
     pub fn new(set: InstructionSet) -> ExcessWork {
-        ExcessWork {
-            set,
-            registers: Vec::new(),
-            point: Vec::new(),
-            expansion: Expansion::default(),
-            strays: Vec::new(),
-            moved: Vec::new(),
-            totals: Vec::new(),
-            beyond: Vec::new(),
-            curve: CurveBlock::default(),
-        }
+        ExcessWork { set, ..ExcessWork::default() }
     }
 
     /// The densities at which a formula was last evaluated when it was asked for `at`.

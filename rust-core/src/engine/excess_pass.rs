@@ -12,7 +12,7 @@ pub const LANES: usize = 128;
 const LISTED: usize = LANES + LANES / 2;
 
 /// Scratch arrays for evaluating ψ in lanes, and counts.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ExcessPass {
     at: Vec<f64>,
     correction: Vec<f64>,
@@ -81,24 +81,10 @@ impl<'a> Lanes<'a> {
     }
 }
 
-impl Default for ExcessPass {
-    fn default() -> ExcessPass {
-        ExcessPass::new(InstructionSet::best())
-    }
-}
-
 impl ExcessPass {
     /// Creates a pass with loops for an instruction set; results do not depend on it.
     pub fn new(set: InstructionSet) -> ExcessPass {
-        ExcessPass {
-            at: Vec::new(),
-            correction: Vec::new(),
-            psi: Vec::new(),
-            slopes: Vec::new(),
-            work: ExcessWork::new(set),
-            out_of_bounds: [0; 2],
-            evaluations: 0,
-        }
+        ExcessPass { work: ExcessWork::new(set), ..ExcessPass::default() }
     }
 
     /// Evaluates ψ and its slopes for the particles of `rows`. `species` is negative for particles

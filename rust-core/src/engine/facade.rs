@@ -152,7 +152,7 @@ impl Engine {
     /// Times and counts of the engine's work since it was made.
     pub fn statistics(&self) -> Statistics {
         let (sweep, sums) = (&self.sweep.sweep, &self.pair_sums);
-        let (a, b) = (sums.out_of_bounds(), sweep.out_of_bounds());
+        let (a, b) = (sums.excess_pass.out_of_bounds, sweep.out_of_bounds());
         let c = self.device.as_ref().map_or([0; 2], |device| device.out_of_bounds());
         Statistics {
             times: sweep.times,
@@ -167,11 +167,11 @@ impl Engine {
     /// # Errors
     /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        self.pair_sums.map_kinds(kinds)?;
+        self.pair_sums.plan.map_kinds(kinds)?;
         if let Some(device) = &mut self.device {
             device.map_kinds(kinds);
         }
-        self.sweep.sweep.map_kinds(kinds)
+        self.sweep.sweep.plan.map_kinds(kinds)
     }
 
     /// Makes later evaluations on a GPU, or on none, and returns the one before. The host then maps its types again.
@@ -365,15 +365,15 @@ impl Engine {
             // The list of pairs still exists.
             Some(Path::PairSums(_)) => return self.pair_sums.sum_all_densities(None),
             Some(Path::Sweep) if self.sweep.fetch_densities() => {}
-            Some(Path::Device) if !self.sweep.densities_mut().is_empty() => {}
+            Some(Path::Device) if !self.sweep.densities.is_empty() => {}
             Some(Path::Sweep | Path::Device) => {
                 self.tell_pair_sums();
                 let all = self.pair_sums.sum_all_densities(Some((surroundings, particles)))?;
-                self.sweep.densities_mut().extend_from_slice(all);
+                self.sweep.densities.extend_from_slice(all);
             }
             None => {
                 let variables = self.plan().densities().count() * self.plan().species.len();
-                self.sweep.densities_mut().resize(particles.owned * variables, 0.0);
+                self.sweep.densities.resize(particles.owned * variables, 0.0);
             }
         }
         Ok(self.results().densities)

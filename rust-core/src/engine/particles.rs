@@ -3,7 +3,7 @@
 use super::error::EngineError;
 
 /// The host's particles: owned ones first, then ghosts. All slices have one length.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Particles<'a> {
     /// Number of owned particles.
     pub owned: usize,

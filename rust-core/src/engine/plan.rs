@@ -7,8 +7,11 @@ use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
-use psidpd_passes::ground::cell_grid::SearchPlan;
+use psidpd_passes::ground::cell_grid::SPARSE;
+use psidpd_passes::ground::species_pairs::SpeciesPairTable;
+use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::noise::PairNoise;
+use psidpd_passes::simd::Scalar;
 use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
@@ -34,6 +37,9 @@ pub struct Plan {
     /// Deliberate fault of the sweep, for tests.
     pub(super) fault: Option<Fault>,
     title: String,
+    /// The species of each of the host's types, negative for particles that do not interact; at first types are species
+    /// indices.
+    pub(super) species_of_type: Vec<i32>,
     /// Whether the forces have a potential.
     pub conservative: bool,
 }
@@ -62,19 +68,8 @@ pub struct ThermostatPlan {
     pub longest: f64,
 }
 
-/// Storage of the pairs that the first pass finds for the second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PairStorage {
-    /// For each density, a compact list of the pairs within its range.
-    InRange,
-    /// A cache of all pairs with their separations and forces: each force is added once, in the second pass.
-    FullCache,
-}
-
-impl PairStorage {
-    /// The full cache is faster if a density's range exceeds this fraction of the cutoff; otherwise the list is short.
-    pub const FULL_CACHE_FROM: f64 = 0.7;
-}
+/// The full pair cache is faster if a density's range exceeds this fraction of the cutoff; otherwise lists are short.
+const FULL_CACHE_FROM: f64 = 0.7;
 
 impl Plan {
     /// Derives the plan of a fluid.
@@ -129,6 +124,7 @@ impl Plan {
             pairs: fluid.pairs.clone(),
             thermostat: ThermostatPlan::new(fluid),
             title: fluid.title.clone(),
+            species_of_type: (0..fluid.species.len() as i32).collect(),
             conservative: fluid.is_conservative(),
         })
     }
@@ -148,12 +144,12 @@ impl Plan {
         without_linear(fluid, alpha, &self.passes, psi.clone())
     }
 
-    /// Storage of pairs for the second pass, if there is one.
-    pub fn pair_storage(&self) -> Option<PairStorage> {
-        let longest = self.passes.iter().map(|d| self.densities[*d].force_kernel.range()).reduce(f64::max)?;
+    /// Whether the first pass caches all pairs with their separations and forces, so that each force is added once, in the
+    /// second pass; otherwise it lists the pairs within the range of each density.
+    pub fn caches_all_pairs(&self) -> bool {
+        let ranges = self.passes.iter().map(|d| self.densities[*d].force_kernel.range());
         // With one variable the density is added together with the force, and the cache saves nothing.
-        let full = self.slope_width() > 1 && longest > PairStorage::FULL_CACHE_FROM * self.cutoff;
-        Some(if full { PairStorage::FullCache } else { PairStorage::InRange })
+        self.slope_width() > 1 && ranges.fold(0.0, f64::max) > FULL_CACHE_FROM * self.cutoff
     }
 
     /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear in.
@@ -176,12 +172,13 @@ impl Plan {
         self.thermostat.is_some()
     }
 
-    /// Fails for types that are mapped to a species out of range.
-    pub(super) fn check_kinds(&self, kinds: &[i32]) -> Result<(), EngineError> {
-        match kinds.iter().any(|s| *s >= self.species.len() as i32) {
-            true => Err(EngineError::Host("a type is mapped to a species the model does not have")),
-            false => Ok(()),
+    /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
+    pub(super) fn map_kinds(&mut self, species_of_type: &[i32]) -> Result<(), EngineError> {
+        if species_of_type.iter().any(|s| *s >= self.species.len() as i32) {
+            return Err(EngineError::Host("a type is mapped to a species the model does not have"));
         }
+        self.species_of_type = species_of_type.to_vec();
+        Ok(())
     }
 
     /// The noise of a step and its `Δt^{−1/2}`, if drag and noise act in it.
@@ -298,29 +295,34 @@ impl ThermostatPlan {
             range,
         })
     }
+
+    /// The exponent of `w_R`, by pairs of species; pairs without drag may have any.
+    pub fn exponent_of_weights<T: Scalar>(&self) -> Exponent<T> {
+        let all = |e: f64| self.exponent.iter().zip(&self.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
+        if all(1.0) {
+            Exponent::One
+        } else if all(2.0) {
+            Exponent::Two
+        } else {
+            Exponent::Any(SpeciesPairTable::new(self.exponent.iter().map(|x| T::of(*x))))
+        }
+    }
 }
 
 /// Prints the plan for `psidpd check` and the LAMMPS log.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = self.species.len();
-        writeln!(
-            f,
-            "fluid         {} ({}-D; species {})",
-            self.title,
-            self.dimensions,
-            self.species.join(", ")
-        )?;
-        writeln!(f, "cut-off       {}", self.cutoff)?;
+        let Plan { title, dimensions, cutoff, .. } = self;
+        let (count, species) = (self.species.len(), self.species.join(", "));
+        writeln!(f, "fluid         {title} ({dimensions}-D; species {species})")?;
+        writeln!(f, "cut-off       {cutoff}")?;
+        let kernel_of = |density: &WeightedDensity| {
+            let WeightedDensity { name, kernel, .. } = density;
+            format!("{name}: {} kernel, range {}", kernel.kind().name(), kernel.range())
+        };
         for &d in &self.passes {
             let density = &self.densities[d];
-            write!(
-                f,
-                "density pass  {}: {} kernel, range {}",
-                density.name,
-                density.kernel.kind().name(),
-                density.kernel.range()
-            )?;
+            write!(f, "density pass  {}", kernel_of(density))?;
             if density.force_kernel != density.kernel {
                 write!(f, "; force by the {} kernel: NOT CONSERVATIVE", density.force_kernel.kind().name())?;
             }
@@ -334,41 +336,26 @@ impl fmt::Display for Plan {
             }
             writeln!(f)?;
         }
-        match self.pair_storage() {
-            None => {}
-            Some(PairStorage::InRange) => {
-                writeln!(f, "second pass   over compact lists of the pairs in range of each density")?;
-            }
-            Some(PairStorage::FullCache) => writeln!(
-                f,
-                "second pass   over all pairs, kept in full: a density reaches further than {} of the cut-off",
-                PairStorage::FULL_CACHE_FROM
-            )?,
+        if self.caches_all_pairs() {
+            write!(f, "second pass   over all pairs, kept in full: a density reaches further than ")?;
+            writeln!(f, "{FULL_CACHE_FROM} of the cut-off")?;
+        } else if !self.passes.is_empty() {
+            writeln!(f, "second pass   over compact lists of the pairs in range of each density")?;
         }
         writeln!(
             f,
-            "pair search   i-clusters of 4 particles; of 8 in columns with fewer than {} particles per cut-off",
-            SearchPlan::DEFAULT.sparse
+            "pair search   i-clusters of 4 particles; of 8 in columns with fewer than {SPARSE} particles \
+             per cut-off"
         )?;
         for term in &self.linear {
-            let density = &self.densities[term.density];
-            writeln!(
-                f,
-                "pair term     psi is linear in {}: {} kernel, range {}, no density pass",
-                density.name,
-                density.kernel.kind().name(),
-                density.kernel.range()
-            )?;
+            let density = kernel_of(&self.densities[term.density]);
+            writeln!(f, "pair term     psi is linear in {density}, no density pass")?;
         }
         for term in &self.pairs {
             use crate::model::pair::PairForm;
             let [a, b] = term.between.map(|s| &self.species[s]);
-            writeln!(
-                f,
-                "pair term     {a}-{b}: {}, range {}",
-                term.potential.name(),
-                term.potential.range()
-            )?;
+            let (form, range) = (term.potential.name(), term.potential.range());
+            writeln!(f, "pair term     {a}-{b}: {form}, range {range}")?;
         }
         // With one species n is its density; with several there are n_A, n_B …
         let names: Vec<String> = self
@@ -390,13 +377,8 @@ impl fmt::Display for Plan {
                     let what = if stated.is_some() { "energy" } else { "psi" };
                     writeln!(f, "{:<13} {}", format!("{what} of {name}"), plan.formula.with_names(&names))?;
                     for (variable, slope) in stated.into_iter().flatten() {
-                        writeln!(
-                            f,
-                            "{:<13} {}: {}; NOT CONSERVATIVE",
-                            format!("slope of {name}"),
-                            names[variable],
-                            slope.with_names(&names)
-                        )?;
+                        let (of, slope) = (format!("slope of {name}"), slope.with_names(&names));
+                        writeln!(f, "{of:<13} {}: {slope}; NOT CONSERVATIVE", names[variable])?;
                     }
                 }
                 ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,

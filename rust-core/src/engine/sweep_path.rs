@@ -11,16 +11,16 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
 
 /// The forces of one fluid by a sweep, with special pairs.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct SweepPath {
     pub sweep: Sweep,
     pub special: Vec<SpecialPair>,
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
     corrections: Corrections,
-    /// ψ of owned particles and their densities in the last evaluation, if they have been fetched.
+    /// ψ of owned particles and their densities in the last evaluation, if they have been fetched or summed.
     excess: Vec<f64>,
-    densities: Vec<f64>,
+    pub densities: Vec<f64>,
 }
 
 impl SweepPath {
@@ -67,33 +67,17 @@ impl SweepPath {
         !self.densities.is_empty()
     }
 
-    /// The densities of owned particles, for those that the sweep did not sum.
-    pub fn densities_mut(&mut self) -> &mut Vec<f64> {
-        &mut self.densities
-    }
-
     /// Computes the contributions of special pairs, and adds those to the densities.
     fn begin(&mut self, around: Around, request: &Request) -> Result<(), EngineError> {
         let SweepPath { sweep, special, corrections, excludes_special, .. } = self;
-        let (plan, species_of_type, exclusions, densities) = sweep.beside_mut();
+        let Sweep { plan, exclusions, added_densities, .. } = sweep;
         exclusions.check(request.particles.x.len())?;
-        corrections.find(
-            (plan, species_of_type),
-            (special, exclusions),
-            around,
-            &request.particles,
-            densities,
-        )?;
+        corrections.find(plan, (special, exclusions), around, &request.particles, added_densities)?;
         if !*excludes_special {
             exclusions.set(special);
             *excludes_special = true;
         }
         Ok(())
-    }
-
-    /// Adds the forces of special pairs to those of a sweep, whose slopes are complete.
-    fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
-        self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)
     }
 
     /// Stores the densities if the request includes them.
@@ -105,7 +89,7 @@ impl SweepPath {
 
     /// Size in bytes of the arrays over particles and pairs.
     pub fn memory(&self) -> usize {
-        let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.memory();
+        let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.pairs.bytes();
         let numbers = self.excess.capacity() + self.densities.capacity();
         self.sweep.memory() + special + numbers * size_of::<f64>()
     }
@@ -121,9 +105,9 @@ impl Evaluate for SweepPath {
     ) -> Result<Tally, EngineError> {
         self.begin(Around { domain, images: &[] }, request)?;
         let mut tally = self.sweep.evaluate(domain, request, force, add)?;
-        if !self.corrections.is_empty() {
+        if self.corrections.pairs.len() > 0 {
             self.sweep.fetch_slopes(request.particles.owned);
-            tally += self.correct(request, force)?;
+            tally += self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)?;
         }
         self.fetch(request.want);
         let factor = Fault::factor(Fault::Virial, self.sweep.plan.fault);
@@ -148,8 +132,8 @@ impl Evaluate for SweepPath {
 
     fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         let mut tally = self.sweep.second(&request.particles, force)?;
-        if !self.corrections.is_empty() {
-            tally += self.correct(request, force)?;
+        if self.corrections.pairs.len() > 0 {
+            tally += self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)?;
         }
         self.fetch(request.want);
         Ok(tally)

@@ -3,7 +3,7 @@
 use crate::domain::PeriodicBox;
 
 /// A parallelepiped with its first edge along x and its second in the xy plane, as in LAMMPS.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct BoxGeometry {
     pub dimensions: usize,
     pub origin: [f64; 3],
@@ -55,13 +55,6 @@ impl BoxGeometry {
             }
         }
         self
-    }
-
-    /// Whether a point is inside the box along all open directions.
-    #[inline(always)]
-    pub fn contains(&self, x: &[f64; 3]) -> bool {
-        (0..self.dimensions)
-            .all(|c| self.periodic[c] || (0.0..=self.length[c]).contains(&(x[c] - self.origin[c])))
     }
 
     pub fn is_fully_periodic(&self) -> bool {

@@ -2,28 +2,12 @@
 
 use super::box_geometry::BoxGeometry;
 
-/// Parameters of the sweep's pair search.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SearchPlan {
-    /// Number of cells along x in one cutoff.
-    pub cells_per_cutoff: f64,
-    /// Below this number of particles per cutoff along a column of cells, i-clusters have eight particles, else
-    /// four: the cell ranges of eight then are still about sixteen particles long, the size of a j-cluster.
-    pub sparse: f64,
-}
+/// Number of cells along x in one cutoff.
+const CELLS_PER_CUTOFF: f64 = 4.0;
 
-impl SearchPlan {
-    /// The parameters for every fluid.
-    pub const DEFAULT: SearchPlan = SearchPlan { cells_per_cutoff: 4.0, sparse: 4.5 };
-
-    /// The size of i-clusters, and the most cells between their particles.
-    fn i_clusters(&self, particles_per_cutoff: f64) -> (usize, f64) {
-        match particles_per_cutoff < self.sparse {
-            true => (8, 4.0 * self.cells_per_cutoff),
-            false => (4, self.cells_per_cutoff),
-        }
-    }
-}
+/// Below this number of particles per cutoff along a column of cells, i-clusters have eight particles, else
+/// four: the cell ranges of eight then are still about sixteen particles long, the size of a j-cluster.
+pub const SPARSE: f64 = 4.5;
 
 /// Columns along x, at least as wide as the cutoff, each divided into cells.
 ///
@@ -31,7 +15,7 @@ impl SearchPlan {
 /// two dimensions a plane is one column, and planes follow each other along y. A particle pairs with
 /// later particles in its column, with the next column of its plane, and with three columns of the next
 /// plane: half of its neighbourhood, so that every pair is found once.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct CellGrid {
     pub cells_per_column: usize,
     pub columns_per_plane: usize,
@@ -75,7 +59,6 @@ impl CellGrid {
                 return None;
             }
         }
-        let plan = SearchPlan::DEFAULT;
         let most = (4 * count + 64) as f64;
         // The width is that of the cutoff minus rounding: pairs in the last 10⁻⁹ of the cutoff may be missed.
         let mut width = cutoff * (1.0 - 1e-9);
@@ -89,16 +72,17 @@ impl CellGrid {
             };
             let columns_per_plane = along(column_axis, width);
             let planes = along(plane_axis, width);
-            let cells_per_column = along(0, width / plan.cells_per_cutoff);
+            let cells_per_column = along(0, width / CELLS_PER_CUTOFF);
             // The loop widens the cells until they barely outnumber the particles: a few distant
             // particles must not cause a grid of empty cells.
-            if columns_per_plane * planes * cells_per_column <= most.max(64.0 * plan.cells_per_cutoff) {
+            if columns_per_plane * planes * cells_per_column <= most.max(64.0 * CELLS_PER_CUTOFF) {
                 let (cells_per_column, columns_per_plane, planes) =
                     (cells_per_column as usize, columns_per_plane as usize, planes as usize);
                 let range_half_width = search_cutoff / geometry.height(0);
                 let per_column = count as f64 / (columns_per_plane * planes) as f64;
+                let is_sparse = per_column * cutoff / geometry.height(0) < SPARSE;
                 let (i_cluster_size, i_cluster_extent) =
-                    plan.i_clusters(per_column * cutoff / geometry.height(0));
+                    if is_sparse { (8, 4.0 * CELLS_PER_CUTOFF) } else { (4, CELLS_PER_CUTOFF) };
                 return Some(CellGrid {
                     cells_per_column,
                     columns_per_plane,

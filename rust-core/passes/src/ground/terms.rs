@@ -9,7 +9,8 @@ use psidpd_model::kernel::KernelKind;
 #[derive(Debug, Clone, Default)]
 pub struct Terms<T> {
     pub species: usize,
-    /// The list has at least one entry: without soft repulsion, a term of strength 0.
+    /// The list has at least one entry: without soft repulsion, a term of strength 0. Others are further soft repulsions
+    /// between the same species.
     pub soft: Vec<Soft<T>>,
     pub linear: Vec<Linear<T>>,
     pub spline: Vec<Spline<T>>,
@@ -90,18 +91,6 @@ impl<T: Scalar> Terms<T> {
     #[inline(always)]
     pub fn variables(&self) -> usize {
         self.passes.len() * self.species
-    }
-
-    /// The first soft repulsion; its strength may be 0.
-    #[inline(always)]
-    pub fn first_soft(&self) -> &Soft<T> {
-        &self.soft[0]
-    }
-
-    /// Further soft repulsions between the same species.
-    #[inline(always)]
-    pub fn other_soft(&self) -> &[Soft<T>] {
-        &self.soft[1..]
     }
 
     /// Whether there are terms besides the first soft one, the thermostat and the densities.

@@ -44,7 +44,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
         }
         kernel_weights::<I, A>(inputs, buffers, batch);
         forces::<I, A, MULTISPECIES, TALLY>(inputs, constants, buffers, batch, &mut sums);
-        if MULTISPECIES && inputs.caches_all_pairs() {
+        if MULTISPECIES && inputs.terms.full_cache {
             append_to_cache::<I, A, MULTISPECIES, TALLY>(inputs, buffers, &mut in_range.full_cache, batch);
         } else {
             in_range.reserve::<TALLY>(batch.count + 16);
@@ -144,7 +144,7 @@ unsafe fn further_terms<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, cons
         if !terms.scalar_fallback.is_empty() {
             scalar_fallback::<I, A, MULTISPECIES, TALLY>(inputs, buffers, batch, tally);
         }
-        for term in terms.other_soft() {
+        for term in &terms.soft[1..] {
             add_soft::<A::Reals, MULTISPECIES, TALLY>(term, buffers, vectors, &mut sums.pair);
         }
         for term in &terms.linear {

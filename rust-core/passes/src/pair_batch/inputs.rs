@@ -17,11 +17,3 @@ pub struct PairInputs<'a, T, R> {
     /// Species of the particles; empty with one species.
     pub species: SharedSlice<'a, u8>,
 }
-
-impl<T, R> PairInputs<'_, T, R> {
-    /// Whether all pairs go to the full pair cache.
-    #[inline(always)]
-    pub fn caches_all_pairs(&self) -> bool {
-        self.terms.full_cache
-    }
-}

@@ -89,9 +89,9 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
         let p_pair_weight = buffers.pair_weight.as_ptr();
         let p_weight =
             if terms.variables() == 1 { buffers.kernel_weights[0].as_ptr() } else { std::ptr::null() };
-        let to_cache = MULTISPECIES && inputs.caches_all_pairs();
+        let to_cache = MULTISPECIES && terms.full_cache;
         let has_more = terms.has_more();
-        let soft = SoftTerm::<A::Reals>::new(terms.first_soft());
+        let soft = SoftTerm::<A::Reals>::new(&terms.soft[0]);
         let thermostat = terms.thermostat.as_ref().filter(|_| constants.noise.is_some());
         let thermostat = thermostat.map(|t| ThermostatForce::<A::Reals>::new(t, constants.noise_scale));
         let mut v = 0;

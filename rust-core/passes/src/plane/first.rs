@@ -42,7 +42,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
     let passes = inputs.terms.passes.len();
     // SAFETY: the caller promises a plane of the grid; the scheduler has filled it and the next one.
     unsafe {
-        if MULTISPECIES && inputs.caches_all_pairs() {
+        if MULTISPECIES && inputs.terms.full_cache {
             in_range.full_cache.clear(passes, TALLY);
             rim.full_cache.clear(passes, TALLY);
         } else {
@@ -165,7 +165,7 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 run(self.set, Append::<MULTISPECIES> { list, terms, batch, computed, is_double });
             }
             // Forces are added first: the quads of weights replace theirs.
-            if !(MULTISPECIES && inputs.caches_all_pairs()) {
+            if !(MULTISPECIES && inputs.terms.full_cache) {
                 scatter_forces::<I, A>(sums, buffers, batch);
                 in_range.add::<TALLY>(&buffers.found, batch);
             }

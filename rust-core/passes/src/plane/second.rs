@@ -73,7 +73,7 @@ pub unsafe fn second_pass<
     // SAFETY: the first pass has listed `found` pairs of each density for each batch; codes name particles of the
     // plane and of the next one, which have accumulators, slopes and species; the caller promises the rest.
     unsafe {
-        if MULTISPECIES && data.inputs.caches_all_pairs() {
+        if MULTISPECIES && data.inputs.terms.full_cache {
             let cache = &in_range.full_cache;
             return second_pass_cached::<I, A, MULTISPECIES, TALLY>(data, sums, cache, RIM, virial);
         }

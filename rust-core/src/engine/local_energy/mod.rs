@@ -40,7 +40,7 @@ pub enum NoEnergy {
 
 /// The energy of one fluid in a box, as a function of the positions of single particles. All
 /// arithmetic is in double precision.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct LocalEnergy {
     plan: Plan,
     /// The longest range of the interactions; 0 for an ideal gas.
@@ -100,21 +100,10 @@ impl LocalEnergy {
             let what = format!("the density {} has another kernel for forces", density.name);
             return Err(NoEnergy::NotConservative(what));
         }
-        let set = InstructionSet::best();
         Ok(LocalEnergy {
             plan: Plan::new(fluid)?.without_slopes(),
             range: fluid.conservative_range(),
-            set,
-            cells: None,
-            x: Vec::new(),
-            species: Vec::new(),
-            n: Vec::new(),
-            psi: Vec::new(),
-            own: Vec::new(),
-            near: Near::default(),
-            excess: ExcessWork::new(set),
-            work: Work::default(),
-            moved: Moved::default(),
+            ..LocalEnergy::default()
         })
     }
 

@@ -3,17 +3,17 @@
 
 use super::densities::sum_densities;
 use super::forces::{ForceInput, ForceOutput, add_forces};
-use super::free_energy::{FreeEnergies, Psi};
+use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
 use super::pairs::Pairs;
 use super::sweep_pairs::SweepPairs;
 use crate::engine::plan::Plan;
 use crate::engine::surroundings::Newton;
+use crate::free_energy::FreeEnergy;
 use crate::model::expression::TooLarge;
 use crate::model::pair::PairForm;
 use crate::model::{Fluid, PairTerm};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::tally::Tally;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Evaluates configurations of one fluid at one temperature.
@@ -23,7 +23,7 @@ pub struct Evaluator {
     pub fluid: Fluid,
     /// A plan with a pass for every density.
     plan: Plan,
-    free_energies: FreeEnergies,
+    free_energy: FreeEnergy,
     work: Mutex<Work>,
 }
 
@@ -59,9 +59,9 @@ impl Evaluator {
     /// # Errors
     /// Fails if a derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: Fluid) -> Result<Evaluator, TooLarge> {
-        let free_energies = FreeEnergies::new(&fluid)?;
+        let free_energy = FreeEnergy::new(&fluid, usize::MAX).map_err(|_| TooLarge)?;
         let work = Mutex::new(Work { search: SweepPairs::new(&fluid), spare: Vec::new() });
-        Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energies, work, fluid })
+        Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energy, work, fluid })
     }
 
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
@@ -98,7 +98,7 @@ impl Evaluator {
             let (dimensions, range) = (self.fluid.dimensions, self.fluid.conservative_range());
             let finite = |k: usize| x[k].iter().all(|c| c.is_finite());
             BoxSearch::default().find(x, x.len(), finite, domain, dimensions, range, |i, j, d| {
-                pairs.push_in_box(i, j, d, species);
+                pairs.force.push(i, j, d, species);
             });
         }
         pair_forces.resize(pairs.force.len(), 0.0);
@@ -107,23 +107,18 @@ impl Evaluator {
 
     /// Computes densities and ψ of all particles.
     fn excess(&self, pairs: &Pairs, species: &[i32]) -> (Vec<f64>, Psi) {
-        let Evaluator { fluid, plan, free_energies, .. } = self;
+        let Evaluator { fluid, plan, free_energy, .. } = self;
         let mut densities = vec![0.0; species.len() * fluid.variables()];
         sum_densities(pairs, plan, 0..fluid.densities.len(), species, &mut densities);
-        let psi = free_energies.psi(fluid, species, &densities);
+        let psi = psi(free_energy, fluid, species, &densities);
         (densities, psi)
     }
 
     fn of_pairs(&self, pairs: Pairs, mut pair_forces: Vec<f64>, species: &[i32]) -> Evaluation {
         let (owned, (densities, psi)) = (species.len(), self.excess(&pairs, species));
         let mut forces = vec![[0.0; 3]; owned];
-        let mut output = ForceOutput {
-            force: &mut forces,
-            particle_energy: &mut [],
-            particle_virial: &mut [],
-            pair_force: &mut pair_forces,
-            tally: Tally::default(),
-        };
+        let mut output =
+            ForceOutput { force: &mut forces, pair_force: &mut pair_forces, ..ForceOutput::default() };
         let input = ForceInput::conservative(&self.plan, &pairs.force, owned, &psi.slopes);
         add_forces(&input, &mut output);
         let tally = output.tally;
@@ -146,11 +141,6 @@ fn pair_energies(pairs: &Pairs, fluid: &Fluid) -> Vec<f64> {
 }
 
 impl Evaluation {
-    /// Potential energy `U`.
-    pub fn energy(&self) -> f64 {
-        self.energy
-    }
-
     /// Uncorrected local densities of one particle.
     pub fn densities_of(&self, particle: usize) -> &[f64] {
         let variables = self.densities.len() / self.forces.len();
@@ -313,7 +303,7 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             assert!((alone - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             assert!((energies - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
-            assert!((found.energy() - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
+            assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
                 assert!((f - g).abs() < 1e-11 * scale, "{f} {g}");
             }

@@ -2,7 +2,9 @@
 //! in a loop of its own, compiled for its kernel, and a last loop adds these to the particles.
 
 use super::pairs::PairList;
+use crate::engine::particles::Particles;
 use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
+use crate::engine::request::Request;
 use crate::engine::surroundings::Newton;
 use crate::model::PairTerm;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
@@ -19,14 +21,11 @@ pub struct ForceInput<'a> {
     pub plan: &'a Plan,
     pub list: &'a PairList,
     pub newton: Newton,
-    pub owned: usize,
     /// Slopes `∂ψ/∂n` of owned particles and ghosts, [`Plan::slope_width`] each.
     pub slopes: &'a [f64],
-    pub v: &'a [[f64; 3]],
-    pub tag: &'a [i32],
+    pub request: Request<'a>,
     /// Noise and `dt^{-1/2}`; with `None` there are no dissipative and random forces.
     pub thermostat: Option<(PairNoise, f64)>,
-    pub want: Want,
 }
 
 impl<'a> ForceInput<'a> {
@@ -37,17 +36,19 @@ impl<'a> ForceInput<'a> {
         owned: usize,
         slopes: &'a [f64],
     ) -> ForceInput<'a> {
-        let (newton, want) = (Newton::On, Want::TOTALS);
-        ForceInput { plan, list, newton, owned, slopes, v: &[], tag: &[], thermostat: None, want }
+        let particles = Particles { owned, ..Particles::default() };
+        let request = Request { particles, v: &[], step: None, want: Want::TOTALS };
+        ForceInput { plan, list, newton: Newton::On, slopes, request, thermostat: None }
     }
 }
 
-/// Arrays that a force pass adds to.
+/// Arrays that a force pass adds to; empty where they are not wanted.
+#[derive(Default)]
 pub struct ForceOutput<'a> {
     pub force: &'a mut [[f64; 3]],
     pub particle_energy: &'a mut [f64],
     pub particle_virial: &'a mut [[f64; 6]],
-    /// The conservative force of each pair along `ê_ij`, positive if repulsive; empty if it is not wanted.
+    /// The conservative force of each pair along `ê_ij`, positive if repulsive.
     pub pair_force: &'a mut [f64],
     pub tally: Tally,
 }
@@ -72,7 +73,7 @@ pub struct Block<const N: usize> {
 /// Adds the forces of all pairs.
 pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
     let mut block = Block::<BLOCK>::new();
-    let energies = input.want.energy || input.want.particle_energy;
+    let energies = input.request.want.energy || input.request.want.particle_energy;
     for begin in (0..input.list.len()).step_by(BLOCK) {
         let pairs = begin..(begin + BLOCK).min(input.list.len());
         block.conserve(input, pairs.clone(), energies);
@@ -85,7 +86,7 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
             block.thermostat.fill(0.0);
         }
         scatter(input, output, pairs.clone(), &block);
-        if input.want.virial || input.want.particle_virial {
+        if input.request.want.virial || input.request.want.particle_virial {
             tally_virial(input, output, pairs.clone(), &block);
         }
         if energies {
@@ -271,11 +272,11 @@ fn add_thermostat(
             let base = 1.0 - r / range;
             let exponent = plan.exponent[pair];
             let w = if exponent == 1.0 { base } else { base.powf(exponent) };
-            let (vi, vj) = (&input.v[i], &input.v[j]);
+            let (vi, vj) = (&input.request.v[i], &input.request.v[j]);
             let dot = list.d[0][k] * (vi[0] - vj[0])
                 + list.d[1][k] * (vi[1] - vj[1])
                 + list.d[2][k] * (vi[2] - vj[2]);
-            let xi = noise.xi(input.tag[i] as u32, input.tag[j] as u32);
+            let xi = noise.xi(input.request.particles.tag[i] as u32, input.request.particles.tag[j] as u32);
             let force = w * (plan.sigma[pair] * xi * inverse_root_dt - plan.gamma[pair] * w * dot / r);
             out[k - pairs.start] = strength * force;
         }
@@ -297,7 +298,7 @@ fn scatter(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, bl
         fi[0] += f[0];
         fi[1] += f[1];
         fi[2] += f[2];
-        if both || j < input.owned {
+        if both || j < input.request.particles.owned {
             let fj = &mut output.force[j];
             fj[0] -= f[0];
             fj[1] -= f[1];
@@ -309,7 +310,7 @@ fn scatter(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, bl
 /// The weight of a pair in the sums of this rank: one half if the other rank counts it too.
 #[inline(always)]
 fn share(input: &ForceInput, j: usize) -> f64 {
-    if input.newton == Newton::On || j < input.owned { 1.0 } else { 0.5 }
+    if input.newton == Newton::On || j < input.request.particles.owned { 1.0 } else { 0.5 }
 }
 
 fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, block: &Block<BLOCK>) {
@@ -330,9 +331,9 @@ fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize
             virials[0][c] += share * conservative * dyad[c];
             virials[1][c] += share * thermostat * dyad[c];
         }
-        if input.want.particle_virial {
+        if input.request.want.particle_virial {
             let half = 0.5 * (conservative + thermostat);
-            let both = input.newton == Newton::On || j < input.owned;
+            let both = input.newton == Newton::On || j < input.request.particles.owned;
             for c in 0..6 {
                 output.particle_virial[i][c] += half * dyad[c];
                 if both {
@@ -341,7 +342,7 @@ fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize
             }
         }
     }
-    if input.want.virial {
+    if input.request.want.virial {
         let Tally { virial, thermostat_virial, .. } = &mut output.tally;
         for (sum, of_block) in [virial, thermostat_virial].into_iter().zip(virials) {
             sum.iter_mut().zip(of_block).for_each(|(sum, of_block)| *sum += of_block);
@@ -355,11 +356,11 @@ fn tally_energy(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize
     for k in pairs.clone() {
         let (i, j) = (list.i[k] as usize, list.j[k] as usize);
         let at = k - pairs.start;
-        let both = input.newton == Newton::On || j < input.owned;
+        let both = input.newton == Newton::On || j < input.request.particles.owned;
         let excess_j = if both { block.excess_j[at] } else { 0.0 };
         excess += block.excess_i[at] + excess_j;
         pair += share(input, j) * block.pair[at];
-        if input.want.particle_energy {
+        if input.request.want.particle_energy {
             output.particle_energy[i] += block.excess_i[at] + 0.5 * block.pair[at];
             if both {
                 output.particle_energy[j] += excess_j + 0.5 * block.pair[at];

@@ -3,11 +3,6 @@
 
 use crate::free_energy::{self, FreeEnergy};
 use crate::model::Fluid;
-use crate::model::expression::TooLarge;
-
-/// The free energies of a fluid and their derivatives.
-#[derive(Debug)]
-pub struct FreeEnergies(FreeEnergy);
 
 /// ψ of particles with derivatives by their uncorrected densities, particle by particle.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -20,43 +15,32 @@ pub struct Psi {
     pub second: Vec<f64>,
 }
 
-impl FreeEnergies {
-    /// Computes the derivatives of the fluid's formulas.
-    ///
-    /// # Errors
-    /// Fails if a derivative grows beyond the limits of the formula engine.
-    pub fn new(fluid: &Fluid) -> Result<FreeEnergies, TooLarge> {
-        FreeEnergy::new(fluid, usize::MAX).map(FreeEnergies).map_err(|_| TooLarge)
-    }
-
-    /// ψ of particles with one species each, at their uncorrected densities, density-major.
-    pub fn psi(&self, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
-        let (count, variables) = (fluid.species.len(), fluid.variables());
-        let room = |per_particle: usize| Vec::with_capacity(species.len() * per_particle);
-        let mut psi = Psi { value: room(1), slopes: room(variables), second: room(variables * variables) };
-        let (mut one, mut work) = (free_energy::Psi::default(), free_energy::Work::default());
-        let (mut corrected, mut at) = (Vec::new(), Vec::new());
-        for (k, alpha) in species.iter().map(|alpha| *alpha as usize).enumerate() {
-            let n = &densities[k * variables..][..variables];
-            let correction = |v: usize| &fluid.densities[v / count].correction[alpha * count + v % count];
-            corrected.clear();
-            corrected.extend((0..variables).map(|v| polynomial(&correction(v).0, n[v])));
-            at.clear();
-            at.extend(corrected.iter().map(|[value, ..]| *value));
-            self.0.evaluate(alpha, &at, &mut one, &mut work);
-            psi.value.push(one.value);
-            psi.slopes
-                .extend(one.gradient.iter().zip(&corrected).map(|(slope, [_, first, _])| slope * first));
-            for v in 0..variables {
-                for u in 0..variables {
-                    let curved = if u == v { one.gradient[v] * corrected[v][2] } else { 0.0 };
-                    psi.second
-                        .push(one.hessian[v * variables + u] * (corrected[v][1] * corrected[u][1]) + curved);
-                }
+/// ψ of particles with one species each, at their uncorrected densities, density-major.
+pub fn psi(free_energy: &FreeEnergy, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
+    let (count, variables) = (fluid.species.len(), fluid.variables());
+    let room = |per_particle: usize| Vec::with_capacity(species.len() * per_particle);
+    let mut psi = Psi { value: room(1), slopes: room(variables), second: room(variables * variables) };
+    let (mut one, mut work) = (free_energy::Psi::default(), free_energy::Work::default());
+    let (mut corrected, mut at) = (Vec::new(), Vec::new());
+    for (k, alpha) in species.iter().map(|alpha| *alpha as usize).enumerate() {
+        let n = &densities[k * variables..][..variables];
+        let correction = |v: usize| &fluid.densities[v / count].correction[alpha * count + v % count];
+        corrected.clear();
+        corrected.extend((0..variables).map(|v| polynomial(&correction(v).0, n[v])));
+        at.clear();
+        at.extend(corrected.iter().map(|[value, ..]| *value));
+        free_energy.evaluate(alpha, &at, &mut one, &mut work);
+        psi.value.push(one.value);
+        psi.slopes.extend(one.gradient.iter().zip(&corrected).map(|(slope, [_, first, _])| slope * first));
+        for v in 0..variables {
+            for u in 0..variables {
+                let curved = if u == v { one.gradient[v] * corrected[v][2] } else { 0.0 };
+                psi.second
+                    .push(one.hessian[v * variables + u] * (corrected[v][1] * corrected[u][1]) + curved);
             }
         }
-        psi
     }
+    psi
 }
 
 /// The value and the first two derivatives of a polynomial.
@@ -91,23 +75,23 @@ B = "n^3 + sqrt(n_A)*n_B^2"
         )
         .unwrap();
         let fluid = model.at(1.3).unwrap();
-        let energies = FreeEnergies::new(&fluid).unwrap();
+        let energies = FreeEnergy::new(&fluid, usize::MAX).unwrap();
         for alpha in 0..2 {
             for n in [[1.0, 1.2], [0.1, 1.0], [5.0, 0.2], [4.0, 6.0], [0.2, 0.1]] {
-                let psi = energies.psi(&fluid, &[alpha], &n);
+                let here = psi(&energies, &fluid, &[alpha], &n);
                 let h = 1e-5;
                 for v in 0..2 {
                     let moved = |h: f64| {
                         let mut n = n;
                         n[v] += h;
-                        energies.psi(&fluid, &[alpha], &n)
+                        psi(&energies, &fluid, &[alpha], &n)
                     };
                     let (up, down) = (moved(h), moved(-h));
                     let slope = (up.value[0] - down.value[0]) / (2.0 * h);
-                    assert!((slope - psi.slopes[v]).abs() < 1e-7 * (1.0 + slope.abs()), "{alpha} {n:?} {v}");
+                    assert!((slope - here.slopes[v]).abs() < 1e-7 * (1.0 + slope.abs()), "{alpha} {n:?} {v}");
                     for u in 0..2 {
                         let second = (up.slopes[u] - down.slopes[u]) / (2.0 * h);
-                        let found = psi.second[v * 2 + u];
+                        let found = here.second[v * 2 + u];
                         assert!((second - found).abs() < 1e-6 * (1.0 + second.abs()), "{alpha} {n:?} {v}{u}");
                     }
                 }

@@ -18,8 +18,7 @@ pub fn add_listed(
     pairs: &mut Pairs,
 ) -> Result<(), EngineError> {
     let PairsOfHost { i, j, factor } = listed;
-    let scaled = !factor.is_empty();
-    if i.len() != j.len() || (scaled && factor.len() != i.len()) {
+    if i.len() != j.len() || (!factor.is_empty() && factor.len() != i.len()) {
         return Err(EngineError::Host("the arrays of a pair list have different lengths"));
     }
     let cutoff_squared = cutoff * cutoff;
@@ -36,11 +35,7 @@ pub fn add_listed(
         if d.iter().map(|c: &f64| c * c).sum::<f64>() >= cutoff_squared {
             continue;
         }
-        if scaled {
-            pairs.push_scaled(i, j, d, factor[k], particles.tag, species);
-        } else {
-            pairs.push(i, j, d, particles.tag, species);
-        }
+        pairs.push(i, j, d, particles.tag, species).factor.extend(factor.get(k));
     }
     Ok(())
 }

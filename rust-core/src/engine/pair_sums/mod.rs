@@ -57,8 +57,7 @@ use special::scale;
 /// the arrays of the computation.
 #[derive(Debug, Clone, Default)]
 pub struct PairSums {
-    plan: Plan,
-    kinds: Vec<i32>,
+    pub(super) plan: Plan,
     search: CellSearch,
     box_search: BoxSearch,
     pairs: Pairs,
@@ -74,34 +73,16 @@ pub struct PairSums {
     slopes: Vec<f64>,
     particle_energy: Vec<f64>,
     particle_virial: Vec<[f64; 6]>,
-    excess_pass: ExcessPass,
+    pub(super) excess_pass: ExcessPass,
     /// Number of runs of each pass.
     pub counts: PassCounts,
     owned: usize,
 }
 
 impl PairSums {
-    /// Creates the sums of a given plan; types are species indices unless [`PairSums::map_kinds`] maps them.
+    /// Creates the sums of a given plan.
     pub fn of_plan(plan: Plan) -> PairSums {
-        let kinds = (0..plan.species.len() as i32).collect();
-        PairSums { plan, kinds, ..PairSums::default() }
-    }
-
-    /// Numbers of evaluations of ψ with a density below its bounds, and above, since the sums were
-    /// created. Only densities that the particle's ψ depends on nonlinearly count.
-    pub fn out_of_bounds(&self) -> [u64; 2] {
-        self.excess_pass.out_of_bounds
-    }
-
-    /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
-    /// particles that do not interact.
-    ///
-    /// # Errors
-    /// Fails for a species index out of range.
-    pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        self.plan.check_kinds(kinds)?;
-        self.kinds = kinds.to_vec();
-        Ok(())
+        PairSums { plan, ..PairSums::default() }
     }
 
     /// Sets the pairs with reduced strength for later evaluations, by the host's numbers. Within the
@@ -141,7 +122,7 @@ impl PairSums {
                 check_reach(domain, dimensions, cutoff, owned)?;
                 pairs.clear(owned, Newton::On);
                 box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
-                    pairs.push_in_box(i, j, d, species);
+                    pairs.force.push(i, j, d, species);
                 });
             }
             Surroundings::Ghosts(Around { domain, images }, newton) if is_closed(domain) => {
@@ -184,7 +165,7 @@ impl PairSums {
         particles.check(31)?;
         self.species.clear();
         for ((kind, tag), x) in particles.kind.iter().zip(particles.tag).zip(particles.x) {
-            let species = usize::try_from(*kind).ok().and_then(|k| self.kinds.get(k));
+            let species = usize::try_from(*kind).ok().and_then(|k| self.plan.species_of_type.get(k));
             let Some(species) = species else { return Err(EngineError::Kind { tag: *tag, kind: *kind }) };
             if *tag < 1 {
                 return Err(EngineError::Tag { tag: *tag });
@@ -297,23 +278,13 @@ impl Evaluate for PairSums {
         self.counts.noise += thermostat.is_some() as u64;
         self.counts.energy += (want.energy || want.particle_energy) as u64;
         self.counts.virial += (want.virial || want.particle_virial) as u64;
-        let input = ForceInput {
-            plan: &self.plan,
-            list: &self.pairs.force,
-            newton,
-            owned: self.owned,
-            slopes: &self.slopes,
-            v,
-            tag: particles.tag,
-            thermostat,
-            want,
-        };
+        let (plan, list, slopes) = (&self.plan, &self.pairs.force, &self.slopes[..]);
+        let input = ForceInput { plan, list, newton, slopes, request: *request, thermostat };
         let mut output = ForceOutput {
             force,
             particle_energy: &mut self.particle_energy,
             particle_virial: &mut self.particle_virial,
-            pair_force: &mut [],
-            tally: Tally::default(),
+            ..ForceOutput::default()
         };
         add_forces(&input, &mut output);
         let mut tally = output.tally;

@@ -85,40 +85,15 @@ impl Pairs {
         self.density_only.clear();
     }
 
-    /// Adds the pair `a`, `b` with `d = r_a − r_b`; at least one particle is owned.
+    /// Adds the pair `a`, `b` with `d = r_a − r_b`; at least one particle is owned. Returns the list that has the pair,
+    /// for its factor: either all pairs get one or none.
     #[inline(always)]
-    pub fn push(&mut self, a: usize, b: usize, d: [f64; 3], tag: &[i32], species: &[i32]) {
+    pub fn push(&mut self, a: usize, b: usize, d: [f64; 3], tag: &[i32], species: &[i32]) -> &mut PairList {
         let (i, j, d) = if a < self.owned { (a, b, d) } else { (b, a, d.map(|c| -c)) };
         let here = j < self.owned || self.newton == Newton::Off || computes(tag[i], tag[j], d);
         let list = if here { &mut self.force } else { &mut self.density_only };
         list.push(i, j, d, species);
-    }
-
-    /// Adds a pair of two owned particles in a box, of which the second may be an image, with `d = r_i − r_j`.
-    #[inline(always)]
-    pub fn push_in_box(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
-        self.force.push(i, j, d, species);
-    }
-
-    /// Adds a pair as [`Pairs::push`], with a factor. Either all pairs are added by this function or none.
-    pub fn push_scaled(
-        &mut self,
-        a: usize,
-        b: usize,
-        d: [f64; 3],
-        factor: f64,
-        tag: &[i32],
-        species: &[i32],
-    ) {
-        let before = self.force.len();
-        self.push(a, b, d, tag, species);
-        let list = if self.force.len() > before { &mut self.force } else { &mut self.density_only };
-        list.factor.push(factor);
-    }
-
-    /// Both lists, for factors that are set after all pairs are found.
-    pub fn lists_mut(&mut self) -> [&mut PairList; 2] {
-        [&mut self.force, &mut self.density_only]
+        list
     }
 }
 

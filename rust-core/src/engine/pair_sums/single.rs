@@ -11,7 +11,8 @@ impl PairSums {
     /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
     /// density. The force includes the many-body part, except for particles without slopes.
     pub fn single(&self, kinds: [i32; 2], r: f64, slopes: &[f64], particles: [usize; 2]) -> (f64, f64) {
-        let species = kinds.map(|k| usize::try_from(k).ok().and_then(|k| self.kinds.get(k)).copied());
+        let types = &self.plan.species_of_type;
+        let species = kinds.map(|k| usize::try_from(k).ok().and_then(|k| types.get(k)).copied());
         let [Some(a), Some(b)] = species else { return (0.0, 0.0) };
         if a < 0 || b < 0 {
             return (0.0, 0.0);

@@ -31,7 +31,7 @@ pub fn scale(
     }
     let key = |i: u32, j: u32| (i.min(j), i.max(j));
     let factors: HashMap<_, _> = special.iter().map(|p| (key(p.i, p.j), p.factor)).collect();
-    for list in pairs.lists_mut() {
+    for list in [&mut pairs.force, &mut pairs.density_only] {
         let factor = |(i, j): (&u32, &u32)| match exclusions.excludes(*i as usize, *j as usize) {
             true => 0.0,
             false => factors.get(&key(*i, *j)).copied().unwrap_or(1.0),
@@ -47,8 +47,7 @@ pub fn scale(
 #[derive(Debug, Clone, Default)]
 pub struct Corrections {
     /// Special pairs within the cut-off with a factor above 0.
-    pairs: PairList,
-    owned: usize,
+    pub pairs: PairList,
 }
 
 impl Corrections {
@@ -59,21 +58,20 @@ impl Corrections {
     /// Fails for a pair of particles that do not exist, and for a pair without an owned particle.
     pub fn find(
         &mut self,
-        (plan, species_of_type): (&Plan, &[i32]),
+        plan: &Plan,
         (special, exclusions): (&[SpecialPair], &Exclusions),
         around: Around,
         particles: &Particles,
         densities: &mut Vec<f64>,
     ) -> Result<(), EngineError> {
         self.pairs.clear();
-        self.owned = particles.owned;
         densities.clear();
         let Particles { x, kind, owned, .. } = *particles;
         let Around { domain, images } = around;
         let is_periodic = domain.periodic() != [false; 3];
         let (squared, depth) = (plan.cutoff * plan.cutoff, if plan.dimensions == 2 { 0.0 } else { 1.0 });
         let square = |d: &[f64; 3]| d[0] * d[0] + d[1] * d[1] + depth * d[2] * d[2];
-        let species = |k: usize| species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
+        let species = |k: usize| plan.species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
         for pair in special {
             let (i, j) = (pair.i as usize, pair.j as usize);
             if i >= owned || j >= x.len() {
@@ -98,18 +96,13 @@ impl Corrections {
         }
         if self.pairs.len() > 0 {
             let width = plan.slope_width();
-            densities.resize(width * self.owned, 0.0);
+            densities.resize(width * owned, 0.0);
             for (k, density) in plan.passes.iter().enumerate() {
                 let kernel = &plan.densities[*density].kernel;
-                add_density(&self.pairs, kernel, self.owned, densities, width, k * plan.species.len());
+                add_density(&self.pairs, kernel, owned, densities, width, k * plan.species.len());
             }
         }
         Ok(())
-    }
-
-    /// Whether there are no contributions.
-    pub fn is_empty(&self) -> bool {
-        self.pairs.len() == 0
     }
 
     /// Adds the forces on owned particles, and returns the contribution to the totals. A pair with a
@@ -124,43 +117,18 @@ impl Corrections {
         request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<Tally, EngineError> {
-        let Request { particles, v, step, want } = *request;
+        let Request { particles, v, step, .. } = *request;
+        let (list, newton) = (&self.pairs, Newton::Off);
         let thermostat = plan.noise_of(step, v, particles.x.len())?;
-        let input = ForceInput {
-            plan,
-            list: &self.pairs,
-            newton: Newton::Off,
-            owned: self.owned,
-            slopes,
-            v,
-            tag: particles.tag,
-            thermostat,
-            want,
-        };
-        let mut output = ForceOutput {
-            force: &mut force[..self.owned],
-            particle_energy: &mut [],
-            particle_virial: &mut [],
-            pair_force: &mut [],
-            tally: Tally::default(),
-        };
+        let input = ForceInput { plan, list, newton, slopes, request: *request, thermostat };
+        let mut output = ForceOutput { force: &mut force[..particles.owned], ..ForceOutput::default() };
         add_forces(&input, &mut output);
         let tally = output.tally;
-        // If one force is not finite, neither is the sum.
-        let of = |list: &[u32]| list.iter().filter_map(|k| force.get(*k as usize)).flatten().sum::<f64>();
-        if (of(&self.pairs.i) + of(&self.pairs.j)).is_finite() {
-            return Ok(tally);
-        }
         let members = self.pairs.i.iter().chain(&self.pairs.j).map(|k| *k as usize);
-        let is_lost = |k: &usize| *k < self.owned && !force[*k].iter().all(|f| f.is_finite());
+        let is_lost = |k: &usize| *k < particles.owned && !force[*k].iter().all(|f| f.is_finite());
         match members.filter(is_lost).map(|k| particles.tag[k]).min() {
             None => Ok(tally),
             Some(tag) => Err(EngineError::Force { tag }),
         }
-    }
-
-    /// Size in bytes of the arrays over pairs.
-    pub fn memory(&self) -> usize {
-        self.pairs.bytes()
     }
 }

@@ -13,6 +13,7 @@ use psidpd_passes::plane::list::{ListTerms, WeightTables, pairs_of_each};
 use std::num::NonZeroUsize;
 
 /// Finds the pairs of a fluid in boxes at least twice as wide as their range.
+#[derive(Debug)]
 pub struct SweepPairs {
     lists: PairLists,
     pool: Pool,
@@ -23,12 +24,6 @@ pub struct SweepPairs {
     kinds: Vec<i32>,
     tags: Vec<i32>,
     planes: Vec<PlanePairs>,
-}
-
-impl std::fmt::Debug for SweepPairs {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("SweepPairs").field("range", &self.range).finish_non_exhaustive()
-    }
 }
 
 impl SweepPairs {
@@ -84,7 +79,7 @@ impl SweepPairs {
                     images.find_nearest(&mut d);
                     let d = d.map(|[d]| d);
                     if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < *range * *range {
-                        pairs.push_in_box(places.host(i), places.host(j), d, species);
+                        pairs.force.push(places.host(i), places.host(j), d, species);
                     }
                 }
             }

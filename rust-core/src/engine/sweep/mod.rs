@@ -57,10 +57,9 @@ pub struct Sweep {
     /// The pool of threads.
     pub pool: Arc<Pool>,
     workspace: EitherPrecision,
-    species_of_type: Vec<i32>,
     /// Additions to the densities of owned particles in the next evaluation: a row of
     /// [`Plan::slope_width`] for each, or an empty list.
-    added_densities: Vec<f64>,
+    pub(super) added_densities: Vec<f64>,
     /// Pairs that do not interact.
     pub(super) exclusions: Exclusions,
     /// Slopes `∂ψ/∂n` of owned particles, [`Plan::slope_width`] each, followed by those of ghosts, which the host writes after
@@ -99,17 +98,8 @@ impl std::fmt::Debug for Sweep {
     }
 }
 
-impl Clone for Sweep {
-    /// Creates a new sweep for the same fluid, with the same threads, before any evaluation.
-    fn clone(&self) -> Sweep {
-        let mut clone = Sweep::of_plan(self.plan.clone(), self.settings, self.pool.clone());
-        clone.species_of_type.clone_from(&self.species_of_type);
-        clone
-    }
-}
-
 impl Sweep {
-    /// Creates a sweep for `fluid`; types are species indices unless [`Sweep::map_kinds`] maps them.
+    /// Creates a sweep for `fluid`, whose types are species indices.
     ///
     /// # Errors
     /// Fails as [`Plan::new`].
@@ -126,14 +116,12 @@ impl Sweep {
             Precision::Mixed => EitherPrecision::Mixed(Box::new(Workspace::new(&plan, set, threads))),
             Precision::Double => EitherPrecision::Double(Box::new(Workspace::new(&plan, set, threads))),
         };
-        let species_of_type = (0..plan.species.len() as i32).collect();
         Sweep {
             plan,
             settings,
             set,
             pool,
             workspace,
-            species_of_type,
             added_densities: Vec::new(),
             exclusions: Exclusions::default(),
             slopes: Vec::new(),
@@ -157,22 +145,6 @@ impl Sweep {
     /// [`Statistics::out_of_bounds`](super::Statistics::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
-    }
-
-    /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
-    ///
-    /// # Errors
-    /// Fails for a species index out of range.
-    pub fn map_kinds(&mut self, species_of_type: &[i32]) -> Result<(), EngineError> {
-        self.plan.check_kinds(species_of_type)?;
-        self.species_of_type = species_of_type.to_vec();
-        Ok(())
-    }
-
-    /// The plan, the species of types, and for later evaluations the excluded pairs and additions to the densities of
-    /// owned particles, a row of [`Plan::slope_width`] for each, or an empty list.
-    pub(super) fn beside_mut(&mut self) -> (&Plan, &[i32], &mut Exclusions, &mut Vec<f64>) {
-        (&self.plan, &self.species_of_type, &mut self.exclusions, &mut self.added_densities)
     }
 
     /// Whether particles in `domain` are near at most one image of each other, as a sweep without
@@ -246,9 +218,16 @@ impl Sweep {
             return Err(EngineError::Host("the force array is too short"));
         }
         particles.check_images(images)?;
-        let input =
-            Input::new(&particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
-                .excluding(&self.exclusions);
+        let input = Input {
+            particles,
+            images,
+            v,
+            species_of_type: &self.plan.species_of_type,
+            added_densities: &self.added_densities,
+            exclusions: Some(&self.exclusions),
+            thermostat,
+            totals: want.energy || want.virial,
+        };
         let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
         let listed = self.asked.take().filter(|_| can_list);
         self.has_listed = false;
@@ -337,7 +316,7 @@ impl Sweep {
     /// The host's numbers of its particles in the order of cells; a host that keeps its particles in
     /// this order makes sorting cheap.
     pub fn order(&self) -> &[u32] {
-        with!(&self.workspace, m => m.order())
+        with!(&self.workspace, m => &m.order.order)
     }
 
     /// Size in bytes of the arrays over particles and pairs.

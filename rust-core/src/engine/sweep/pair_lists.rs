@@ -19,58 +19,28 @@ use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
-use psidpd_passes::tally::Want;
-use psidpd_threads::{Pool, part};
+use psidpd_threads::{Pool, part, take};
 
 /// Sorted particles, and scratch arrays.
+#[derive(Debug, Default)]
 pub struct PairLists {
     set: InstructionSet,
     dimensions: usize,
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
-    /// Sorted index by index of the host, or [`NOWHERE`].
-    place: Vec<u32>,
-}
-
-/// The sorted index of particles that are left out.
-pub const NOWHERE: u32 = u32::MAX;
-
-impl Clone for PairLists {
-    /// Copies the order; the clone has scratch arrays of its own.
-    fn clone(&self) -> PairLists {
-        let PairLists { set, dimensions, cells, particles, place, .. } = self;
-        PairLists {
-            set: *set,
-            dimensions: *dimensions,
-            cells: cells.clone(),
-            particles: particles.clone(),
-            buffers: Vec::new(),
-            place: place.clone(),
-        }
-    }
+    /// The sorted index of each particle of the host, beyond all for particles that are left out.
+    pub place: Vec<u32>,
 }
 
 impl PairLists {
     pub fn new(set: InstructionSet, dimensions: usize) -> PairLists {
-        PairLists {
-            set,
-            dimensions,
-            cells: CellOrder::new(dimensions),
-            particles: SortedParticles::default(),
-            buffers: Vec::new(),
-            place: Vec::new(),
-        }
+        PairLists { set, dimensions, ..PairLists::default() }
     }
 
     /// The host's index of each sorted particle.
     pub fn order(&self) -> &[u32] {
         &self.cells.order
-    }
-
-    /// The sorted index of each particle of the host; [`NOWHERE`] for particles that are left out.
-    pub fn place(&self) -> &[u32] {
-        &self.place
     }
 
     /// Finds the pairs of `particles` within `range`, extended by the fraction `margin` where the box
@@ -91,7 +61,8 @@ impl PairLists {
         [range, margin]: [f64; 2],
         planes: &mut Vec<PlanePairs>,
     ) -> Result<(), EngineError> {
-        let input = Input::new(particles, images, &[], species_of_kind, &[], None, Want::FORCES);
+        let input =
+            Input { particles: *particles, images, species_of_type: species_of_kind, ..Input::default() };
         let set = self.set;
         let range = self.range_within(domain, range, margin)?;
         let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
@@ -121,22 +92,18 @@ impl PairLists {
             packed: shared.packed,
             terms,
         };
-        let threads = pool.threads();
-        let count = planes.len();
-        let mut rest = planes.iter_mut().enumerate();
-        let mut work: Vec<_> = self
-            .buffers
-            .iter_mut()
-            .enumerate()
-            .map(|(t, buffers)| {
-                (buffers, rest.by_ref().take(part(count, t, threads).len()).collect::<Vec<_>>())
-            })
-            .collect();
-        pool.each(&mut work, |(buffers, planes)| {
-            for (number, plane) in planes {
-                plane.lie_in(cells, *number);
+        let (count, threads) = (planes.len(), pool.threads());
+        let mut rest = &mut planes[..];
+        let of_thread = |(t, buffers): (usize, _)| {
+            let numbers = part(count, t, threads);
+            (buffers, take(&mut rest, numbers.len()), numbers)
+        };
+        let mut work: Vec<_> = self.buffers.iter_mut().enumerate().map(of_thread).collect();
+        pool.each(&mut work, |(buffers, planes, numbers)| {
+            for (number, plane) in numbers.clone().zip(planes.iter_mut()) {
+                plane.lie_in(cells, number);
                 // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
-                unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.lists) };
+                unsafe { list_pairs(set, inputs, number, buffers, &mut plane.lists) };
             }
         });
         Ok(())
@@ -145,15 +112,14 @@ impl PairLists {
     /// Takes over the order of a sweep.
     pub fn follow(&mut self, cells: &CellOrder) {
         self.cells.order.clone_from(&cells.order);
-        self.find_places(cells.all);
+        cells.find_places(&mut self.place);
     }
 
     /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag
     /// and noise at the range are almost zero there.
     fn range_within(&self, domain: &PeriodicBox, range: f64, margin: f64) -> Result<f64, EngineError> {
-        let longest =
-            (0..self.dimensions).map(|k| domain.edge(k).map(f64::abs).into_iter().fold(0.0, f64::max));
-        let longest = longest.fold(4.0 * range, f64::max);
+        let edges = (0..self.dimensions).flat_map(|k| domain.edge(k));
+        let longest = edges.map(f64::abs).fold(4.0 * range, f64::max);
         let periodic = domain.periodic();
         let heights = (0..self.dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
@@ -170,30 +136,18 @@ impl PairLists {
         let mut rest = &mut order[..];
         let mut work: Vec<_> = (0..threads)
             .map(|t| {
-                let starts = &start[part(cells, t, threads)];
-                let end = start[part(cells, t, threads).end] as usize;
-                let first = starts.first().map_or(end, |first| *first as usize);
-                (starts, end, rest.split_off_mut(..end - first).unwrap_or_default())
+                let part = part(cells, t, threads);
+                let count = start[part.end] - start[part.start];
+                (&start[part.start..=part.end], take(&mut rest, count as usize))
             })
             .collect();
-        pool.each(&mut work, |(starts, end, order)| {
-            let first = starts.first().map_or(*end, |first| *first as usize);
-            let ends = starts.iter().skip(1).map(|s| *s as usize).chain([*end]);
-            for (from, to) in starts.iter().map(|s| *s as usize).zip(ends).filter(|(from, to)| to - from > 1)
-            {
-                order[from - first..to - first].sort_unstable_by_key(|k| tags[*k as usize]);
+        pool.each(&mut work, |(starts, order)| {
+            for cell in starts.windows(2).filter(|ends| ends[1] - ends[0] > 1) {
+                let [from, to] = [cell[0], cell[1]].map(|place| (place - starts[0]) as usize);
+                order[from..to].sort_unstable_by_key(|k| tags[*k as usize]);
             }
         });
-        self.find_places(tags.len());
-    }
-
-    /// Finds the sorted index of each of the host's particles.
-    fn find_places(&mut self, all: usize) {
-        self.place.clear();
-        self.place.resize(all, NOWHERE);
-        for (sorted, k) in self.cells.order.iter().enumerate() {
-            self.place[*k as usize] = sorted as u32;
-        }
+        self.cells.find_places(&mut self.place);
     }
 
     /// Fills the arrays in the order of cells.
@@ -201,11 +155,10 @@ impl PairLists {
         self.particles.make_room(&self.cells, multispecies);
         let (set, cells, threads) = (self.set, &self.cells, pool.threads());
         let shared = &self.particles.share();
-        let mut work: Vec<_> = (0..threads).map(|t| cells.whole_vectors(t, threads)).collect();
-        pool.each(&mut work, |places| {
+        pool.run(&|t| {
             // SAFETY: `whole_vectors` gives threads disjoint indices that begin at whole vectors; no
             // thread reads the arrays meanwhile.
-            unsafe { shared.fill(set, cells, input, places.clone()) };
+            unsafe { shared.fill(set, cells, input, cells.whole_vectors(t, threads)) };
         });
         self.particles.copy_first_plane(&self.cells);
     }

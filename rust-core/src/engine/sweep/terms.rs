@@ -1,12 +1,12 @@
 //! The plan of a fluid as tables of numbers in the precision of the pairs.
 
 use crate::engine::fault::Fault;
-use crate::engine::plan::{PairStorage, Plan, ThermostatPlan};
+use crate::engine::plan::Plan;
 use crate::model::PairTerm;
 use crate::model::kernel::Kernel;
 use crate::model::pair::{PairForm, PairPotential, SplineAttractive};
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
-use psidpd_passes::ground::terms::{Exponent, Linear, Pass, Soft, Spline, Terms, ThermostatTables};
+use psidpd_passes::ground::terms::{Linear, Pass, Soft, Spline, Terms, ThermostatTables};
 use psidpd_passes::simd::Scalar;
 
 /// The tables of all terms of a plan.
@@ -51,12 +51,12 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
             pass(&density.kernel, &density.force_kernel, factor(Fault::ManyBodyForce))
         })
         .collect();
-    terms.full_cache = plan.pair_storage() == Some(PairStorage::FullCache);
+    terms.full_cache = plan.caches_all_pairs();
     terms.thermostat = plan.thermostat.as_ref().map(|t| ThermostatTables {
         gamma: SpeciesPairTable::new(t.gamma.iter().map(|x| T::of(factor(Fault::Drag) * x))),
         sigma: SpeciesPairTable::new(t.sigma.iter().map(|x| T::of(factor(Fault::Noise) * x))),
         inverse_range: SpeciesPairTable::new(t.range.iter().map(|x| T::of(inverse(*x)))),
-        exponent: exponent(t),
+        exponent: t.exponent_of_weights(),
     });
     terms
 }
@@ -64,17 +64,6 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
 /// The reciprocal of a range. A range of zero gives a number so large that every pair is beyond the range.
 fn inverse(range: f64) -> f64 {
     if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
-}
-
-fn exponent<T: Scalar>(plan: &ThermostatPlan) -> Exponent<T> {
-    let all = |e: f64| plan.exponent.iter().zip(&plan.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
-    if all(1.0) {
-        Exponent::One
-    } else if all(2.0) {
-        Exponent::Two
-    } else {
-        Exponent::Any(SpeciesPairTable::new(plan.exponent.iter().map(|x| T::of(*x))))
-    }
 }
 
 fn pass<T: Scalar>(kernel: &Kernel, force: &Kernel, factor: f64) -> Pass<T> {

@@ -71,7 +71,7 @@ impl<P: PairPrecision> Workspace<P> {
         let threads = (0..threads).map(|_| ThreadState::new(terms.passes.len(), set)).collect();
         Workspace {
             fluid: FluidConstants { set, terms, variables },
-            order: CellOrder::new(plan.dimensions),
+            order: CellOrder::default(),
             particles: SortedParticles::default(),
             excluded: ExcludedPairs::default(),
             accumulators: AccumulatorArrays::default(),
@@ -146,15 +146,7 @@ impl<P: PairPrecision> Workspace<P> {
         if !has_excess {
             self.results.excess.fill(0.0);
         }
-        {
-            let Workspace { fluid, order, particles, results, threads, .. } = self;
-            let particles = &particles.share();
-            let slabs = results.split(order, units, width, threads);
-            let mut slabs: Vec<_> = slabs.into_iter().enumerate().collect();
-            pool.each(&mut slabs, |(t, slab)| {
-                Scheduler::<P>::fill_start(particles, fluid, order, input, slab, *t == 0);
-            });
-        }
+        self.on_slabs(units, |scheduler, slabs| scheduler.fill_start(pool, input, slabs));
         self.particles.copy_first_plane(&self.order);
     }
 

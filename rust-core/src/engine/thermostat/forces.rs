@@ -1,7 +1,7 @@
 //! Drag and noise as forces on the particles of a host.
 
 use super::PairThermostat;
-use super::pass::{Wide, add_to_host, virial};
+use super::pass::{Sums, Wide, add_to_host, virial};
 use crate::engine::sweep::Pool;
 
 impl PairThermostat {
@@ -25,8 +25,13 @@ impl PairThermostat {
         sums.compute(pool, *set, planes, noise);
         let virial = virial(pool, planes, sums, noise, factor);
         // Frozen particles receive forces like others; the integrator does not move them.
-        let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
-        add_to_host(pool, lists.place(), &all, -factor, force);
+        let all: Vec<Wide> = Sums::halves(&mut sums.of_plane, planes)
+            .flat_map(|(own, below)| {
+                let below = below.iter().chain(std::iter::repeat(&Wide::ZERO));
+                own.iter().zip(below).map(|(a, b)| Wide([0, 1, 2, 3].map(|c| a[c] + b[c])))
+            })
+            .collect();
+        add_to_host(pool, &lists.place, &all, -factor, force);
         virial
     }
 }

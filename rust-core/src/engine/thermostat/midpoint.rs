@@ -25,29 +25,13 @@
 //! known from the coefficients of the iterations; they then go on until it is below 1 %.
 
 use super::PairThermostat;
-use super::particle_loops::{Advance, Finish, Multiply, Start};
+use super::particle_loops::{Advance, Finish, Multiply, Share, Start};
 use super::pass::{Sums, Wide, add_to_host, virial};
 use super::solution::{End, Move, Progress, Solution, TOLERANCE, TOLERANCE_OF_DRAG};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
-
-/// The data of one plane during a step of the solver.
-struct Share<'a> {
-    p: &'a mut [Wide],
-    /// Sums over pairs, of the plane itself and of the plane below.
-    image: &'a mut [Wide],
-    below: &'a [Wide],
-    inertia: &'a [f64],
-    inverse_mass: &'a [f64],
-    residual: &'a mut [Wide],
-    solution: &'a mut [Wide],
-}
-
-/// Takes the first `count` vectors off `rest`.
-fn first<'a>(rest: &mut &'a mut [Wide], count: usize) -> &'a mut [Wide] {
-    rest.split_off_mut(..count).unwrap_or_default()
-}
+use psidpd_threads::take;
 
 impl PairThermostat {
     /// Does `work` for every plane; returns the sums of the scalar products, in the order of the planes.
@@ -56,15 +40,15 @@ impl PairThermostat {
         pool: &Pool,
         work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let PairThermostat { planes, set, masses, sums, solution, .. } = self;
+        let PairThermostat { planes, set, inertia, inverse_mass, sums, solution, .. } = self;
         let (Sums { p, of_plane }, Solution { change, residual, .. }) = (sums, solution);
         let mut rest = [&mut p[..], residual, change];
         let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
             .zip(planes.iter())
             .map(|((image, below), plane)| {
                 let own = plane.own.clone();
-                let [p, residual, solution] = rest.each_mut().map(|rest| first(rest, own.len()));
-                let (inertia, inverse_mass) = (&masses.inertia[own.clone()], &masses.inverse[own]);
+                let [p, residual, solution] = rest.each_mut().map(|rest| take(rest, own.len()));
+                let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
                 (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
             })
             .collect();
@@ -87,10 +71,11 @@ impl PairThermostat {
         let mut virial = [0.0; 6];
         if self.wants_virial {
             let mut at = v.to_vec();
-            self.add_direction(pool, &mut at);
+            // After the last iteration, `p` is δ without its residual.
+            add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut at);
             virial = self.virial_at(pool, &at, noise);
         }
-        self.add_solution(pool, factor, v);
+        add_to_host(pool, &self.lists.place, &self.solution.change, factor, v);
         virial
     }
 
@@ -105,10 +90,7 @@ impl PairThermostat {
         }
         sums.gather(pool, lists.order(), v);
         sums.compute(pool, *set, planes, if noise { kt.sqrt() } else { 0.0 });
-        let [first, _] =
-            self.on_planes(pool, |Share { p, image: own, below, inverse_mass, residual, .. }, set| {
-                [vectors::run(set, Start { inverse_mass, own, below, residual, p }), 0.0]
-            });
+        let [first, _] = self.on_planes(pool, |share, set| [vectors::run(set, Start(share)), 0.0]);
         first
     }
 
@@ -116,9 +98,7 @@ impl PairThermostat {
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
         self.sums.compute(pool, self.set, &self.planes, 0.0);
-        self.on_planes(pool, |Share { p, image, below, inertia, inverse_mass, .. }, set| {
-            vectors::run(set, Multiply { p, inertia, inverse_mass, image, below })
-        })
+        self.on_planes(pool, |share, set| vectors::run(set, Multiply(share)))
     }
 
     /// Moves along the direction, and computes the next one; returns false after the last iteration. The totals are the
@@ -132,31 +112,14 @@ impl PairThermostat {
         if let Some(end) = outcome {
             self.effort.add(self.iterations(), self.from_forces.are_present, end == End::Inaccurate);
         }
-        self.on_planes(pool, |Share { p, image, inverse_mass, residual, solution, .. }, set| {
+        self.on_planes(pool, |share, set| {
             match outcome {
-                None => {
-                    let advance =
-                        Advance { is_first, alpha, beta, inverse_mass, image, solution, residual, p };
-                    vectors::run(set, advance);
-                }
-                Some(_) => {
-                    let finish = Finish { is_first, alpha, rest, inverse_mass, p, image, residual, solution };
-                    vectors::run(set, finish);
-                }
+                None => vectors::run(set, Advance { share, is_first, alpha, beta }),
+                Some(_) => vectors::run(set, Finish { share, is_first, alpha, rest }),
             }
             [0.0; 2]
         });
         outcome.is_none()
-    }
-
-    /// Adds `p` to the velocities `v`: after the last iteration, δ without its residual.
-    pub(super) fn add_direction(&self, pool: &Pool, v: &mut [[f64; 3]]) {
-        add_to_host(pool, self.lists.place(), &self.sums.p, 1.0, v);
-    }
-
-    /// Adds `factor` times the solution to the velocities `v`.
-    pub(super) fn add_solution(&self, pool: &Pool, factor: f64, v: &mut [[f64; 3]]) {
-        add_to_host(pool, self.lists.place(), &self.solution.change, factor, v);
     }
 
     /// The virial of drag at the velocities `v`, and of noise.

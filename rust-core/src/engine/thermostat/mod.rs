@@ -20,10 +20,10 @@
 
 mod bodies;
 mod effort;
+mod encounter;
 mod exchange;
 mod forces;
 mod listed;
-mod masses;
 mod measure;
 mod midpoint;
 mod of_forces;
@@ -48,10 +48,10 @@ use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
+use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
 use listed::{FromForces, Listed};
-use masses::Masses;
-use pass::Sums;
+use pass::{Sums, fill};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::plane::list::ListTerms;
@@ -65,7 +65,7 @@ pub enum Update {
     Midpoint,
     /// Drag alone, by the implicit Euler rule over all pairs: `(M + ½ΔtG) v′ = M v`.
     ImplicitDrag,
-    /// The exact Ornstein–Uhlenbeck process of each pair in turn; see `sequential.rs`.
+    /// The exact Ornstein–Uhlenbeck process of each pair in turn; see `encounter.rs`.
     OrnsteinUhlenbeck,
     /// Half an explicit and half an implicit step, for each pair in turn.
     Shardlow {
@@ -77,7 +77,7 @@ pub enum Update {
 }
 
 /// Drag and noise of the pairs of one fluid.
-#[derive(Clone)]
+#[derive(Debug)]
 pub struct PairThermostat {
     plan: ThermostatPlan,
     dimensions: usize,
@@ -88,7 +88,9 @@ pub struct PairThermostat {
     planes: Vec<PlanePairs>,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
-    masses: Masses,
+    /// Mass of each sorted particle; 0 where it is infinite.
+    inertia: Vec<f64>,
+    inverse_mass: Vec<f64>,
     sums: Sums,
     solution: Solution,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
@@ -100,12 +102,6 @@ pub struct PairThermostat {
     exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
-}
-
-impl std::fmt::Debug for PairThermostat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("PairThermostat").field("kt", &self.kt).field("dt", &self.dt).finish_non_exhaustive()
-    }
 }
 
 impl PairThermostat {
@@ -122,7 +118,8 @@ impl PairThermostat {
             lists: PairLists::new(set, plan.dimensions),
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
-            masses: Masses::default(),
+            inertia: Vec::new(),
+            inverse_mass: Vec::new(),
             sums: Sums::default(),
             solution: Solution::default(),
             impulses: Vec::new(),
@@ -175,7 +172,12 @@ impl PairThermostat {
             lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
         }
         self.measure(pool, around.domain, particles, species_of_kind);
-        self.masses.sort(pool, self.lists.order(), mass);
+        let order = self.lists.order();
+        fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
+        fill(pool, &mut self.inertia, order, |k| {
+            let m = mass(k);
+            if m.is_finite() { m } else { 0.0 }
+        });
         Ok(())
     }
 
@@ -205,16 +207,16 @@ impl PairThermostat {
         match update {
             Update::Midpoint => self.implicit(pool, v, true),
             Update::ImplicitDrag => self.implicit(pool, v, false),
-            Update::OrnsteinUhlenbeck => self.ornstein_uhlenbeck(pool, v),
-            Update::Shardlow { reversed } => self.shardlow(pool, v, reversed),
-            Update::LoweAndersen => self.lowe_andersen(pool, v),
+            Update::OrnsteinUhlenbeck => self.in_turn(pool, v, ornstein_uhlenbeck, false, false),
+            Update::Shardlow { reversed } => self.in_turn(pool, v, shardlow, reversed, false),
+            Update::LoweAndersen => self.in_turn(pool, v, lowe_andersen, false, true),
         }
     }
 
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let moving = self.masses.inertia.iter().filter(|m| **m > 0.0).count();
+        let moving = self.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
@@ -222,7 +224,7 @@ impl PairThermostat {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let inverse = self.masses.inverse[i] + self.masses.inverse[j];
+                let inverse = self.inverse_mass[i] + self.inverse_mass[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     squares += along * along / inverse;
@@ -244,11 +246,6 @@ impl PairThermostat {
     /// Iterations of all implicit updates so far.
     pub fn effort(&self) -> Effort {
         self.effort
-    }
-
-    /// Number of pairs in range.
-    pub fn pairs(&self) -> usize {
-        self.planes.iter().map(|plane| plane.lists.own.count() + plane.lists.with_ghosts.count()).sum()
     }
 }
 

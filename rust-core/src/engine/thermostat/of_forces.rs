@@ -27,7 +27,7 @@ impl PairThermostat {
     /// same positions, with the particles in the same order.
     pub fn take(&mut self, engine: &mut Engine) {
         let taken = engine.sweep_mut().take_pairs(&mut self.lists, &mut self.planes);
-        let particles = self.lists.place().len();
+        let particles = self.lists.place.len();
         self.from_forces.listed =
             self.from_forces.listed.filter(|_| taken).map(|listed| Listed { particles, ..listed });
     }

@@ -3,26 +3,33 @@
 use super::pass::Wide;
 use crate::engine::vectors::Loop;
 
-/// Sets the residual to the negative sum of `own` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
-pub struct Start<'a> {
-    pub inverse_mass: &'a [f64],
-    pub own: &'a [Wide],
+/// The data of one plane during a step of the solver.
+pub struct Share<'a> {
+    pub p: &'a mut [Wide],
+    /// Sums over the pairs of the plane itself.
+    pub image: &'a mut [Wide],
     /// Contributions of the plane below; empty if it has no pairs with these particles.
     pub below: &'a [Wide],
+    /// Mass of each particle; 0 if it is frozen.
+    pub inertia: &'a [f64],
+    pub inverse_mass: &'a [f64],
     pub residual: &'a mut [Wide],
-    pub p: &'a mut [Wide],
+    pub solution: &'a mut [Wide],
 }
 
-impl Loop for Start<'_> {
+/// Sets the residual to the negative sum of `image` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
+pub struct Start<'s, 'a>(pub &'s mut Share<'a>);
+
+impl Loop for Start<'_, '_> {
     type Out = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Start { inverse_mass, own, below, residual, p } = self;
+        let Share { p, image, below, inverse_mass, residual, .. } = self.0;
         let mut sum = Wide::ZERO;
-        let particles = residual.iter_mut().zip(p).zip(own).zip(inverse_mass);
-        let each = |(((r, p), own), inverse): (((&mut Wide, &mut Wide), &Wide), &f64), below: Wide| {
-            *r = times(Wide([-1.0; 4]), plus(*own, 1.0, below));
+        let particles = residual.iter_mut().zip(p.iter_mut()).zip(image.iter()).zip(*inverse_mass);
+        let each = |(((r, p), image), inverse): (((&mut Wide, &mut Wide), &Wide), &f64), below: Wide| {
+            *r = times(Wide([-1.0; 4]), plus(*image, 1.0, below));
             *p = times(Wide([*inverse; 4]), *r);
             sum = plus(sum, 1.0, times(*p, *r));
         };
@@ -33,24 +40,16 @@ impl Loop for Start<'_> {
 
 /// Adds `m p` and the contributions of the plane below to the sums of the particles of a plane, which become the
 /// image `(M + K) p`; returns `p · image` and `image · M⁻¹ image` of the particles that are not frozen.
-pub struct Multiply<'a> {
-    pub p: &'a [Wide],
-    /// Mass of each particle; 0 if it is frozen.
-    pub inertia: &'a [f64],
-    pub inverse_mass: &'a [f64],
-    pub image: &'a mut [Wide],
-    /// Contributions of the plane below; empty if it has no pairs with these particles.
-    pub below: &'a [Wide],
-}
+pub struct Multiply<'s, 'a>(pub &'s mut Share<'a>);
 
-impl Loop for Multiply<'_> {
+impl Loop for Multiply<'_, '_> {
     type Out = [f64; 2];
 
     #[inline(always)]
     fn run(self) -> [f64; 2] {
-        let Multiply { p, inertia, inverse_mass, image, below } = self;
+        let Share { p, image, below, inertia, inverse_mass, .. } = self.0;
         let (mut curvature, mut square) = (Wide::ZERO, Wide::ZERO);
-        let particles = image.iter_mut().zip(p).zip(inertia).zip(inverse_mass);
+        let particles = image.iter_mut().zip(p.iter()).zip(*inertia).zip(*inverse_mass);
         let each = |(((image, p), inertia), inverse): (((&mut Wide, &Wide), &f64), &f64), below: Wide| {
             let momentum = times(Wide([*inertia; 4]), *p);
             *image = plus(plus(*image, 1.0, below), 1.0, momentum);
@@ -74,26 +73,22 @@ fn with_below<P>(particles: impl Iterator<Item = P>, below: &[Wide], mut each: i
 
 /// Computes `solution ← solution + alpha p`, or `alpha p` if there is none yet, `residual ← residual − alpha image` and then
 /// `p ← M⁻¹ residual + beta p`.
-pub struct Advance<'a> {
+pub struct Advance<'s, 'a> {
+    pub share: &'s mut Share<'a>,
     pub is_first: bool,
     pub alpha: f64,
     pub beta: f64,
-    pub inverse_mass: &'a [f64],
-    pub image: &'a [Wide],
-    pub solution: &'a mut [Wide],
-    pub residual: &'a mut [Wide],
-    pub p: &'a mut [Wide],
 }
 
-impl Loop for Advance<'_> {
+impl Loop for Advance<'_, '_> {
     type Out = ();
 
     #[inline(always)]
     fn run(self) {
-        let Advance { is_first, alpha, beta, inverse_mass, image, solution, residual, p } = self;
-        for ((((s, r), p), image), inverse) in
-            solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
-        {
+        let Advance { share, is_first, alpha, beta } = self;
+        let Share { p, image, inverse_mass, residual, solution, .. } = share;
+        let particles = solution.iter_mut().zip(residual.iter_mut()).zip(p.iter_mut()).zip(image.iter());
+        for ((((s, r), p), image), inverse) in particles.zip(*inverse_mass) {
             *s = plus(if is_first { Wide::ZERO } else { *s }, alpha, *p);
             *r = plus(*r, -alpha, *image);
             *p = plus(times(Wide([beta; 4]), *p), *inverse, *r);
@@ -103,26 +98,22 @@ impl Loop for Advance<'_> {
 
 /// The last step: computes `p ← solution + alpha p` and `solution ← p + rest M⁻¹ (residual − alpha image)`, without
 /// the old solution if there is none yet.
-pub struct Finish<'a> {
+pub struct Finish<'s, 'a> {
+    pub share: &'s mut Share<'a>,
     pub is_first: bool,
     pub alpha: f64,
     pub rest: f64,
-    pub inverse_mass: &'a [f64],
-    pub p: &'a mut [Wide],
-    pub image: &'a [Wide],
-    pub residual: &'a [Wide],
-    pub solution: &'a mut [Wide],
 }
 
-impl Loop for Finish<'_> {
+impl Loop for Finish<'_, '_> {
     type Out = ();
 
     #[inline(always)]
     fn run(self) {
-        let Finish { is_first, alpha, rest, inverse_mass, p, image, residual, solution } = self;
-        for ((((s, r), p), image), inverse) in
-            solution.iter_mut().zip(residual).zip(p).zip(image).zip(inverse_mass)
-        {
+        let Finish { share, is_first, alpha, rest } = self;
+        let Share { p, image, inverse_mass, residual, solution, .. } = share;
+        let particles = solution.iter_mut().zip(residual.iter()).zip(p.iter_mut()).zip(image.iter());
+        for ((((s, r), p), image), inverse) in particles.zip(*inverse_mass) {
             *p = plus(if is_first { Wide::ZERO } else { *s }, alpha, *p);
             *s = plus(*p, rest * *inverse, plus(*r, -alpha, *image));
         }

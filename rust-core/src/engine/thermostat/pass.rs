@@ -62,29 +62,12 @@ impl Sums {
                 (own, &*next)
             })
             .unzip();
-        let below: Vec<_> = (0..planes.len())
-            .map(|number| below(planes, number).map_or(&[][..], |(below, _)| next[below]))
-            .collect();
-        own.into_iter().zip(below)
+        let below = move |number: usize| {
+            let below = number.checked_sub(1).unwrap_or(planes.len() - 1);
+            if planes[below].next == planes[number].own { next[below] } else { &[] }
+        };
+        own.into_iter().zip((0..planes.len()).map(below))
     }
-
-    /// The sums of the particles of a plane.
-    pub fn of(&self, planes: &[PlanePairs], number: usize) -> impl Iterator<Item = Wide> {
-        let own = &self.of_plane[number][..planes[number].own.len()];
-        let below = below(planes, number).map_or(&[][..], |(below, count)| &self.of_plane[below][count..]);
-        let zeros = std::iter::repeat(&Wide::ZERO);
-        own.iter().zip(below.iter().chain(zeros)).map(|(a, b)| Wide([0, 1, 2, 3].map(|c| a[c] + b[c])))
-    }
-}
-
-/// The plane below, and the number of its own particles, if it has pairs with the particles of a plane.
-fn below(planes: &[PlanePairs], number: usize) -> Option<(usize, usize)> {
-    let below = match number {
-        0 => planes.len() - 1,
-        number => number - 1,
-    };
-    let below_has = &planes[below];
-    (below_has.next == planes[number].own).then_some((below, below_has.own.len()))
 }
 
 /// Virial `Σ r_ij ⊗ F_ij` of the opposite, `g (a ξ − g·(p_i − p_j))`: xx, yy, zz, xy, xz, yz; half of it for pairs with
@@ -134,11 +117,7 @@ pub fn fill<T: Copy + Default + Send>(
     value: impl Fn(usize) -> T + Sync,
 ) {
     to.resize(order.len(), T::default());
-    pool.parts(to, |first, to| {
-        for (to, k) in to.iter_mut().zip(&order[first..]) {
-            *to = value(*k as usize);
-        }
-    });
+    each_with(pool, to, order, |to, k| *to = value(k));
 }
 
 /// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not left out.
@@ -154,11 +133,18 @@ pub fn each_of_host(
     to: &mut [[f64; 3]],
     change: impl Fn(&mut [f64; 3], &Wide) + Sync,
 ) {
+    each_with(pool, to, place, |to, place| {
+        if let Some(from) = from.get(place) {
+            change(to, from);
+        }
+    });
+}
+
+/// Does `work` with each element of an array and its number, divided among the threads.
+fn each_with<T: Send>(pool: &Pool, to: &mut [T], numbers: &[u32], work: impl Fn(&mut T, usize) + Sync) {
     pool.parts(to, |first, to| {
-        for (to, place) in to.iter_mut().zip(&place[first..]) {
-            if let Some(from) = from.get(*place as usize) {
-                change(to, from);
-            }
+        for (to, number) in to.iter_mut().zip(&numbers[first..]) {
+            work(to, *number as usize);
         }
     });
 }

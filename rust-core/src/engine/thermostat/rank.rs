@@ -6,7 +6,7 @@
 
 use super::PairThermostat;
 use super::exchange::Round;
-use super::pass::{Wide, each_of_host};
+use super::pass::{Wide, add_to_host, each_of_host};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
@@ -115,7 +115,7 @@ impl PairThermostat {
                 true => Ok(self.show_direction(pool, vectors)),
                 false if self.wants_virial => {
                     vectors[..v.len()].copy_from_slice(v);
-                    self.add_direction(pool, &mut vectors[..v.len()]);
+                    add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut vectors[..v.len()]);
                     self.exchange.round = Round::Middle;
                     Ok(Need::Ghosts)
                 }
@@ -129,25 +129,25 @@ impl PairThermostat {
     }
 
     fn check(&self, vectors: &[[f64; 3]]) -> Result<(), EngineError> {
-        if vectors.len() == self.lists.place().len() { Ok(()) } else { Err(CHANGED) }
+        if vectors.len() == self.lists.place.len() { Ok(()) } else { Err(CHANGED) }
     }
 
     /// Asks for the direction of ghosts.
     fn show_direction(&mut self, pool: &Pool, vectors: &mut [[f64; 3]]) -> Need {
         let owned = &mut vectors[..self.exchange.owned];
-        each_of_host(pool, self.lists.place(), &self.sums.p, owned, |to, p| *to = [p[0], p[1], p[2]]);
+        each_of_host(pool, &self.lists.place, &self.sums.p, owned, |to, p| *to = [p[0], p[1], p[2]]);
         self.exchange.round = Round::Direction;
         Need::Ghosts
     }
 
     fn end(&mut self, pool: &Pool, v: &mut [[f64; 3]], virial: [f64; 6]) -> Need {
-        self.add_solution(pool, 2.0, v);
+        add_to_host(pool, &self.lists.place, &self.solution.change, 2.0, v);
         self.exchange.round = Round::Start;
         Need::Nothing(virial)
     }
 
     fn take_ghosts(&mut self, vectors: &[[f64; 3]]) {
-        for ([x, y, z], place) in vectors.iter().zip(self.lists.place()).skip(self.exchange.owned) {
+        for ([x, y, z], place) in vectors.iter().zip(&self.lists.place).skip(self.exchange.owned) {
             // Particles that are left out have no place.
             if let Some(p) = self.sums.p.get_mut(*place as usize) {
                 *p = Wide([*x, *y, *z, 0.0]);

@@ -3,64 +3,13 @@
 //! The pairs of a particle are updated one after the other, particles in the order of cells, and planes
 //! in an order of their own: every second plane first. These run at once, as no two of them share
 //! particles. The order depends on positions and tags alone.
-//!
-//! With `u = ê·v_ij`, the reduced mass μ and `a = |g|²/μ = ½ΔtD/μ`, each rule computes a new `u′` that
-//! preserves the normal distribution of variance kT/μ, for any Δt.
 
 use super::PairThermostat;
+use super::encounter::Encounter;
 use super::pass::add_virial;
 use crate::engine::sweep::{PlanePairs, Pool};
 use psidpd_passes::noise::Law;
 use psidpd_passes::plane::list::pairs_of_each;
-
-/// The order in which the pairs come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Order {
-    Forward,
-    Reversed,
-}
-
-/// The pair that a rule updates.
-#[derive(Debug, Clone, Copy)]
-pub struct Encounter {
-    /// Relative velocity times `|g|`, `|g| u`.
-    along: f64,
-    /// Ratio `½ Δt D/μ`.
-    a: f64,
-    /// Square `|g|²`.
-    square: f64,
-    mu: f64,
-    kt: f64,
-    xi: f64,
-    /// Uniform random number on (0, 1), for rules that need one.
-    chance: f64,
-}
-
-impl Encounter {
-    /// The factor of `g` in the impulse on the first particle that changes `u` to `factor u + noise √(kT/μ) ξ`.
-    #[inline(always)]
-    fn impulse(&self, factor_less_one: f64, noise: f64) -> f64 {
-        self.mu * (factor_less_one * self.along / self.square)
-            + (self.mu * self.kt / self.square).sqrt() * noise * self.xi
-    }
-}
-
-/// The rule `u′ = c u + √(kT/μ (1 − c²)) ξ`, `c = exp(−DΔt/μ)`: exact for a single pair; Peters's scheme II.
-pub fn ornstein_uhlenbeck(pair: &Encounter) -> f64 {
-    let less_one = (-2.0 * pair.a).exp_m1();
-    pair.impulse(less_one, (-(-4.0 * pair.a).exp_m1()).sqrt())
-}
-
-/// The rule `u′ = ((1 − a) u + 2 √(kT a/μ) ξ)/(1 + a)`: half an explicit and half an implicit step.
-pub fn shardlow(pair: &Encounter) -> f64 {
-    let a = pair.a;
-    pair.impulse(-2.0 * a / (1.0 + a), 2.0 * a.sqrt() / (1.0 + a))
-}
-
-/// The rule `u′ = √(kT/μ) ξ` with the probability `1 − exp(−DΔt/μ)`.
-pub fn lowe_andersen(pair: &Encounter) -> f64 {
-    if pair.chance < -(-2.0 * pair.a).exp_m1() { pair.impulse(-1.0, 1.0) } else { 0.0 }
-}
 
 /// Sets of planes that are updated at once, one set after the other: no two planes of a set are neighbours.
 fn sets(planes: &[PlanePairs]) -> [Vec<usize>; 3] {
@@ -86,35 +35,18 @@ struct Share<'a> {
 }
 
 impl PairThermostat {
-    /// Updates all pairs in turn by [`ornstein_uhlenbeck`].
-    pub(super) fn ornstein_uhlenbeck(&mut self, pool: &Pool, v: &mut [[f64; 3]]) -> [f64; 6] {
-        self.in_turn(pool, v, ornstein_uhlenbeck, Order::Forward, false)
-    }
-
-    /// Updates all pairs in turn by [`shardlow`].
-    pub(super) fn shardlow(&mut self, pool: &Pool, v: &mut [[f64; 3]], reversed: bool) -> [f64; 6] {
-        let order = if reversed { Order::Reversed } else { Order::Forward };
-        self.in_turn(pool, v, shardlow, order, false)
-    }
-
-    /// Updates all pairs in turn by [`lowe_andersen`].
-    pub(super) fn lowe_andersen(&mut self, pool: &Pool, v: &mut [[f64; 3]]) -> [f64; 6] {
-        self.in_turn(pool, v, lowe_andersen, Order::Forward, true)
-    }
-
-    /// Applies a rule to all pairs in turn; `draws` where it asks for a chance.
-    fn in_turn(
+    /// Applies a rule to all pairs in turn, perhaps in the opposite order; `draws` where it asks for a chance.
+    pub(super) fn in_turn(
         &mut self,
         pool: &Pool,
         v: &mut [[f64; 3]],
         rule: fn(&Encounter) -> f64,
-        order: Order,
+        reversed: bool,
         draws: bool,
     ) -> [f64; 6] {
-        let PairThermostat { planes, lists, masses, kt, dt, noise, impulses, .. } = self;
+        let PairThermostat { planes, lists, inverse_mass, kt, dt, noise, impulses, .. } = self;
         impulses.resize_with(planes.len(), Vec::new);
-        let (planes, inverse_mass, kt) = (&planes[..], &masses.inverse[..], *kt);
-        let reversed = order == Order::Reversed;
+        let (planes, inverse_mass, kt) = (&planes[..], &inverse_mass[..], *kt);
         let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
         let mut sets = sets(planes);

@@ -207,7 +207,7 @@ fn a_rank_keeps_the_pairs_of_few_planes() {
     let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::Portable, 1)).unwrap();
     swept(&mut sweep, &cloud, Want::FORCES);
     let alone = sweep.memory() as f64 / count as f64;
-    let mut ranks = [0, 1].map(|_| sweep.clone());
+    let mut ranks = [0, 1].map(|_| Sweep::of_plan(sweep.plan.clone(), sweep.settings, sweep.pool.clone()));
     on_ranks(&mut ranks, &cloud, 2, [true, true, false]);
     let both = ranks.iter().map(|sweep| sweep.memory()).sum::<usize>() as f64 / count as f64;
     assert!(both < alone + 24.0 * 2.5 + 85.0, "{both:.0} bytes a particle instead of {alone:.0}");

@@ -25,9 +25,12 @@ pub use fractions::TWO_TO_32;
 /// Up to this number of particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
+/// The sorted index of particles that are left out.
+pub const NOWHERE: u32 = u32::MAX;
+
 /// The particles of each cell: in each plane owned particles come first, then ghosts. If planes are periodic, copies of
 /// the first plane follow the last plane.
-#[derive(Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct CellOrder {
     pub geometry: BoxGeometry,
     pub grid: CellGrid,
@@ -49,33 +52,6 @@ pub struct CellOrder {
 }
 
 impl CellOrder {
-    pub fn new(dimensions: usize) -> CellOrder {
-        CellOrder {
-            geometry: BoxGeometry::enclosing([0.0; 3], [1.0; 3], dimensions, 1.0),
-            grid: CellGrid {
-                cells_per_column: 1,
-                columns_per_plane: 1,
-                planes: 1,
-                column_axis: 1,
-                plane_axis: 2,
-                search_cutoff: 1.0,
-                range_half_width: 1.0,
-                layers: 1,
-                interior: [0, 1],
-                i_cluster_size: 4,
-                i_cluster_extent: 1.0,
-            },
-            fixed32: Vec::new(),
-            start: Vec::new(),
-            order: Vec::new(),
-            owned: 0,
-            all: 0,
-            cell: Vec::new(),
-            counts: Vec::new(),
-            sums: Vec::new(),
-        }
-    }
-
     /// Sorts the particles into the cells of `grid`: by cell, and within a cell by the host's number. Ghosts are in cells of
     /// their own.
     pub fn sort(
@@ -155,6 +131,15 @@ impl CellOrder {
             return Err(EngineError::Host("a rank has 2^25 particles and ghosts or more"));
         }
         Ok(())
+    }
+
+    /// Finds the sorted index of each of the host's particles; [`NOWHERE`] for those that are left out.
+    pub fn find_places(&self, place: &mut Vec<u32>) {
+        place.clear();
+        place.resize(self.all, NOWHERE);
+        for (sorted, k) in (0..).zip(&self.order) {
+            place[*k as usize] = sorted;
+        }
     }
 
     /// Number of particles.

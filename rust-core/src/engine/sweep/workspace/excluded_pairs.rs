@@ -1,6 +1,6 @@
 //! Excluded pairs in the order of cells.
 
-use super::cell_order::CellOrder;
+use super::cell_order::{CellOrder, NOWHERE};
 use crate::engine::exclusions::Exclusions;
 use psidpd_passes::cells::excluded::{Excluded, Mark};
 use psidpd_passes::simd::OFFSET_BITS;
@@ -16,9 +16,6 @@ pub struct ExcludedPairs {
     /// Sorted index of each of the host's particles.
     place: Vec<u32>,
 }
-
-/// The sorted index of a particle that is left out.
-const NOWHERE: u32 = u32::MAX;
 
 impl ExcludedPairs {
     /// Finds the sorted indices of the partners of all particles, and sorts their marks.
@@ -46,11 +43,7 @@ impl ExcludedPairs {
     }
 
     fn fill_partners(&mut self, order: &CellOrder, exclusions: &Exclusions) {
-        self.place.clear();
-        self.place.resize(order.all, NOWHERE);
-        for (place, k) in (0..).zip(&order.order) {
-            self.place[*k as usize] = place;
-        }
+        order.find_places(&mut self.place);
         let (all, copies) = (order.particles() as u32, order.copies() as u32);
         let last_plane = order.plane_start(order.grid.planes - 1);
         self.start.push(0);

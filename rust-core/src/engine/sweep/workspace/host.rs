@@ -7,11 +7,6 @@ use psidpd_passes::tally::Tally;
 use psidpd_threads::{Pool, SharedSlice, part};
 
 impl<P: PairPrecision> Workspace<P> {
-    /// The host's index of each particle, in the order of cells.
-    pub fn order(&self) -> &[u32] {
-        &self.order.order
-    }
-
     /// Copies the slopes of owned particles to the order of the host; entries of ghosts are unspecified.
     pub fn slopes_to_host(&self, pool: &Pool, out: &mut Vec<f64>) {
         let (width, slopes, order) = (self.fluid.width(), &self.slopes.rows[..], &self.order);

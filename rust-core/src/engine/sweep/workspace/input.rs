@@ -1,12 +1,12 @@
 use crate::engine::exclusions::Exclusions;
 use crate::engine::particles::Particles;
 use psidpd_passes::noise::PairNoise;
-use psidpd_passes::tally::Want;
 
 /// Number of elements after the last particle that whole vectors may read.
 pub const VECTOR_PADDING: usize = 16;
 
 /// The input of an evaluation, from the host.
+#[derive(Default)]
 pub struct Input<'a> {
     pub particles: Particles<'a>,
     /// Whether each ghost is an image of another particle of this rank; empty if none is.
@@ -23,33 +23,7 @@ pub struct Input<'a> {
     pub totals: bool,
 }
 
-impl<'a> Input<'a> {
-    pub fn new(
-        particles: &Particles<'a>,
-        images: &'a [bool],
-        v: &'a [[f64; 3]],
-        species_of_type: &'a [i32],
-        added_densities: &'a [f64],
-        thermostat: Option<(PairNoise, f64)>,
-        want: Want,
-    ) -> Input<'a> {
-        Input {
-            particles: *particles,
-            images,
-            v,
-            species_of_type,
-            added_densities,
-            exclusions: None,
-            thermostat,
-            totals: want.energy || want.virial,
-        }
-    }
-
-    /// The same input with excluded pairs.
-    pub fn excluding(self, exclusions: &'a Exclusions) -> Input<'a> {
-        Input { exclusions: Some(exclusions), ..self }
-    }
-
+impl Input<'_> {
     /// Whether there are ghosts that are not images: only these are sorted.
     pub fn has_ghosts(&self) -> bool {
         let Particles { owned, x, .. } = self.particles;

@@ -32,6 +32,7 @@ use super::units::Unit;
 use crate::engine::sweep::times::lap;
 use psidpd_passes::compiled::{First, PairPrecision, Passes, Second};
 use psidpd_passes::plane::data::PassData;
+use psidpd_threads::Pool;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -83,29 +84,21 @@ fn filled_first(order: &CellOrder, units: &Range<usize>) -> [Range<usize>; 2] {
 }
 
 impl<P: PairPrecision> Scheduler<'_, P> {
-    /// Fills the particles of a thread slab that threads of other slabs read; the first slab also fills the
-    /// last particles, which are no whole vector.
-    pub fn fill_start(
-        particles: &SharedParticles<P::PackedParticle>,
-        fluid: &FluidConstants<P::Scalar>,
-        order: &CellOrder,
-        input: &Input,
-        slab: &mut ThreadSlab<P::Scalar>,
-        is_first: bool,
-    ) {
-        let mut since = Instant::now();
-        // SAFETY: different slabs have disjoint particles, and each slab has one thread. The particles after
-        // the last whole vector are in no slab; one thread fills them. No pass reads any before this is done.
-        unsafe {
-            if is_first {
-                let rest = vectors_before(order.particles())..order.particles();
-                particles.fill(fluid.set, order, input, rest);
-            }
+    /// Fills the particles of all thread slabs that threads of other slabs read, and the particles after the last whole
+    /// vector, which are in no slab.
+    pub fn fill_start(&self, pool: &Pool, input: &Input, slabs: &mut [ThreadSlab<P::Scalar>]) {
+        let (set, order) = (self.fluid.set, self.order);
+        let rest = vectors_before(order.particles())..order.particles();
+        // SAFETY: no other thread fills particles yet, and no pass reads any before this is done.
+        unsafe { self.particles.fill(set, order, input, rest) };
+        pool.each(slabs, |slab| {
+            let mut since = Instant::now();
             for places in filled_first(order, &slab.units) {
-                particles.fill(fluid.set, order, input, places);
+                // SAFETY: different slabs have disjoint particles, and each slab has one thread; the rest is as above.
+                unsafe { self.particles.fill(set, order, input, places) };
             }
-        }
-        lap(&mut since, &mut slab.state.times.sort);
+            lap(&mut since, &mut slab.state.times.sort);
+        });
     }
 
     /// The units of a slab in a plane.

@@ -9,7 +9,7 @@ use psidpd_passes::ground::fixed_point::FixedPoint16;
 use psidpd_threads::SharedSlice;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
-#[derive(Clone, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct SortedParticles<R> {
     /// Positions relative to the origin of the box.
     pub x: [Vec<f32>; 3],

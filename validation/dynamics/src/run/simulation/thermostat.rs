@@ -8,7 +8,7 @@ use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
 use psidpd_core::engine::{Step, Want};
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Thermostat {
     pub on: bool,
     pairs: Option<PairThermostat>,

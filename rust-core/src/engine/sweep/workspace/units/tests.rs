@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 /// A box with a cell of unit size for every column, and one particle in each: a column's number is that of its particle.
 fn one_in_each_column(columns: usize, planes: usize, periodic: bool) -> CellOrder {
-    let mut order = CellOrder::new(3);
+    let mut order = CellOrder::default();
     let lengths = [2.5, columns as f64, planes as f64].map(|l| l * 1.01);
     let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, periodic, periodic]).unwrap();
     order.geometry = BoxGeometry::of_box(&domain, 3).unwrap();
