@@ -17,7 +17,7 @@ impl Number {
     /// Reads a number or a formula; names are looked up when it is evaluated.
     pub fn read(value: &Value) -> Result<Number, FileError> {
         if let Some(number) = value.as_number() {
-            return Ok(Number::Value(Located { value: number?, place: value.place().clone() }));
+            return Ok(Number::Value(Located { value: number?, place: value.place.clone() }));
         }
         match value.as_str() {
             Some(_) => Ok(Number::Formula(read_formula(value)?)),

@@ -1,6 +1,6 @@
 use super::node::{Content, Node, Table};
 use super::printable::is_control;
-use super::{FileError, FileErrorKind, Place, Source};
+use super::{FileError, FileErrorKind, Place};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -28,39 +28,28 @@ impl<T> Located<T> {
 /// A table of a document.
 #[derive(Debug, Clone)]
 pub struct Section<'a> {
-    place: Place,
-    table: &'a Table,
+    /// The table's place.
+    pub place: Place,
+    pub(super) table: &'a Table,
 }
 
 /// A value of a document, not yet interpreted.
 #[derive(Debug, Clone)]
 pub struct Value<'a> {
-    place: Place,
+    /// The value's place.
+    pub place: Place,
     value: &'a Node,
 }
 
 impl<'a> Section<'a> {
-    pub(super) fn new(place: Place, table: &'a Table) -> Section<'a> {
-        Section { place, table }
-    }
-
-    /// The file that contains this section.
-    pub fn source(&self) -> &Arc<Source> {
-        &self.place.source
-    }
-
-    /// The dotted path of a key of this section.
-    pub fn path_of(&self, key: &str) -> String {
-        match (self.place.key.is_empty(), key.is_empty()) {
+    /// The place of a key of this section, or of its value.
+    fn place_of(&self, key: &str, span: &Range<usize>) -> Place {
+        let path = match (self.place.key.is_empty(), key.is_empty()) {
             (true, _) => key.to_owned(),
             (_, true) => self.place.key.clone(),
             _ => format!("{}.{key}", self.place.key),
-        }
-    }
-
-    /// The place of a key of this section, or of its value.
-    fn place_of(&self, key: &str, span: &Range<usize>) -> Place {
-        Place { source: Arc::clone(self.source()), span: span.clone(), key: self.path_of(key) }
+        };
+        Place { source: Arc::clone(&self.place.source), span: span.clone(), key: path }
     }
 
     /// An error about this section as a whole.
@@ -107,21 +96,6 @@ impl<'a> Section<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The value's dotted key.
-    pub fn key(&self) -> &str {
-        &self.place.key
-    }
-
-    /// The value's place in the file.
-    pub fn place(&self) -> &Place {
-        &self.place
-    }
-
-    /// The value's bytes in the file.
-    pub fn span(&self) -> Range<usize> {
-        self.place.span.clone()
-    }
-
     /// An error about this value.
     pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
         self.place.error(kind)
@@ -233,9 +207,8 @@ impl<'a> Value<'a> {
                 .iter()
                 .enumerate()
                 .map(|(k, value)| {
-                    let (source, key) =
-                        (Arc::clone(&self.place.source), format!("{}[{}]", self.key(), k + 1));
-                    Value { place: Place { source, span: value.span.clone(), key }, value }
+                    let key = format!("{}[{}]", self.place.key, k + 1);
+                    Value { place: Place { span: value.span.clone(), key, ..self.place.clone() }, value }
                 })
                 .collect(),
         )
@@ -249,7 +222,7 @@ impl<'a> Value<'a> {
     /// The table, if the value is one.
     pub fn as_section(&self) -> Option<Section<'a>> {
         let Content::Table(table) = &self.value.content else { return None };
-        Some(Section::new(self.place.clone(), table))
+        Some(Section { place: self.place.clone(), table })
     }
 
     /// Reads an array of `N` numbers.

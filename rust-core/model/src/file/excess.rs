@@ -80,7 +80,7 @@ fn read_curve(
                 section.only(["table"])?;
                 let file = section.require("table")?;
                 let spline = Arc::new(read_spline(&file, directory, ["rho", "p"])?);
-                return Ok(ExcessEntry::PressureTable { spline, density, place: file.place().clone() });
+                return Ok(ExcessEntry::PressureTable { spline, density, place: file.place.clone() });
             }
             let names_file = |text: &str| {
                 let extension = Path::new(text).extension().and_then(|e| e.to_str());

@@ -74,11 +74,11 @@ impl Model {
         let species = names::read_species(&root)?;
         let parameters = parameters::read(&root)?;
         let densities = density::read(&root, &species.value, &parameters)?;
-        let excess = excess::read(&root, &species, &densities, document.directory())?;
-        let pairs = interaction::read_pairs(&root, &species.value, document.directory())?;
+        let excess = excess::read(&root, &species, &densities, &document.directory)?;
+        let pairs = interaction::read_pairs(&root, &species.value, &document.directory)?;
         let thermostats = interaction::read_thermostats(&root, &species.value)?;
         let model = Model {
-            source: Arc::clone(document.source()),
+            source: Arc::clone(&document.source),
             title,
             reference,
             dimensions,

@@ -49,7 +49,7 @@ impl FormEntry for TableEntry {
         let file = table.require("file")?;
         Ok(TableEntry {
             spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
-            file: file.place().clone(),
+            file: file.place.clone(),
             range: table.get("range").map(|value| Number::read(&value)).transpose()?,
         })
     }

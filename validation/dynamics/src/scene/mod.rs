@@ -96,7 +96,7 @@ impl Scene {
             let known = model.as_ref().and_then(|m| m.root().get("parameters")?.as_section()?.get(name));
             known.is_some()
         };
-        let (text, of_model) = edits::edit_scene(document.source().text(), edits, &parameters)?;
+        let (text, of_model) = edits::edit_scene(document.source.text(), edits, &parameters)?;
         Scene::read(&Document::parse(&path.display().to_string(), &text)?, base, &of_model)
     }
 
@@ -139,7 +139,7 @@ impl Scene {
             body_forces,
             output: output::read(&root)?,
             observe,
-            source: root.source().clone(),
+            source: root.place.source.clone(),
             folder: base.to_owned(),
             stages,
             model,
@@ -276,7 +276,7 @@ fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Mo
     });
     match model {
         Ok(model) => Ok((path, model)),
-        Err(error) => match error.kind() {
+        Err(error) => match &*error.kind {
             FileErrorKind::Unreadable(why) => {
                 let message = format!("the model file {} cannot be read: {why}", path.display());
                 Err(value.error(message).with_help("the path is relative to the scene file"))
