@@ -165,16 +165,7 @@ impl Pool {
     /// # Panics
     /// Panics if `work` panics on any thread.
     pub fn each<T: Send>(&self, things: &mut [T], work: impl Fn(&mut T) + Sync) {
-        if let [thing] = things {
-            return work(thing);
-        }
-        let (threads, things) = (self.threads(), SharedSlice::new(things));
-        self.run(&|t| {
-            // SAFETY: `run` calls this once for each number of a thread, and `part` makes
-            // ranges of different numbers disjoint.
-            let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
-            part.iter_mut().for_each(&work);
-        });
+        self.in_stages(things, &[&work]);
     }
 
     /// Does the work of all stages with each of `things`, which are divided among the threads as in [`Pool::each`]. A
