@@ -1,4 +1,4 @@
-use super::line::{Line, least_stable, unstable};
+use super::line::{Line, coexisting, smallest, unstable};
 use super::{MeanField, TheoryError};
 use crate::model::{Fluid, Model};
 
@@ -92,7 +92,7 @@ impl MeanField {
     pub fn binodal(&self) -> Result<Binodal, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
-        let [a, b] = self.phases(&line)?;
+        let [a, b] = coexisting(&line)?;
         Ok(Binodal {
             vapour: a.exp(),
             liquid: b.exp(),
@@ -109,7 +109,8 @@ impl MeanField {
     /// Fails for more than one species.
     pub fn least_stable_density(&self) -> Result<[f64; 2], TheoryError> {
         self.require_species(1)?;
-        let (u, value) = least_stable(&DensityLine::new(self));
+        let line = DensityLine::new(self);
+        let (u, value) = smallest(&line.grid, &|u| line.curvature(u));
         Ok([u.exp(), value])
     }
 }
