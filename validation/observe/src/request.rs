@@ -3,7 +3,7 @@
 use super::keys::{COMMON, Key, Table};
 use super::meter::{AnyMeter, KINDS};
 use super::options::{Drive, Options, Place, StageNames};
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 
@@ -98,16 +98,12 @@ impl Common {
             common.skip = value.count()?.value;
         }
         if let Some(value) = section.get("stages") {
-            let known = place.stages.all;
             common.stages.clear();
             for item in value.array()? {
-                let name = item.string()?.value;
-                if !known.contains(&name.as_str()) {
-                    let known = known.join(", ");
-                    return Err(item.error(FileErrorKind::UnknownName { what: "stage", name, known }));
-                }
-                if !common.stages.contains(&name) {
-                    common.stages.push(name);
+                let name = item.string()?;
+                name.among("stage", place.stages.all.iter().map(|name| (name, ())))?;
+                if !common.stages.contains(&name.value) {
+                    common.stages.push(name.value);
                 }
             }
             if common.stages.is_empty() {

@@ -25,6 +25,26 @@ impl<T> Located<T> {
     }
 }
 
+impl Located<String> {
+    /// The choice of this name; fails if there is none.
+    pub fn among<N: AsRef<str>, T>(
+        &self,
+        what: &'static str,
+        choices: impl IntoIterator<Item = (N, T)>,
+    ) -> Result<T, FileError> {
+        let mut known = Vec::new();
+        for (name, choice) in choices {
+            if name.as_ref() == self.value {
+                return Ok(choice);
+            }
+            known.push(name);
+        }
+        let known: Vec<&str> = known.iter().map(|name| name.as_ref()).collect();
+        let (name, known) = (self.value.clone(), known.join(", "));
+        Err(self.error(FileErrorKind::UnknownName { what, name, known }))
+    }
+}
+
 /// A table of a document.
 #[derive(Debug, Clone)]
 pub struct Section<'a> {
@@ -183,15 +203,7 @@ impl<'a> Value<'a> {
         what: &'static str,
         choices: &[(&str, T)],
     ) -> Result<Located<T>, FileError> {
-        let name = self.string()?;
-        match choices.iter().find(|(n, _)| *n == name.value) {
-            Some((_, choice)) => Ok(self.located(*choice)),
-            None => Err(self.error(FileErrorKind::UnknownName {
-                what,
-                name: name.value,
-                known: choices.iter().map(|(n, _)| *n).collect::<Vec<_>>().join(", "),
-            })),
-        }
+        Ok(self.located(self.string()?.among(what, choices.iter().copied())?))
     }
 
     /// Reads the elements of an array.

@@ -1,5 +1,4 @@
 use super::names::check_identifier;
-use super::species_index;
 use crate::continuation::Continuation;
 use crate::document::{FileError, FileErrorKind, Located, Section, Value};
 use crate::kernel::KernelKind;
@@ -106,7 +105,9 @@ fn read_correction(value: &Value, species: &[String]) -> Result<Vec<Vec<Number>>
         let Some((of, by)) = key.value.split_once('|') else {
             return Err(key.error("expected \"A|B\", the density of A felt by B"));
         };
-        let index = |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()));
+        let index = |name: &str| {
+            key.clone().map(|_| name.trim().to_owned()).among("species", species.iter().zip(0usize..))
+        };
         all[index(by)? * count + index(of)?] = coefficients(&value)?;
     }
     Ok(all)

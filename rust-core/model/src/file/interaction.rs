@@ -1,4 +1,3 @@
-use super::species_index;
 use crate::document::{FileError, Section, Source, Value};
 use crate::fluid::{ExcessFreeEnergy, Fluid};
 use crate::number::Number;
@@ -25,7 +24,8 @@ pub struct ThermostatEntry {
 
 fn read_between(value: &Value, species: &[String]) -> Result<[usize; 2], FileError> {
     let [a, b] = &value.array()?[..] else { return Err(value.error("expected two species")) };
-    Ok([species_index(species, &a.string()?)?, species_index(species, &b.string()?)?])
+    let index = |name: &Value| name.string()?.among("species", species.iter().zip(0..));
+    Ok([index(a)?, index(b)?])
 }
 
 /// Reads every `[[pair]]`.

@@ -11,7 +11,7 @@ mod units;
 
 use super::fluid::Fluid;
 use crate::document::keys::{of_another_kind, read_known};
-use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
+use crate::document::{Document, FileError, Section, Source};
 use density::DensityEntry;
 use excess::ExcessEntry;
 use interaction::{PairTable, ThermostatEntry};
@@ -152,16 +152,6 @@ fn read_dimensions(root: &Section) -> Result<usize, FileError> {
         d @ (2 | 3) => Ok(d as usize),
         _ => Err(value.error("must be 2 or 3")),
     }
-}
-
-/// The index of a species by its name.
-fn species_index(species: &[String], name: &Located<String>) -> Result<usize, FileError> {
-    let unknown = || FileErrorKind::UnknownName {
-        what: "species",
-        name: name.value.clone(),
-        known: species.join(", "),
-    };
-    species.iter().position(|s| *s == name.value).ok_or_else(|| name.error(unknown()))
 }
 
 #[cfg(test)]
