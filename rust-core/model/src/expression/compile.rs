@@ -112,7 +112,8 @@ impl Compiler<'_> {
         known.extend(self.constants.keys().cloned());
         known.sort();
         known.dedup();
-        Err(ErrorKind::UnknownName {
+        Err(ErrorKind::Unknown {
+            what: "name",
             name: name.to_owned(),
             suggestion: closest(name, known.iter().map(String::as_str)),
             known,

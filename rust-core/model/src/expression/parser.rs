@@ -242,7 +242,8 @@ impl Parser<'_> {
 
 fn unknown(name: &str, span: Span) -> ExpressionError {
     let known = Function::ALL.map(|entry| entry.0);
-    span.error(ErrorKind::UnknownFunction {
+    span.error(ErrorKind::Unknown {
+        what: "function",
         name: name.to_owned(),
         suggestion: in_other_words(name).or_else(|| closest(name, known)),
         known: known.map(str::to_owned).to_vec(),
