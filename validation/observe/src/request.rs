@@ -49,7 +49,7 @@ pub fn read(
         if let Some(section) = &options.section {
             section.only([names(COMMON), names(kind.table.keys)].concat())?;
         }
-        if options.section.is_none() && !value.boolean()?.value {
+        if options.section.is_none() && !value.boolean()? {
             continue;
         }
         let preset = Common { every: kind.every.unwrap_or(common.every), ..common.clone() };
@@ -89,13 +89,13 @@ impl Common {
     fn read(section: &Section, place: &Place, mut common: Common) -> Result<Common, FileError> {
         debug_assert_eq!(COMMON.len(), 3);
         if let Some(value) = section.get("every") {
-            common.every = value.count()?.value;
+            common.every = value.count()?;
             if common.every == 0 {
                 return Err(value.error("must be at least 1"));
             }
         }
         if let Some(value) = section.get("skip") {
-            common.skip = value.count()?.value;
+            common.skip = value.count()?;
         }
         if let Some(value) = section.get("stages") {
             common.stages.clear();

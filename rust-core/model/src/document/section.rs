@@ -125,22 +125,14 @@ impl<'a> Value<'a> {
         self.error(FileErrorKind::WrongType { expected, found: self.value.type_name() })
     }
 
-    fn located<T>(&self, value: T) -> Located<T> {
-        Located { value, place: self.place.clone() }
-    }
-
     /// Reads a number; integers are numbers too.
-    pub fn number(&self) -> Result<Located<f64>, FileError> {
-        match self.as_number() {
-            Some(Ok(value)) => Ok(self.located(value)),
-            Some(Err(error)) => Err(error),
-            None => Err(self.wrong("a number")),
-        }
+    pub fn number(&self) -> Result<f64, FileError> {
+        self.as_number().unwrap_or_else(|| Err(self.wrong("a number")))
     }
 
     /// Reads a number above zero.
     pub fn positive(&self) -> Result<f64, FileError> {
-        match self.number()?.value {
+        match self.number()? {
             x if x > 0.0 => Ok(x),
             x => Err(self.error(format!("must be positive, is {x}"))),
         }
@@ -160,21 +152,20 @@ impl<'a> Value<'a> {
     }
 
     /// Reads a whole number from 0.
-    pub fn count(&self) -> Result<Located<u64>, FileError> {
+    pub fn count(&self) -> Result<u64, FileError> {
         match &self.value.content {
-            Content::Integer(digits, radix) => match u64::from_str_radix(digits, *radix) {
-                Ok(value) => Ok(self.located(value)),
-                Err(_) => Err(self.error("must be a whole number from 0")),
-            },
+            Content::Integer(digits, radix) => {
+                u64::from_str_radix(digits, *radix).map_err(|_| self.error("must be a whole number from 0"))
+            }
             Content::Float(x) => Err(self.error(not_an_integer(x))),
             _ => Err(self.wrong("an integer")),
         }
     }
 
     /// Reads true or false.
-    pub fn boolean(&self) -> Result<Located<bool>, FileError> {
+    pub fn boolean(&self) -> Result<bool, FileError> {
         match &self.value.content {
-            Content::Boolean(b) => Ok(self.located(*b)),
+            Content::Boolean(b) => Ok(*b),
             _ => Err(self.wrong("true or false")),
         }
     }
@@ -184,7 +175,7 @@ impl<'a> Value<'a> {
         match self.as_str() {
             // Strings may be printed, and written to other files.
             Some(s) if s.contains(is_control) => Err(self.error("has a control character in it")),
-            Some(s) => Ok(self.located(s.to_owned())),
+            Some(s) => Ok(Located { value: s.to_owned(), place: self.place.clone() }),
             None => Err(self.wrong("a string")),
         }
     }
@@ -198,12 +189,8 @@ impl<'a> Value<'a> {
     }
 
     /// Reads one name of a list.
-    pub fn one_of<T: Copy>(
-        &self,
-        what: &'static str,
-        choices: &[(&str, T)],
-    ) -> Result<Located<T>, FileError> {
-        Ok(self.located(self.string()?.among(what, choices.iter().copied())?))
+    pub fn one_of<T: Copy>(&self, what: &'static str, choices: &[(&str, T)]) -> Result<T, FileError> {
+        self.string()?.among(what, choices.iter().copied())
     }
 
     /// Reads the elements of an array.
@@ -240,8 +227,7 @@ impl<'a> Value<'a> {
     /// Reads an array of `N` numbers.
     pub fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], FileError> {
         let items = self.array()?;
-        let numbers: Vec<f64> =
-            items.iter().map(|v| v.number().map(|x| x.value)).collect::<Result<_, _>>()?;
+        let numbers: Vec<f64> = items.iter().map(Value::number).collect::<Result<_, _>>()?;
         <[f64; N]>::try_from(numbers)
             .map_err(|_| self.error(format!("expected {expected}, found an array of length {}", items.len())))
     }

@@ -148,7 +148,7 @@ impl Model {
 
 fn read_dimensions(root: &Section) -> Result<usize, FileError> {
     let Some(value) = root.get("dimensions") else { return Ok(3) };
-    match value.count()?.value {
+    match value.count()? {
         d @ (2 | 3) => Ok(d as usize),
         _ => Err(value.error("must be 2 or 3")),
     }

@@ -97,7 +97,8 @@ macro_rules! pair_table {
                     $name,
                     |table, directory| <$entry>::read(table, directory).map(PairEntry::$variant),
                 )),+];
-                (form.one_of("form", readers)?.value)(table, directory)
+                let read = form.one_of("form", readers)?;
+                read(table, directory)
             }
 
             /// The potential for these parameters of the model, kT among them.

@@ -26,7 +26,7 @@ impl Composition {
         let mut fractions = vec![0.0; count];
         for (name, value) in section.entries() {
             let index: usize = name.among("species", species.iter().zip(0..))?;
-            let fraction = value.number()?.value;
+            let fraction = value.number()?;
             if !(0.0..=1.0).contains(&fraction) {
                 return Err(value.error(format!("must be from 0 to 1, is {fraction}")));
             }

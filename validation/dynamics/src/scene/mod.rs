@@ -116,7 +116,7 @@ impl Scene {
         let title = root.get("title").map(|value| value.string()).transpose()?;
         let (model_path, model) = read_model(&root.require("model")?, base, of_model)?;
         let kt = root.require("kT")?.positive()?;
-        let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
+        let seed = root.get("seed").map_or(Ok(1), |value| value.count())?;
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
         let device = root.get("device").map_or(Ok(Device::Cpu), |value| device::read(&value))?;
         let (initial, domain) = initial::read(&root, &model, base)?;
@@ -132,7 +132,7 @@ impl Scene {
             model_path,
             kt,
             seed,
-            precision: precision.transpose()?.map(|p| p.value),
+            precision: precision.transpose()?,
             device,
             mass: masses::read(&root, model.species(), &initial)?,
             frozen: initial.frozen(),

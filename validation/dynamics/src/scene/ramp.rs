@@ -39,7 +39,7 @@ pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, 
     };
     let levels = match levels {
         None => DEFAULT_LEVELS.min(steps),
-        Some(value) => match value.count()?.value {
+        Some(value) => match value.count()? {
             n if (1..=MOST_LEVELS.min(steps)).contains(&n) => n,
             n => {
                 let most = MOST_LEVELS.min(steps);
