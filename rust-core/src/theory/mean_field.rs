@@ -20,7 +20,7 @@ pub struct MeanField {
     /// Self term that is added to the bulk density in variable `v` of `ψ_α`.
     pub(super) shift: Vec<Vec<f64>>,
     /// The variables of `ψ_α` for a particle without neighbours: its corrected densities.
-    isolated: Vec<Vec<f64>>,
+    pub(super) isolated: Vec<Vec<f64>>,
     /// Weight function `w` of each density.
     pub(super) kernels: Vec<Radial>,
     /// Pair potentials `φ`, and the species that they act between.
@@ -105,11 +105,6 @@ impl MeanField {
         let at: Vec<f64> =
             self.shift[alpha].iter().enumerate().map(|(v, shift)| densities[v % count] + shift).collect();
         self.psi_at(alpha, &at)
-    }
-
-    /// `ψ_α` and its derivatives for a particle without neighbours.
-    pub(super) fn isolated_psi(&self, alpha: usize) -> Psi {
-        self.psi_at(alpha, &self.isolated[alpha])
     }
 
     pub(super) fn psi_at(&self, alpha: usize, at: &[f64]) -> Psi {

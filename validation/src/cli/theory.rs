@@ -1,6 +1,6 @@
 use super::check::{number_density, per_species};
 use super::*;
-use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point_of_model};
+use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point};
 use psidpd_dynamics::prediction::{Prediction, predict, published};
 use psidpd_experiments::measure::{self, Effort};
 use psidpd_experiments::theory_page::{self, Scope};
@@ -182,7 +182,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
             (
                 "critical point",
                 or_reason(
-                    critical_point_of_model(model, range),
+                    critical_point(&|kt| Ok(model.at(kt)?), range),
                     |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
                 ),
             ),
