@@ -71,9 +71,9 @@ impl Curve {
         match &self.form {
             CurveForm::Table(spline) => {
                 let [low, high] = spline.ends();
-                format!("table of {} points from {low} to {high}", spline.points())
+                format!("table of {} points from {low} to {high}", spline.pieces().0.len())
             }
-            CurveForm::Pressure(pressure) => format!("from the pressure {}", pressure.text()),
+            CurveForm::Pressure(pressure) => format!("from the pressure {}", pressure.text),
         }
     }
 }

@@ -12,7 +12,8 @@ use crate::expression::{Formula, Program, TooLarge};
 /// as with `ρ^2.6`, and `ψ′` has a limit nevertheless, it goes to it as a power of `ρ`.
 #[derive(Debug, Clone)]
 pub struct Pressure {
-    text: String,
+    /// The pressure as the model file states it.
+    pub(super) text: String,
     /// Computes `ψ′` and `ψ″` from the one variable ρ.
     program: Program,
     slope: Program,
@@ -103,11 +104,6 @@ impl Pressure {
             curve.dilute = Some(dilute);
         }
         Ok(curve)
-    }
-
-    /// The pressure as text, as the model file states it.
-    pub fn text(&self) -> &str {
-        &self.text
     }
 
     fn slope_at(&self, n: f64) -> f64 {
