@@ -16,10 +16,7 @@ impl Ast {
     /// [`MAX_DEPTH`] is an error like any other.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
         if text.len() > MAX_LENGTH {
-            let mut offset = MAX_LENGTH;
-            while !text.is_char_boundary(offset) {
-                offset -= 1;
-            }
+            let offset = text.floor_char_boundary(MAX_LENGTH);
             return Err(Span::new(offset, text.len() - offset).error(ErrorKind::TooLong));
         }
         let mut parser =
