@@ -39,7 +39,7 @@ pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     }
     let kts: Vec<String> = scope.kts.iter().map(ToString::to_string).collect();
     Ok(Report {
-        title: model.title().into(),
+        title: model.title.clone(),
         subtitle: "psidpd theory: mean field".into(),
         facts: vec![("kT".into(), kts.join(", ")), ("species".into(), model.species().join(", "))],
         sections,

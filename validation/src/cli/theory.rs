@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     match all.as_slice() {
         [single] => write_json(json, single)?,
-        several => write_json(json, &json!({"title": model.title(), "temperatures": several}))?,
+        several => write_json(json, &json!({"title": model.title, "temperatures": several}))?,
     }
     Ok(if defined { Verdict::Good } else { Verdict::CheckFailed })
 }
@@ -152,7 +152,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     scope.density = scope.density.max(total);
     scope.range = [scope.range[0].min(range[0]), scope.range[1].max(range[1])];
 
-    say!("{} at kT = {}", model.title(), number(kt));
+    say!("{} at kT = {}", model.title, number(kt));
     let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
     let (mut rows, mut empty) = (Vec::new(), Vec::new());
     for k in 1..=arguments.rows.min(10_000) {
@@ -273,7 +273,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         say!("note: {doubt}");
         scope.doubts.push(format!("kT = {kt}: {doubt}"));
     }
-    let mut all = json!({"title": model.title(), "kT": kt, "equation_of_state": rows, "doubts": doubts});
+    let mut all = json!({"title": model.title, "kT": kt, "equation_of_state": rows, "doubts": doubts});
     if let Some(p) = &prediction {
         all["correlated"] = json!({
             "density": p.density,

@@ -26,10 +26,13 @@ pub use units::Units;
 #[derive(Debug, Clone)]
 pub struct Model {
     source: Arc<Source>,
-    title: String,
-    reference: Option<String>,
+    /// The title in the file.
+    pub title: String,
+    /// The publication that the model comes from.
+    pub reference: Option<String>,
     dimensions: usize,
-    units: Option<Units>,
+    /// The units of the model's numbers, if the file states them.
+    pub units: Option<Units>,
     literature: Vec<Published>,
     species: Vec<String>,
     parameters: BTreeMap<String, f64>,
@@ -97,24 +100,9 @@ impl Model {
         Ok(model)
     }
 
-    /// The title in the file.
-    pub fn title(&self) -> &str {
-        &self.title
-    }
-
-    /// The publication that the model comes from.
-    pub fn reference(&self) -> Option<&str> {
-        self.reference.as_deref()
-    }
-
     /// The number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
-    }
-
-    /// The units of the model's numbers, if the file states them.
-    pub fn units(&self) -> Option<Units> {
-        self.units
     }
 
     /// The published values of the fluid at a temperature.

@@ -128,7 +128,7 @@ impl Scene {
         let stages_of = StageNames { all: &names, timeless };
         let observe = observe::read(&root, &model, kt, &domain, stages_of, initial.slab_axis(), drive)?;
         let scene = Scene {
-            title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
+            title: title.map_or_else(|| model.title.clone(), |t| t.value),
             model_path,
             kt,
             seed,
