@@ -40,7 +40,6 @@ pub struct CurveBlock {
     /// Second derivatives `ψ″(n)`.
     pub curvature: Vec<f64>,
     work: Vec<f64>,
-    out: Vec<f64>,
 }
 
 impl Curve {

@@ -167,11 +167,8 @@ impl Pressure {
     /// Computes [`Curve::block`](super::Curve::block); the lists have the length of `n`.
     pub(super) fn block(&self, n: &[f64], to: &mut CurveBlock) {
         to.psi.iter_mut().zip(n).for_each(|(psi, n)| *psi = self.integral(*n));
-        let lanes = n.len();
-        to.out.resize(2 * lanes, 0.0);
-        self.program.eval_block(lanes, n, &mut to.out, &mut to.work);
-        to.slope.copy_from_slice(&to.out[..lanes]);
-        to.curvature.copy_from_slice(&to.out[lanes..2 * lanes]);
+        let out = [&mut to.slope[..], &mut to.curvature[..]];
+        self.program.eval_block_into(n.len(), n, out.into_iter(), &mut to.work);
         let Some(dilute) = &self.dilute else { return };
         for (lane, n) in n.iter().enumerate() {
             if *n < dilute.below && *n >= dilute.from {

@@ -77,13 +77,8 @@ impl PairForm for ExpressionPair {
 
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
         let mut work = Vec::new();
-        let mut out = [0.0; 2 * LANES];
         for ((r, phi), slope) in r.chunks(LANES).zip(phi.chunks_mut(LANES)).zip(slope.chunks_mut(LANES)) {
-            let lanes = r.len();
-            let out = &mut out[..2 * lanes];
-            self.program.eval_block(lanes, r, out, &mut work);
-            phi.copy_from_slice(&out[..lanes]);
-            slope.copy_from_slice(&out[lanes..]);
+            self.program.eval_block_into(r.len(), r, [phi, slope].into_iter(), &mut work);
         }
     }
 }
