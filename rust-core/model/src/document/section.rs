@@ -1,4 +1,4 @@
-use super::node::{Content, Node, Table};
+use super::node::{Content, Entry, Node, Table};
 use super::printable::is_control;
 use super::{FileError, FileErrorKind, Place};
 use std::ops::Range;
@@ -90,16 +90,12 @@ impl<'a> Section<'a> {
 
     /// Every key with its value, in the order of the file: for tables whose keys are names.
     pub fn entries(&self) -> Vec<(Located<String>, Value<'a>)> {
-        self.table
-            .entries
-            .iter()
-            .map(|entry| {
-                let place = self.place_of(&entry.key, &entry.key_span);
-                let value =
-                    Value { place: self.place_of(&entry.key, &entry.value.span), value: &entry.value };
-                (Located { value: entry.key.clone(), place }, value)
-            })
-            .collect()
+        let located = |entry: &'a Entry| {
+            let place = self.place_of(&entry.key, &entry.key_span);
+            let value = Value { place: self.place_of(&entry.key, &entry.value.span), value: &entry.value };
+            (Located { value: entry.key.clone(), place }, value)
+        };
+        self.table.entries.iter().map(located).collect()
     }
 
     /// Fails if the section has a key that is not in this list.
@@ -201,16 +197,11 @@ impl<'a> Value<'a> {
     /// The elements, if the value is an array.
     pub fn as_array(&self) -> Option<Vec<Value<'a>>> {
         let Content::Array(items) = &self.value.content else { return None };
-        Some(
-            items
-                .iter()
-                .enumerate()
-                .map(|(k, value)| {
-                    let key = format!("{}[{}]", self.place.key, k + 1);
-                    Value { place: Place { span: value.span.clone(), key, ..self.place.clone() }, value }
-                })
-                .collect(),
-        )
+        let located = |(k, value): (usize, &'a Node)| {
+            let key = format!("{}[{}]", self.place.key, k + 1);
+            Value { place: Place { span: value.span.clone(), key, ..self.place.clone() }, value }
+        };
+        Some(items.iter().enumerate().map(located).collect())
     }
 
     /// Reads a table.
