@@ -260,7 +260,7 @@ mod ffi {
 pub use ffi::{Atoms, Effort, Extent, Heat, Listed, Movers, Request, Round, Totals, Wants};
 
 pub fn read_model(path: &str) -> Result<String, StyleError> {
-    guard(|| Ok(Document::open(path.as_ref())?.source().text().to_owned()))
+    guard(|| Ok(Document::open(path.as_ref())?.source.text().to_owned()))
 }
 
 #[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.

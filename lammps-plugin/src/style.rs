@@ -141,8 +141,8 @@ impl Style {
     pub fn description(&self, search: &str, listed: bool, apart: bool) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "psidpd: {} ({})", self.model.title(), self.model.source().name());
-        if let Some(reference) = self.model.reference() {
+        let _ = writeln!(text, "psidpd: {} ({})", self.model.title, self.model.source().name());
+        if let Some(reference) = &self.model.reference {
             let _ = writeln!(text, "  reference     {reference}");
         }
         if !self.scale.is_one() {

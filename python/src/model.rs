@@ -38,13 +38,13 @@ impl Model {
     /// The title in the file.
     #[getter]
     fn title(&self) -> &str {
-        self.model.title()
+        &self.model.title
     }
 
     /// The source of the model, or None.
     #[getter]
     fn reference(&self) -> Option<&str> {
-        self.model.reference()
+        self.model.reference.as_deref()
     }
 
     /// The number of dimensions, 2 or 3.
@@ -132,7 +132,7 @@ impl Model {
     }
 
     fn __repr__(&self) -> String {
-        format!("<psidpd.Model \"{}\", species {}>", self.model.title(), self.model.species().join(", "))
+        format!("<psidpd.Model \"{}\", species {}>", self.model.title, self.model.species().join(", "))
     }
 
     /// A model is pickled as its text.

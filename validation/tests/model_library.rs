@@ -401,7 +401,7 @@ fn every_file_is_in_the_table_and_opens_with_a_comment() {
         assert!(text.starts_with("# ") && text.contains("Target"), "{}", entry.name);
         let fluid = entry.fluid();
         assert_eq!(fluid.species.len(), entry.densities.len(), "{}", entry.name);
-        assert!(entry.model().reference().is_some() && fluid.is_conservative(), "{}", entry.name);
+        assert!(entry.model().reference.is_some() && fluid.is_conservative(), "{}", entry.name);
         assert!(fluid.thermostats.iter().all(Option::is_some), "{}", entry.name);
     }
 }

@@ -56,7 +56,7 @@ impl Style {
     ) -> Result<Style, StyleError> {
         guard(|| {
             let model = Model::parse(source, text)?;
-            let scale = Scale::new(units, model.units())
+            let scale = Scale::new(units, model.units)
                 .map_err(|text| StyleError(format!("{}: {text}", model.source().name())))?;
             Ok(Style { scale, ..Style::new(model, kt / scale.energy, names, dimensions)? })
         })

@@ -15,7 +15,7 @@ pub struct Model {
 
 impl Model {
     fn boxed(model: model::Model) -> *mut Model {
-        let title = c_text(model.title());
+        let title = c_text(&model.title);
         let species = model.species().iter().map(|s| c_text(s)).collect();
         Box::into_raw(Box::new(Model { model, title, species }))
     }

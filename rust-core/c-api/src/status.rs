@@ -52,7 +52,7 @@ impl Failure {
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Failure {
-        let status = match error.kind() {
+        let status = match *error.kind {
             FileErrorKind::Unreadable(_) => Status::File,
             _ => Status::Model,
         };

@@ -17,7 +17,7 @@ impl Number {
     /// Reads a number or a formula; names are looked up when it is evaluated.
     pub fn read(value: &Value) -> Result<Number, FileError> {
         if let Some(number) = value.as_number() {
-            return Ok(Number::Value(Located { value: number?, place: value.place().clone() }));
+            return Ok(Number::Value(Located { value: number?, place: value.place.clone() }));
         }
         match value.as_str() {
             Some(_) => Ok(Number::Formula(read_formula(value)?)),
@@ -83,13 +83,8 @@ fn error_in_string(string: &Place, error: ExpressionError) -> FileError {
     if quotes == 3 && quoted[3..].starts_with('\n') {
         quotes += 1;
     }
-    let mut start = (whole.start + quotes + error.offset).min(whole.end);
-    let mut end = (start + error.length).min(whole.end);
-    while !text.is_char_boundary(start) {
-        start -= 1;
-    }
-    while !text.is_char_boundary(end) {
-        end += 1;
-    }
-    Place { span: start..end, ..string.clone() }.error(FileErrorKind::Expression(error))
+    let start = (whole.start + quotes + error.offset).min(whole.end);
+    let end = (start + error.length).min(whole.end);
+    let span = text.floor_char_boundary(start)..text.ceil_char_boundary(end);
+    Place { span, ..string.clone() }.error(FileErrorKind::Expression(error))
 }

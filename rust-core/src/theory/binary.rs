@@ -65,13 +65,6 @@ impl<'a> CompositionLine<'a> {
         line
     }
 
-    fn new(theory: &'a MeanField, held: Held) -> CompositionLine<'a> {
-        match held {
-            Held::Density(density) => CompositionLine::at_density(theory, density),
-            Held::Pressure(pressure) => CompositionLine::at_pressure(theory, pressure),
-        }
-    }
-
     /// `ln ρ` at the given pressure, by Newton's method from a neighbouring value.
     fn solve_density(&self, u: f64, from: f64, pressure: f64) -> Option<f64> {
         let x = fractions(u);
@@ -106,15 +99,16 @@ impl<'a> CompositionLine<'a> {
         x.map(|x| x * total)
     }
 
-    fn two_phases(&self, [a, b]: [f64; 2]) -> CompositionBinodal {
-        let phases = [a, b].map(|u| self.densities(u));
+    fn two_phases(&self) -> Result<CompositionBinodal, TheoryError> {
+        let ends = coexisting(self)?;
+        let phases = ends.map(|u| self.densities(u));
         let exchange = self.theory.chemical_potentials(&phases[0]);
-        CompositionBinodal {
-            composition: [self.x(a), self.x(b)],
+        Ok(CompositionBinodal {
+            composition: ends.map(|u| self.x(u)),
             density: phases.map(|rho| rho[0] + rho[1]),
             pressure: phases.map(|rho| self.theory.pressure(&rho)),
             exchange_potential: exchange[0] - exchange[1],
-        }
+        })
     }
 }
 
@@ -234,7 +228,8 @@ impl MeanField {
 
     /// The common tangent of `f(c)` at a total density, for any pressures.
     pub(super) fn common_tangent(&self, density: f64) -> Result<CompositionBinodal, TheoryError> {
-        self.binodal_of(Held::Density(density))
+        self.require_species(2)?;
+        CompositionLine::at_density(self, density).two_phases()
     }
 
     /// Two phases of a binary mixture with the pressure `pressure` and equal chemical potentials: the common
@@ -243,18 +238,7 @@ impl MeanField {
     /// # Errors
     /// Fails for other than two species, and with [`TheoryError::NoCoexistence`].
     pub fn composition_binodal_at_pressure(&self, pressure: f64) -> Result<CompositionBinodal, TheoryError> {
-        self.binodal_of(Held::Pressure(pressure))
-    }
-
-    fn binodal_of(&self, held: Held) -> Result<CompositionBinodal, TheoryError> {
         self.require_species(2)?;
-        let line = CompositionLine::new(self, held);
-        let phases = self.phases(&line)?;
-        Ok(line.two_phases(phases))
-    }
-
-    /// The two phases as parameters of the line.
-    pub(super) fn phases(&self, line: &dyn Line) -> Result<[f64; 2], TheoryError> {
-        coexisting(line).ok_or(TheoryError::NoCoexistence)
+        CompositionLine::at_pressure(self, pressure).two_phases()
     }
 }

@@ -64,7 +64,7 @@ pub fn composition_critical_point(
     let least = |parameter: f64| -> Result<(f64, f64), TheoryError> {
         let theory = theory(parameter)?;
         let line = CompositionLine::at_density(&theory, density);
-        Ok(smallest(&line.grid(), &|u| theory.lowest(&line.densities(u))))
+        Ok(smallest(&line.grid(), &|u| theory.smallest_inverse_structure_factor(&line.densities(u), 0.0)))
     };
     let limit = change_of_sign(range, &|parameter| Ok(least(parameter)?.1 < 0.0))?;
     let at_limit = least(limit)?.0;
@@ -111,15 +111,11 @@ pub fn composition_critical_point(
 }
 
 impl MeanField {
-    /// The lowest eigenvalue of `∂²f/∂ρ_α∂ρ_β`, scaled so that it is 1 for an ideal mixture.
-    fn lowest(&self, densities: &[f64]) -> f64 {
-        self.smallest_inverse_structure_factor(densities, 0.0)
-    }
-
     /// The unstable interval of compositions that overlaps `near` or is nearest to it.
     fn ends(&self, density: f64, near: [f64; 2]) -> Option<Ends> {
         let line = CompositionLine::at_density(self, density);
-        let regions = negative(&line.grid(), &|u| self.lowest(&line.densities(u)));
+        let stability = |u: f64| self.smallest_inverse_structure_factor(&line.densities(u), 0.0);
+        let regions = negative(&line.grid(), &stability);
         let gap = |[a, b]: [f64; 2]| (a - near[1]).max(near[0] - b);
         let u = regions.into_iter().min_by(|a, b| gap(*a).total_cmp(&gap(*b)))?;
         let third = u.map(|u| self.third_derivative(line.densities(u)));

@@ -1,5 +1,5 @@
 use super::binary::CompositionLine;
-use super::line::Line;
+use super::line::{Line, coexisting};
 use super::mean_field::add_symmetric;
 use super::one_component::DensityLine;
 use super::radial::{gauss_legendre, integral};
@@ -75,7 +75,7 @@ impl MeanField {
     pub fn interface(&self, points: usize) -> Result<Interface, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
-        let phases = self.phases(&line)?;
+        let phases = coexisting(&line)?;
         planar(&line, &|x| self.gradient_coefficients(&[x])[0], phases, points, self.kt, &|x| x)
     }
 
@@ -89,7 +89,7 @@ impl MeanField {
     pub fn composition_interface(&self, density: f64, points: usize) -> Result<Interface, TheoryError> {
         self.composition_binodal(density)?;
         let line = CompositionLine::at_density(self, density);
-        let phases = self.phases(&line)?;
+        let phases = coexisting(&line)?;
         let kappa = |c: f64| {
             let k = self.gradient_coefficients(&[density * c, density * (1.0 - c)]);
             density * density * (k[0] - k[1] - k[2] + k[3])

@@ -1,5 +1,6 @@
 //! Coexistence for a free energy of one variable, by the double tangent.
 
+use super::TheoryError;
 use super::search::{minimum, turning_point};
 
 /// A free energy `g(x)` of one variable, as a function of a parameter `u` (a logarithm, so that a phase
@@ -57,11 +58,6 @@ pub fn negative(grid: &[f64], f: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     all
 }
 
-/// The place and value of the smallest curvature.
-pub fn least_stable(line: &dyn Line) -> (f64, f64) {
-    smallest(&line.grid(), &|u| line.curvature(u))
-}
-
 /// The place and the smallest value of `f`, from a grid and then between its points.
 pub fn smallest(grid: &[f64], f: &dyn Fn(f64) -> f64) -> (f64, f64) {
     let values: Vec<f64> = grid.iter().map(|u| f(*u)).collect();
@@ -76,7 +72,10 @@ pub fn smallest(grid: &[f64], f: &dyn Fn(f64) -> f64) -> (f64, f64) {
 
 /// Two coexisting phases: the first double tangent, in order of `x`, with no part of `g` below it
 /// between the two phases. A stable phase between the two may be left out.
-pub fn coexisting(line: &dyn Line) -> Option<[f64; 2]> {
+///
+/// # Errors
+/// Fails with [`TheoryError::NoCoexistence`].
+pub fn coexisting(line: &dyn Line) -> Result<[f64; 2], TheoryError> {
     let regions = unstable(line);
     let grid = line.grid();
     let supported = |[a, b]: [f64; 2]| {
@@ -87,10 +86,11 @@ pub fn coexisting(line: &dyn Line) -> Option<[f64; 2]> {
             above.is_nan() || above > -1e-9 * ((x * own_slope).abs() + own_intercept.abs())
         })
     };
-    (0..regions.len()).find_map(|first| {
+    let found = (0..regions.len()).find_map(|first| {
         let partners = (first..regions.len()).rev();
         partners.filter_map(|last| coexistence(line, &regions, first, last)).find(|pair| supported(*pair))
-    })
+    });
+    found.ok_or(TheoryError::NoCoexistence)
 }
 
 /// The two phases below unstable interval `first` and above unstable interval `last` of `regions`.

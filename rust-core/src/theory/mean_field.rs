@@ -2,7 +2,7 @@ use super::TheoryError;
 use super::radial::Radial;
 use crate::free_energy::{FreeEnergy, Psi};
 use crate::model::pair::PairForm;
-use crate::model::{ExcessFreeEnergy, Fluid, Polynomial};
+use crate::model::{Fluid, Polynomial};
 
 /// The mean-field theory of a fluid at one temperature.
 ///
@@ -20,7 +20,7 @@ pub struct MeanField {
     /// Self term that is added to the bulk density in variable `v` of `ψ_α`.
     pub(super) shift: Vec<Vec<f64>>,
     /// The variables of `ψ_α` for a particle without neighbours: its corrected densities.
-    isolated: Vec<Vec<f64>>,
+    pub(super) isolated: Vec<Vec<f64>>,
     /// Weight function `w` of each density.
     pub(super) kernels: Vec<Radial>,
     /// Pair potentials `φ`, and the species that they act between.
@@ -84,11 +84,15 @@ impl MeanField {
         if ranges[0] == 0.0 {
             ranges = [1.0, 1.0];
         }
+        if let Some(species) = fluid.stated_slopes() {
+            return Err(TheoryError::NoFreeEnergy(species.to_owned()));
+        }
+        let too_large = |alpha: usize| TheoryError::TooLarge(fluid.species[alpha].clone());
         Ok(MeanField {
             dimensions: d,
             kt: fluid.kt,
             species: fluid.species.clone(),
-            free_energy: free_energy_of(fluid)?,
+            free_energy: FreeEnergy::new(fluid, MOST_OPERATIONS).map_err(too_large)?,
             shift,
             isolated,
             kernels,
@@ -105,11 +109,6 @@ impl MeanField {
         let at: Vec<f64> =
             self.shift[alpha].iter().enumerate().map(|(v, shift)| densities[v % count] + shift).collect();
         self.psi_at(alpha, &at)
-    }
-
-    /// `ψ_α` and its derivatives for a particle without neighbours.
-    pub(super) fn isolated_psi(&self, alpha: usize) -> Psi {
-        self.psi_at(alpha, &self.isolated[alpha])
     }
 
     pub(super) fn psi_at(&self, alpha: usize, at: &[f64]) -> Psi {
@@ -240,13 +239,4 @@ pub(super) fn add_symmetric(matrix: &mut [f64], count: usize, [a, b]: [usize; 2]
     if a != b {
         matrix[b * count + a] += number;
     }
-}
-
-fn free_energy_of(fluid: &Fluid) -> Result<FreeEnergy, TheoryError> {
-    let name = |alpha: usize| fluid.species[alpha].clone();
-    let is_stated = |e: &ExcessFreeEnergy| matches!(e, ExcessFreeEnergy::Slopes(_));
-    if let Some(alpha) = fluid.excess.iter().position(is_stated) {
-        return Err(TheoryError::NoFreeEnergy(name(alpha)));
-    }
-    FreeEnergy::new(fluid, MOST_OPERATIONS).map_err(|alpha| TheoryError::TooLarge(name(alpha)))
 }

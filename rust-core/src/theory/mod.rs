@@ -41,7 +41,7 @@ pub use critical::{CompositionCritical, composition_critical_point};
 pub use interface::Interface;
 pub use limit::{NoLimit, Structure, thermodynamic_limit};
 pub use mean_field::MeanField;
-pub use one_component::{Binodal, CriticalPoint, critical_point, critical_point_of_model};
+pub use one_component::{Binodal, CriticalPoint, critical_point};
 pub use singular::{Singularity, SingularityKind, singular_densities};
 pub use stability::Stability;
 

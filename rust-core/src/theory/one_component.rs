@@ -1,6 +1,6 @@
-use super::line::{Line, least_stable, unstable};
+use super::line::{Line, coexisting, smallest, unstable};
 use super::{MeanField, TheoryError};
-use crate::model::{Fluid, Model};
+use crate::model::Fluid;
 
 /// Coexisting vapour and liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +92,7 @@ impl MeanField {
     pub fn binodal(&self) -> Result<Binodal, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
-        let [a, b] = self.phases(&line)?;
+        let [a, b] = coexisting(&line)?;
         Ok(Binodal {
             vapour: a.exp(),
             liquid: b.exp(),
@@ -100,17 +100,6 @@ impl MeanField {
             pressure: self.pressure(&[a.exp()]),
             chemical_potential: line.slope(a),
         })
-    }
-
-    /// The density on the grid at which `β ∂p/∂ρ` is smallest, and that value: at the critical
-    /// temperature the value is zero, and the density is the critical one.
-    ///
-    /// # Errors
-    /// Fails for more than one species.
-    pub fn least_stable_density(&self) -> Result<[f64; 2], TheoryError> {
-        self.require_species(1)?;
-        let (u, value) = least_stable(&DensityLine::new(self));
-        Ok([u.exp(), value])
     }
 }
 
@@ -127,19 +116,18 @@ pub fn critical_point(
     fluid: &dyn Fn(f64) -> Result<Fluid, TheoryError>,
     range: [f64; 2],
 ) -> Result<CriticalPoint, TheoryError> {
-    let least = |parameter: f64| MeanField::new(&fluid(parameter)?)?.least_stable_density();
+    // The density at which `β ∂p/∂ρ` is smallest, and that value, which is zero at the critical point.
+    let least = |parameter: f64| -> Result<[f64; 2], TheoryError> {
+        let theory = MeanField::new(&fluid(parameter)?)?;
+        theory.require_species(1)?;
+        let line = DensityLine::new(&theory);
+        let (u, value) = smallest(&line.grid, &|u| line.curvature(u));
+        Ok([u.exp(), value])
+    };
     let parameter = change_of_sign(range, &|parameter| Ok(least(parameter)?[1] < 0.0))?;
     let density = least(parameter)?[0];
     let pressure = MeanField::new(&fluid(parameter)?)?.pressure(&[density]);
     Ok(CriticalPoint { parameter, density, pressure })
-}
-
-/// The [`critical_point`] of a model, in kT.
-///
-/// # Errors
-/// Fails as [`critical_point`].
-pub fn critical_point_of_model(model: &Model, kt: [f64; 2]) -> Result<CriticalPoint, TheoryError> {
-    critical_point(&|kt| Ok(model.at(kt)?), kt)
 }
 
 /// The control parameter nearest to the upper end of `range` where `unstable` changes.

@@ -52,21 +52,13 @@ impl MeanField {
         let unit = self.ranges[0].powi(-(self.dimensions as i32));
         let (low, high) = ((1e-6 * unit).ln(), (1e6 * unit).ln());
         let all: Vec<f64> = spaced(low, high, 1200).into_iter().map(f64::exp).collect();
-        let pole = first_along(self, composition, &all);
-        let Some(pole) = pole else { return all };
+        let present = (0..composition.len()).filter(|alpha| composition[*alpha] > 0.0);
+        let singular = present.flat_map(|alpha| along(self, alpha, composition, &all));
+        let Some(pole) = singular.map(|s| s.density).min_by(f64::total_cmp) else { return all };
         let mut grid: Vec<f64> = all.into_iter().filter(|rho| *rho < 0.5 * pole).collect();
         grid.extend((0..240).map(|i| pole * (1.0 - 0.5 * 2f64.powf(-(i as f64) / 8.0))));
         grid
     }
-}
-
-/// The first singularity above density zero along a composition.
-pub fn first_along(theory: &MeanField, composition: &[f64], grid: &[f64]) -> Option<f64> {
-    (0..composition.len())
-        .filter(|alpha| composition[*alpha] > 0.0)
-        .flat_map(|alpha| along(theory, alpha, composition, grid))
-        .map(|s| s.density)
-        .min_by(f64::total_cmp)
 }
 
 /// A measure of the slopes of ψ; infinite where ψ is not defined.
@@ -84,7 +76,7 @@ fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) ->
     let values: Vec<f64> = grid.iter().map(|rho| at(*rho)).collect();
     let found = |density, kind| Singularity { species: alpha, density, kind };
     let mut all = Vec::new();
-    if grid[0] == 0.0 && !steepness(&theory.isolated_psi(alpha)).is_finite() {
+    if grid[0] == 0.0 && !steepness(&theory.psi_at(alpha, &theory.isolated[alpha])).is_finite() {
         all.push(found(0.0, SingularityKind::Origin));
     }
     for i in 1..grid.len() {

@@ -92,7 +92,8 @@ fn pressure_of_the_van_der_waals_fluid_and_its_compressibility() {
 fn critical_points_have_their_closed_form() {
     let (a, b) = (1.9 * 0.016, 0.016);
     for alpha3 in [0.0f64, 0.5, 1.0, 5.0] {
-        let found = critical_point_of_model(&van_der_waals(2, a, b, alpha3), [0.05, 20.0]).unwrap();
+        let model = van_der_waals(2, a, b, alpha3);
+        let found = critical_point(&|kt| Ok(model.at(kt)?), [0.05, 20.0]).unwrap();
         let x = if alpha3 == 0.0 {
             1.0 / 3.0
         } else {
@@ -106,7 +107,8 @@ fn critical_points_have_their_closed_form() {
             close(found.pressure, a / (27.0 * b * b), 1e-9);
         }
     }
-    let none = critical_point_of_model(&van_der_waals(2, a, b, 0.0), [5.0, 20.0]);
+    let model = van_der_waals(2, a, b, 0.0);
+    let none = critical_point(&|kt| Ok(model.at(kt)?), [5.0, 20.0]);
     assert_eq!(none, Err(TheoryError::NoCriticalPoint(5.0, 20.0)));
 }
 
@@ -329,7 +331,7 @@ fn interface_of_the_van_der_waals_fluid() {
         close(mf.gradient_coefficients(&[rho])[0], 0.2 / 2.0 * bracket, 1e-12);
     }
     // Close to the critical point γ = Δρ² √(κf″)/6.
-    let critical = critical_point_of_model(&model, [0.1, 10.0]).unwrap();
+    let critical = critical_point(&|kt| Ok(model.at(kt)?), [0.1, 10.0]).unwrap();
     let mf = theory(&model, critical.parameter * (1.0 - 1e-4));
     let found = mf.interface(101).unwrap();
     let delta = found.phases[1] - found.phases[0];

@@ -47,7 +47,7 @@ impl Bulk<'_> {
         let mut text = format!(
             "title = \"{total} of {}\"\nmodel = {}\nkT = {:?}\nseed = {seed}\ndt = {dt:?}\nequilibrate = {equilibrate}\n\
              steps = {steps}\nbox = {:?}\n[initial]\nkind = \"lattice\"\ndensity = {total:?}\n",
-            self.model.title().replace(['"', '\\'], "'"),
+            self.model.title.replace(['"', '\\'], "'"),
             toml::Value::String(file.display().to_string()),
             self.kt,
             vec![edge; d],

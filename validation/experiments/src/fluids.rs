@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::lammps::style::PairStyle;
 use crate::models;
-use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab, warren_ab_text};
+use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab};
 
 /// A fluid with everything the codes need to be told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -152,10 +152,6 @@ impl WarrenSet {
     /// The model with friction `gamma` and one of the two force laws.
     pub fn model(&self, law: ForceLaw, gamma: f64) -> Result<Model, ExperimentError> {
         Ok(warren_ab(&["F".to_owned()], &[Some(self.pair(gamma))], 3, law)?)
-    }
-
-    pub fn model_text(&self, law: ForceLaw, gamma: f64) -> Result<String, ExperimentError> {
-        Ok(warren_ab_text(&["F".to_owned()], &[Some(self.pair(gamma))], 3, law)?)
     }
 }
 

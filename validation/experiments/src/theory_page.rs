@@ -1,7 +1,7 @@
 //! Mean field of a model over temperatures, as a page.
 
 use psidpd_core::model::Model;
-use psidpd_core::theory::{MeanField, composition_critical_point, critical_point_of_model};
+use psidpd_core::theory::{MeanField, composition_critical_point, critical_point};
 use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style};
 
 const TEMPERATURES: usize = 25;
@@ -39,7 +39,7 @@ pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     }
     let kts: Vec<String> = scope.kts.iter().map(ToString::to_string).collect();
     Ok(Report {
-        title: model.title().into(),
+        title: model.title.clone(),
         subtitle: "psidpd theory: mean field".into(),
         facts: vec![("kT".into(), kts.join(", ")), ("species".into(), model.species().join(", "))],
         sections,
@@ -123,7 +123,7 @@ fn diagram(
 }
 
 fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
-    let critical = match critical_point_of_model(model, scope.range) {
+    let critical = match critical_point(&|kt| Ok(model.at(kt)?), scope.range) {
         Ok(critical) => critical,
         Err(error) => return Ok(vec![Item::Prose(format!("{error}."))]),
     };

@@ -66,12 +66,12 @@ impl<'a> Options<'a> {
 
     pub fn number(&self, key: &str, low: f64, high: f64) -> Result<Option<f64>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        within(&value, value.number()?.value, low, high).map(Some)
+        within(&value, value.number()?, low, high).map(Some)
     }
 
     pub fn count(&self, key: &str, low: u64, high: u64) -> Result<Option<usize>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        Ok(Some(within(&value, value.count()?.value, low, high)? as usize))
+        Ok(Some(within(&value, value.count()?, low, high)? as usize))
     }
 
     pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
@@ -80,25 +80,23 @@ impl<'a> Options<'a> {
         let [a, b] = items.as_slice() else {
             return Err(value.error("expected two whole numbers"));
         };
-        let read = |item: &Value| Ok(within(item, item.count()?.value, low, high)? as usize);
+        let read = |item: &Value| Ok(within(item, item.count()?, low, high)? as usize);
         Ok(Some([read(a)?, read(b)?]))
     }
 
     pub fn flag(&self, key: &str) -> Result<Option<bool>, FileError> {
-        self.get(key).map(|value| Ok(value.boolean()?.value)).transpose()
+        self.get(key).map(|value| value.boolean()).transpose()
     }
 
     pub fn axis(&self, key: &str) -> Result<Option<usize>, FileError> {
         let names = [("x", 0), ("y", 1), ("z", 2)];
         let names = &names[..self.place.fluid.dimensions];
-        self.get(key).map(|value| Ok(value.one_of("axis", names)?.value)).transpose()
+        self.get(key).map(|value| value.one_of("axis", names)).transpose()
     }
 
     pub fn species(&self, key: &str) -> Result<Option<usize>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        let names: Vec<(&str, usize)> =
-            self.place.fluid.species.iter().enumerate().map(|(k, name)| (name.as_str(), k)).collect();
-        Ok(Some(value.one_of("species", &names)?.value))
+        value.string()?.among("species", self.place.fluid.species.iter().zip(0..)).map(Some)
     }
 
     /// The index of a species of the model, for keys whose value may be something other than a name.
@@ -107,7 +105,7 @@ impl<'a> Options<'a> {
     }
 
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
-        self.get(key).map(|value| Ok(value.one_of("choice", choices)?.value)).transpose()
+        self.get(key).map(|value| value.one_of("choice", choices)).transpose()
     }
 
     /// An error about a key, or about the observable if the key is not set.

@@ -3,7 +3,7 @@
 use super::keys::{COMMON, Key, Table};
 use super::meter::{AnyMeter, KINDS};
 use super::options::{Options, Place};
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, Section};
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Observe {
@@ -36,7 +36,7 @@ pub fn read(root: &Section, place: &Place) -> Result<Observe, FileError> {
         if let Some(section) = &options.section {
             section.only([names(COMMON), names(kind.table.keys)].concat())?;
         }
-        if options.section.is_none() && !value.boolean()?.value {
+        if options.section.is_none() && !value.boolean()? {
             continue;
         }
         let preset = Common { every: kind.every.unwrap_or(common.every), ..common.clone() };
@@ -76,25 +76,21 @@ impl Common {
     fn read(section: &Section, place: &Place, mut common: Common) -> Result<Common, FileError> {
         debug_assert_eq!(COMMON.len(), 3);
         if let Some(value) = section.get("every") {
-            common.every = value.count()?.value;
+            common.every = value.count()?;
             if common.every == 0 {
                 return Err(value.error("must be at least 1"));
             }
         }
         if let Some(value) = section.get("skip") {
-            common.skip = value.count()?.value;
+            common.skip = value.count()?;
         }
         if let Some(value) = section.get("stages") {
-            let known = place.stages;
             common.stages.clear();
             for item in value.array()? {
-                let name = item.string()?.value;
-                if !known.contains(&name.as_str()) {
-                    let known = known.join(", ");
-                    return Err(item.error(FileErrorKind::UnknownName { what: "stage", name, known }));
-                }
-                if !common.stages.contains(&name) {
-                    common.stages.push(name);
+                let name = item.string()?;
+                name.among("stage", place.stages.iter().map(|name| (name, ())))?;
+                if !common.stages.contains(&name.value) {
+                    common.stages.push(name.value);
                 }
             }
             if common.stages.is_empty() {

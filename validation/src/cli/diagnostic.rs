@@ -49,26 +49,26 @@ impl Failure {
 
     fn rendered(&self, renderer: &Renderer, caller: Caller) -> String {
         let shows = |e: &&FileError| {
-            let text = e.file().text();
+            let text = e.place.source.text();
             !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
         };
         let located = file_error(&*self.error).filter(shows);
         // Text from a file may contain control characters, which are made printable in every part of the message.
-        let text = located.map_or(String::new(), |e| printable(e.file().text()));
-        let name = located.map_or("", |e| e.file().name());
+        let text = located.map_or(String::new(), |e| printable(e.place.source.text()));
+        let name = located.map_or("", |e| e.place.source.name());
         let title = match located {
             // The line itself shows the place.
-            Some(e) if e.key().is_empty() => e.kind().to_string(),
-            Some(e) => format!("{}: {}", e.key(), e.kind()),
+            Some(e) if e.place.key.is_empty() => e.kind.to_string(),
+            Some(e) => format!("{}: {}", e.place.key, e.kind),
             None => self.error.to_string(),
         };
         let mut report = Group::with_title(Level::ERROR.primary_title(printable(&title)));
         if let Some(e) = located {
-            let place = AnnotationKind::Primary.span(e.span()).label("here");
+            let place = AnnotationKind::Primary.span(e.place.span.clone()).label("here");
             report = report.element(Snippet::source(text).path(name).annotation(place));
         }
         let help = run_error(&*self.error).and_then(|error| error.help(caller));
-        if let Some(help) = help.or_else(|| Some(file_error(&*self.error)?.help()?.to_string())) {
+        if let Some(help) = help.or_else(|| file_error(&*self.error)?.help.clone()) {
             report = report.element(Level::HELP.message(printable(&help)));
         }
         let title = printable(&title);

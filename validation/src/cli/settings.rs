@@ -25,7 +25,7 @@ impl Settings {
         let (of_host, of_model): (Vec<_>, Vec<_>) = self.edits.iter().partition(|e| e.key() == "kT");
         let of_model: Vec<Edit> = of_model.into_iter().cloned().collect();
         let document = Document::open(path)?;
-        let text = edit_model(document.source().text(), &of_model)?;
+        let text = edit_model(document.source.text(), &of_model)?;
         let model = Model::parse(&path.display().to_string(), &text)?;
         let wrong = |e: &&Edit| {
             let source = Arc::new(Source::new("--set", ""));

@@ -1,6 +1,6 @@
 use super::check::{number_density, per_species};
 use super::*;
-use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point_of_model};
+use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point};
 use psidpd_dynamics::prediction::{Prediction, predict, published};
 use psidpd_experiments::measure::{self, Effort};
 use psidpd_experiments::theory_page::{self, Scope};
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     match all.as_slice() {
         [single] => conclude(json, single, defined),
-        several => conclude(json, &json!({"title": model.title(), "temperatures": several}), defined),
+        several => conclude(json, &json!({"title": model.title, "temperatures": several}), defined),
     }
 }
 
@@ -152,7 +152,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     scope.density = scope.density.max(total);
     scope.range = [scope.range[0].min(range[0]), scope.range[1].max(range[1])];
 
-    say!("{} at kT = {}", model.title(), number(kt));
+    say!("{} at kT = {}", model.title, number(kt));
     let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
     let (mut rows, mut empty) = (Vec::new(), Vec::new());
     for k in 1..=arguments.rows.min(10_000) {
@@ -181,7 +181,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         1 => vec![
             answer(
                 "critical point",
-                critical_point_of_model(model, range),
+                critical_point(&|kt| Ok(model.at(kt)?), range),
                 |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
             ),
             answer("spinodal", theory.spinodal(), |s| json!(s)),
@@ -257,7 +257,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         say!("note: {doubt}");
         scope.doubts.push(format!("kT = {kt}: {doubt}"));
     }
-    let mut all = json!({"title": model.title(), "kT": kt, "equation_of_state": rows, "doubts": doubts});
+    let mut all = json!({"title": model.title, "kT": kt, "equation_of_state": rows, "doubts": doubts});
     if let Some(p) = &prediction {
         all["correlated"] = json!({
             "density": p.density,

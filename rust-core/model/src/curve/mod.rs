@@ -40,7 +40,6 @@ pub struct CurveBlock {
     /// Second derivatives `ψ″(n)`.
     pub curvature: Vec<f64>,
     work: Vec<f64>,
-    out: Vec<f64>,
 }
 
 impl Curve {
@@ -71,9 +70,9 @@ impl Curve {
         match &self.form {
             CurveForm::Table(spline) => {
                 let [low, high] = spline.ends();
-                format!("table of {} points from {low} to {high}", spline.points())
+                format!("table of {} points from {low} to {high}", spline.pieces().0.len())
             }
-            CurveForm::Pressure(pressure) => format!("from the pressure {}", pressure.text()),
+            CurveForm::Pressure(pressure) => format!("from the pressure {}", pressure.text),
         }
     }
 }

@@ -12,7 +12,8 @@ use crate::expression::{Formula, Program, TooLarge};
 /// as with `ρ^2.6`, and `ψ′` has a limit nevertheless, it goes to it as a power of `ρ`.
 #[derive(Debug, Clone)]
 pub struct Pressure {
-    text: String,
+    /// The pressure as the model file states it.
+    pub(super) text: String,
     /// Computes `ψ′` and `ψ″` from the one variable ρ.
     program: Program,
     slope: Program,
@@ -20,28 +21,26 @@ pub struct Pressure {
     anchors: Vec<[f64; 2]>,
     /// ψ in the panel above each anchor, minus ψ at the anchor.
     panels: Vec<Primitive>,
-    series: Option<Series>,
-    tail: Option<Tail>,
+    dilute: Option<Dilute>,
 }
 
-/// `ψ′ = limit + factor ρ^power` below some density: there the formula itself loses its digits, and is 0/0 at ρ = 0.
-#[derive(Debug, Clone, Copy)]
-struct Tail {
-    below: f64,
-    limit: f64,
-    factor: f64,
-    power: f64,
-    /// Constant of integration that makes ψ continuous where the tail begins.
-    constant: f64,
-}
-
-/// `ψ′ = Σ_k c_k ρ^k` below some density.
+/// ψ at low densities, where the formula itself loses its digits, and may be 0/0 at ρ = 0.
 #[derive(Debug, Clone)]
-struct Series {
+struct Dilute {
+    law: Law,
+    /// The law holds from this density, and below that one.
+    from: f64,
     below: f64,
-    coefficients: [f64; TERMS],
-    /// Constant of integration that makes ψ continuous where the series ends.
+    /// Constant of integration that makes ψ continuous where the law ends.
     constant: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Law {
+    /// `ψ′ = Σ_k c_k ρ^k`.
+    Series([f64; TERMS]),
+    /// `ψ′ = limit + factor ρ^power`.
+    Power { limit: f64, factor: f64, power: f64 },
 }
 
 const TERMS: usize = 7;
@@ -80,8 +79,7 @@ impl Pressure {
             slope: Program::new(&[&slope]),
             anchors: Vec::new(),
             panels: Vec::new(),
-            series: Series::new(pressure, kt, start),
-            tail: None,
+            dilute: None,
         };
         let powers = (0..100).map(|k| start * 2f64.powi(if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 }));
         let first = powers.into_iter().find(|n| curve.slope_at(*n).is_finite());
@@ -99,21 +97,13 @@ impl Pressure {
             let panel = |ends: &[[f64; 2]]| Primitive::of(slopes, ends[0][0], ends[1][0]);
             curve.panels = curve.anchors.windows(2).map(panel).collect();
         }
-        if let Some(mut series) = curve.series.take() {
-            let constant = curve.integral(series.below) - series.value(series.below);
-            series.constant = if constant.is_finite() { constant } else { 0.0 };
-            curve.series = Some(series);
-        } else if let Some(mut tail) = Tail::find(&|n| curve.slope_at(n), start) {
-            let constant = curve.integral(tail.below) - tail.value(tail.below);
-            tail.constant = if constant.is_finite() { constant } else { 0.0 };
-            curve.tail = Some(tail);
+        let power = || Dilute::power(&|n| curve.slope_at(n), start);
+        if let Some(mut dilute) = Dilute::series(pressure, kt, start).or_else(power) {
+            let constant = curve.integral(dilute.below) - dilute.value(dilute.below);
+            dilute.constant = if constant.is_finite() { constant } else { 0.0 };
+            curve.dilute = Some(dilute);
         }
         Ok(curve)
-    }
-
-    /// The pressure as text, as the model file states it.
-    pub fn text(&self) -> &str {
-        &self.text
     }
 
     fn slope_at(&self, n: f64) -> f64 {
@@ -177,23 +167,13 @@ impl Pressure {
     /// Computes [`Curve::block`](super::Curve::block); the lists have the length of `n`.
     pub(super) fn block(&self, n: &[f64], to: &mut CurveBlock) {
         to.psi.iter_mut().zip(n).for_each(|(psi, n)| *psi = self.integral(*n));
-        let lanes = n.len();
-        to.out.resize(2 * lanes, 0.0);
-        self.program.eval_block(lanes, n, &mut to.out, &mut to.work);
-        to.slope.copy_from_slice(&to.out[..lanes]);
-        to.curvature.copy_from_slice(&to.out[lanes..2 * lanes]);
-        if let Some(series) = &self.series {
-            for (lane, n) in n.iter().enumerate() {
-                if *n < series.below {
-                    [to.slope[lane], to.curvature[lane]] = series.slope(*n);
-                    to.psi[lane] = series.value(*n) + series.constant;
-                }
-            }
-        }
-        if let Some(tail) = &self.tail {
-            for (lane, n) in n.iter().enumerate().filter(|(_, n)| (0.0..tail.below).contains(*n)) {
-                [to.slope[lane], to.curvature[lane]] = tail.slope(*n);
-                to.psi[lane] = tail.value(*n) + tail.constant;
+        let out = [&mut to.slope[..], &mut to.curvature[..]];
+        self.program.eval_block_into(n.len(), n, out.into_iter(), &mut to.work);
+        let Some(dilute) = &self.dilute else { return };
+        for (lane, n) in n.iter().enumerate() {
+            if *n < dilute.below && *n >= dilute.from {
+                [to.slope[lane], to.curvature[lane]] = dilute.slope(*n);
+                to.psi[lane] = dilute.value(*n) + dilute.constant;
             }
         }
     }
@@ -217,16 +197,16 @@ const fn rule(x: [f64; 4], w: [f64; 4]) -> ([f64; POINTS], [f64; POINTS]) {
     (nodes, weights)
 }
 
-impl Tail {
-    /// The tail begins below this fraction of the first density: low enough that only one power is
-    /// left, and high enough that `p − ρkT` keeps its digits.
-    const PART: f64 = 1e-4;
+/// A power holds below this fraction of the first density: low enough that only one power is left, and
+/// high enough that `p − ρkT` keeps its digits.
+const PART: f64 = 1e-4;
 
+impl Dilute {
     /// The limit of `slope` as its argument goes to 0, if its values at halved densities converge: with
     /// `s(n) = L + C n^q`, each difference of values at n and n/2 is `2^−q` times the previous
     /// difference. The differences of a logarithm stay equal; those of a pole grow.
-    fn find(slope: &dyn Fn(f64) -> f64, start: f64) -> Option<Tail> {
-        let below = Tail::PART * start;
+    fn power(slope: &dyn Fn(f64) -> f64, start: f64) -> Option<Dilute> {
+        let below = PART * start;
         let values: [f64; 5] = std::array::from_fn(|k| slope(below * 0.5f64.powi(k as i32)));
         let steps: [f64; 4] = std::array::from_fn(|k| values[k] - values[k + 1]);
         if steps.iter().any(|step| !step.is_finite() || *step == 0.0) {
@@ -241,24 +221,12 @@ impl Tail {
         }
         let limit = values[0] - steps[0] / (1.0 - ratio);
         let power = -ratio.log2();
-        Some(Tail { below, limit, factor: (values[0] - limit) / below.powf(power), power, constant: 0.0 })
+        let law = Law::Power { limit, factor: (values[0] - limit) / below.powf(power), power };
+        Some(Dilute { law, from: 0.0, below, constant: 0.0 })
     }
 
-    /// `ψ` without the constant of integration.
-    fn value(&self, n: f64) -> f64 {
-        n * (self.limit + self.factor * n.powf(self.power) / (self.power + 1.0))
-    }
-
-    /// Derivatives `ψ′` and `ψ″`.
-    fn slope(&self, n: f64) -> [f64; 2] {
-        let power = self.factor * n.powf(self.power);
-        [self.limit + power, self.power * self.factor * n.powf(self.power - 1.0)]
-    }
-}
-
-impl Series {
     /// Expands ψ at ρ = 0 if the pressure begins with ρkT.
-    fn new(pressure: &Formula, kt: f64, start: f64) -> Option<Series> {
+    fn series(pressure: &Formula, kt: f64, start: f64) -> Option<Dilute> {
         let mut derivative = pressure.clone();
         let mut factorial = 1.0;
         let mut taylor = Vec::new();
@@ -282,18 +250,30 @@ impl Series {
             term(TERMS - 1) <= 1e-15 * largest && term(TERMS - 2) <= 1e-13 * largest
         };
         let below = (0..40).map(|k| 0.01 * start * 0.25f64.powi(k)).find(|b| negligible(*b))?;
-        Some(Series { below, coefficients, constant: 0.0 })
+        Some(Dilute { law: Law::Series(coefficients), from: f64::NEG_INFINITY, below, constant: 0.0 })
     }
 
     /// `ψ` without the constant of integration.
     fn value(&self, n: f64) -> f64 {
-        n * self.coefficients.iter().enumerate().rev().fold(0.0, |sum, (k, c)| sum * n + c / (k + 1) as f64)
+        n * match self.law {
+            Law::Series(c) => {
+                c.iter().enumerate().rev().fold(0.0, |sum, (k, c)| sum * n + c / (k + 1) as f64)
+            }
+            Law::Power { limit, factor, power } => limit + factor * n.powf(power) / (power + 1.0),
+        }
     }
 
     /// Derivatives `ψ′` and `ψ″`.
     fn slope(&self, n: f64) -> [f64; 2] {
-        let fold = |[value, slope]: [f64; 2], c: &f64| [value * n + c, slope * n + value];
-        self.coefficients.iter().rev().fold([0.0; 2], fold)
+        match self.law {
+            Law::Series(c) => {
+                let fold = |[value, slope]: [f64; 2], c: &f64| [value * n + c, slope * n + value];
+                c.iter().rev().fold([0.0; 2], fold)
+            }
+            Law::Power { limit, factor, power } => {
+                [limit + factor * n.powf(power), power * factor * n.powf(power - 1.0)]
+            }
+        }
     }
 }
 

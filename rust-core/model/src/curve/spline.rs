@@ -93,11 +93,6 @@ impl Spline {
         (&self.knots, &self.pieces)
     }
 
-    /// The number of points that the spline passes through.
-    pub fn points(&self) -> usize {
-        self.knots.len()
-    }
-
     /// Intercept and slope, if the points lie on a straight line to rounding.
     pub fn straight(&self) -> Option<[f64; 2]> {
         let slope = self.pieces[0][1];

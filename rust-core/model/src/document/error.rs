@@ -33,14 +33,6 @@ impl Source {
     pub fn text(&self) -> &str {
         if self.quoted { &self.text } else { "" }
     }
-
-    /// Line and column, from 1, of a byte offset.
-    pub fn line_column(&self, offset: usize) -> (usize, usize) {
-        let before = &self.text.as_bytes()[..offset.min(self.text.len())];
-        let line = 1 + before.iter().filter(|b| **b == b'\n').count();
-        let column = 1 + before.iter().rev().take_while(|b| **b != b'\n').count();
-        (line, column)
-    }
 }
 
 /// The kinds of errors in a file.
@@ -125,9 +117,12 @@ impl Place {
 /// An error in a file: its kind, its place, and advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileError {
-    place: Place,
-    kind: Box<FileErrorKind>,
-    help: Option<String>,
+    /// The place that the error is about.
+    pub place: Place,
+    /// The kind of the error.
+    pub kind: Box<FileErrorKind>,
+    /// Advice how to mend the file.
+    pub help: Option<String>,
 }
 
 impl FileError {
@@ -151,34 +146,11 @@ impl FileError {
         self
     }
 
-    /// The file that contains the error.
-    pub fn file(&self) -> &Source {
-        &self.place.source
-    }
-
-    /// The bytes of the file that the error is about.
-    pub fn span(&self) -> Range<usize> {
-        self.place.span.clone()
-    }
-
-    /// The dotted key of the value that is wrong.
-    pub fn key(&self) -> &str {
-        &self.place.key
-    }
-
-    /// The kind of the error.
-    pub fn kind(&self) -> &FileErrorKind {
-        &self.kind
-    }
-
-    /// Advice how to mend the file.
-    pub fn help(&self) -> Option<&str> {
-        self.help.as_deref()
-    }
-
     /// The line of the error, from 1.
     pub fn line(&self) -> usize {
-        self.place.source.line_column(self.place.span.start).0
+        let text = self.place.source.text.as_bytes();
+        let before = &text[..self.place.span.start.min(text.len())];
+        1 + before.iter().filter(|b| **b == b'\n').count()
     }
 }
 

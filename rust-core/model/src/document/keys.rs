@@ -200,8 +200,8 @@ impl Table {
 
 /// An error at `key`, for a file of another kind than the one expected.
 pub fn of_another_kind(root: &Section, key: &str, what: &str) -> FileError {
-    let span = root.get(key).map_or(0..0, |value| value.span());
-    FileError::new(root.source(), span, key, what)
+    let span = root.get(key).map_or(0..0, |value| value.place.span);
+    FileError::new(&root.place.source, span, key, what)
 }
 
 /// Calls `read`, and refuses the keys of a file that its tables do not have. A misspelt key is reported first, before a key

@@ -20,8 +20,10 @@ use std::sync::Arc;
 /// A TOML document read but not yet interpreted.
 #[derive(Debug, Clone)]
 pub struct Document {
-    source: Arc<Source>,
-    directory: PathBuf,
+    /// The file's name and text.
+    pub source: Arc<Source>,
+    /// The directory of the file, to which file names in the document are relative.
+    pub directory: PathBuf,
     root: node::Table,
 }
 
@@ -70,20 +72,10 @@ impl Document {
         }
     }
 
-    /// The file's name and text.
-    pub fn source(&self) -> &Arc<Source> {
-        &self.source
-    }
-
-    /// The directory of the file, to which file names in the document are relative.
-    pub fn directory(&self) -> &Path {
-        &self.directory
-    }
-
     /// The table of top-level keys.
     pub fn root(&self) -> Section<'_> {
         let place = Place { source: Arc::clone(&self.source), span: 0..0, key: String::new() };
-        Section::new(place, &self.root)
+        Section { place, table: &self.root }
     }
 }
 

@@ -1,6 +1,6 @@
-use super::node::{Content, Node, Table};
+use super::node::{Content, Entry, Node, Table};
 use super::printable::is_control;
-use super::{FileError, FileErrorKind, Place, Source};
+use super::{FileError, FileErrorKind, Place};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -25,42 +25,51 @@ impl<T> Located<T> {
     }
 }
 
+impl Located<String> {
+    /// The choice of this name; fails if there is none.
+    pub fn among<N: AsRef<str>, T>(
+        &self,
+        what: &'static str,
+        choices: impl IntoIterator<Item = (N, T)>,
+    ) -> Result<T, FileError> {
+        let mut known = Vec::new();
+        for (name, choice) in choices {
+            if name.as_ref() == self.value {
+                return Ok(choice);
+            }
+            known.push(name);
+        }
+        let known: Vec<&str> = known.iter().map(|name| name.as_ref()).collect();
+        let (name, known) = (self.value.clone(), known.join(", "));
+        Err(self.error(FileErrorKind::UnknownName { what, name, known }))
+    }
+}
+
 /// A table of a document.
 #[derive(Debug, Clone)]
 pub struct Section<'a> {
-    place: Place,
-    table: &'a Table,
+    /// The table's place.
+    pub place: Place,
+    pub(super) table: &'a Table,
 }
 
 /// A value of a document, not yet interpreted.
 #[derive(Debug, Clone)]
 pub struct Value<'a> {
-    place: Place,
+    /// The value's place.
+    pub place: Place,
     value: &'a Node,
 }
 
 impl<'a> Section<'a> {
-    pub(super) fn new(place: Place, table: &'a Table) -> Section<'a> {
-        Section { place, table }
-    }
-
-    /// The file that contains this section.
-    pub fn source(&self) -> &Arc<Source> {
-        &self.place.source
-    }
-
-    /// The dotted path of a key of this section.
-    pub fn path_of(&self, key: &str) -> String {
-        match (self.place.key.is_empty(), key.is_empty()) {
+    /// The place of a key of this section, or of its value.
+    fn place_of(&self, key: &str, span: &Range<usize>) -> Place {
+        let path = match (self.place.key.is_empty(), key.is_empty()) {
             (true, _) => key.to_owned(),
             (_, true) => self.place.key.clone(),
             _ => format!("{}.{key}", self.place.key),
-        }
-    }
-
-    /// The place of a key of this section, or of its value.
-    fn place_of(&self, key: &str, span: &Range<usize>) -> Place {
-        Place { source: Arc::clone(self.source()), span: span.clone(), key: self.path_of(key) }
+        };
+        Place { source: Arc::clone(&self.place.source), span: span.clone(), key: path }
     }
 
     /// An error about this section as a whole.
@@ -81,16 +90,12 @@ impl<'a> Section<'a> {
 
     /// Every key with its value, in the order of the file: for tables whose keys are names.
     pub fn entries(&self) -> Vec<(Located<String>, Value<'a>)> {
-        self.table
-            .entries
-            .iter()
-            .map(|entry| {
-                let place = self.place_of(&entry.key, &entry.key_span);
-                let value =
-                    Value { place: self.place_of(&entry.key, &entry.value.span), value: &entry.value };
-                (Located { value: entry.key.clone(), place }, value)
-            })
-            .collect()
+        let located = |entry: &'a Entry| {
+            let place = self.place_of(&entry.key, &entry.key_span);
+            let value = Value { place: self.place_of(&entry.key, &entry.value.span), value: &entry.value };
+            (Located { value: entry.key.clone(), place }, value)
+        };
+        self.table.entries.iter().map(located).collect()
     }
 
     /// Fails if the section has a key that is not in this list.
@@ -107,21 +112,6 @@ impl<'a> Section<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The value's dotted key.
-    pub fn key(&self) -> &str {
-        &self.place.key
-    }
-
-    /// The value's place in the file.
-    pub fn place(&self) -> &Place {
-        &self.place
-    }
-
-    /// The value's bytes in the file.
-    pub fn span(&self) -> Range<usize> {
-        self.place.span.clone()
-    }
-
     /// An error about this value.
     pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
         self.place.error(kind)
@@ -131,22 +121,14 @@ impl<'a> Value<'a> {
         self.error(FileErrorKind::WrongType { expected, found: self.value.type_name() })
     }
 
-    fn located<T>(&self, value: T) -> Located<T> {
-        Located { value, place: self.place.clone() }
-    }
-
     /// Reads a number; integers are numbers too.
-    pub fn number(&self) -> Result<Located<f64>, FileError> {
-        match self.as_number() {
-            Some(Ok(value)) => Ok(self.located(value)),
-            Some(Err(error)) => Err(error),
-            None => Err(self.wrong("a number")),
-        }
+    pub fn number(&self) -> Result<f64, FileError> {
+        self.as_number().unwrap_or_else(|| Err(self.wrong("a number")))
     }
 
     /// Reads a number above zero.
     pub fn positive(&self) -> Result<f64, FileError> {
-        match self.number()?.value {
+        match self.number()? {
             x if x > 0.0 => Ok(x),
             x => Err(self.error(format!("must be positive, is {x}"))),
         }
@@ -166,21 +148,20 @@ impl<'a> Value<'a> {
     }
 
     /// Reads a whole number from 0.
-    pub fn count(&self) -> Result<Located<u64>, FileError> {
+    pub fn count(&self) -> Result<u64, FileError> {
         match &self.value.content {
-            Content::Integer(digits, radix) => match u64::from_str_radix(digits, *radix) {
-                Ok(value) => Ok(self.located(value)),
-                Err(_) => Err(self.error("must be a whole number from 0")),
-            },
+            Content::Integer(digits, radix) => {
+                u64::from_str_radix(digits, *radix).map_err(|_| self.error("must be a whole number from 0"))
+            }
             Content::Float(x) => Err(self.error(not_an_integer(x))),
             _ => Err(self.wrong("an integer")),
         }
     }
 
     /// Reads true or false.
-    pub fn boolean(&self) -> Result<Located<bool>, FileError> {
+    pub fn boolean(&self) -> Result<bool, FileError> {
         match &self.value.content {
-            Content::Boolean(b) => Ok(self.located(*b)),
+            Content::Boolean(b) => Ok(*b),
             _ => Err(self.wrong("true or false")),
         }
     }
@@ -190,7 +171,7 @@ impl<'a> Value<'a> {
         match self.as_str() {
             // Strings may be printed, and written to other files.
             Some(s) if s.contains(is_control) => Err(self.error("has a control character in it")),
-            Some(s) => Ok(self.located(s.to_owned())),
+            Some(s) => Ok(Located { value: s.to_owned(), place: self.place.clone() }),
             None => Err(self.wrong("a string")),
         }
     }
@@ -204,20 +185,8 @@ impl<'a> Value<'a> {
     }
 
     /// Reads one name of a list.
-    pub fn one_of<T: Copy>(
-        &self,
-        what: &'static str,
-        choices: &[(&str, T)],
-    ) -> Result<Located<T>, FileError> {
-        let name = self.string()?;
-        match choices.iter().find(|(n, _)| *n == name.value) {
-            Some((_, choice)) => Ok(self.located(*choice)),
-            None => Err(self.error(FileErrorKind::UnknownName {
-                what,
-                name: name.value,
-                known: choices.iter().map(|(n, _)| *n).collect::<Vec<_>>().join(", "),
-            })),
-        }
+    pub fn one_of<T: Copy>(&self, what: &'static str, choices: &[(&str, T)]) -> Result<T, FileError> {
+        self.string()?.among(what, choices.iter().copied())
     }
 
     /// Reads the elements of an array.
@@ -228,17 +197,11 @@ impl<'a> Value<'a> {
     /// The elements, if the value is an array.
     pub fn as_array(&self) -> Option<Vec<Value<'a>>> {
         let Content::Array(items) = &self.value.content else { return None };
-        Some(
-            items
-                .iter()
-                .enumerate()
-                .map(|(k, value)| {
-                    let (source, key) =
-                        (Arc::clone(&self.place.source), format!("{}[{}]", self.key(), k + 1));
-                    Value { place: Place { source, span: value.span.clone(), key }, value }
-                })
-                .collect(),
-        )
+        let located = |(k, value): (usize, &'a Node)| {
+            let key = format!("{}[{}]", self.place.key, k + 1);
+            Value { place: Place { span: value.span.clone(), key, ..self.place.clone() }, value }
+        };
+        Some(items.iter().enumerate().map(located).collect())
     }
 
     /// Reads a table.
@@ -249,14 +212,13 @@ impl<'a> Value<'a> {
     /// The table, if the value is one.
     pub fn as_section(&self) -> Option<Section<'a>> {
         let Content::Table(table) = &self.value.content else { return None };
-        Some(Section::new(self.place.clone(), table))
+        Some(Section { place: self.place.clone(), table })
     }
 
     /// Reads an array of `N` numbers.
     pub fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], FileError> {
         let items = self.array()?;
-        let numbers: Vec<f64> =
-            items.iter().map(|v| v.number().map(|x| x.value)).collect::<Result<_, _>>()?;
+        let numbers: Vec<f64> = items.iter().map(Value::number).collect::<Result<_, _>>()?;
         <[f64; N]>::try_from(numbers)
             .map_err(|_| self.error(format!("expected {expected}, found an array of length {}", items.len())))
     }

@@ -6,7 +6,7 @@ use super::Formula;
 use super::ast::{Action, Ast, Binary, Step};
 use super::error::{ErrorKind, ExpressionError, TooLarge};
 use super::function::{Function, Unary};
-use super::graph::{Graph, Id};
+use super::graph::{Graph, Id, Node};
 use super::suggest::closest;
 
 /// The meaning of the names in an expression.
@@ -87,8 +87,8 @@ impl Compiler<'_> {
                     (graph.unary(Unary::Ln, a)?, graph.constant(std::f64::consts::LOG10_E)?);
                 graph.multiply(natural, scale)
             }
-            (Action::Call(Function::Min), &[a, b]) => graph.min(a, b),
-            (Action::Call(Function::Max), &[a, b]) => graph.max(a, b),
+            (Action::Call(Function::Min), &[a, b]) => graph.select(a, b, a, b),
+            (Action::Call(Function::Max), &[a, b]) => graph.select(b, a, a, b),
             (Action::Binary(binary), &[a, b]) => match binary {
                 Binary::Add => graph.add(a, b),
                 Binary::Subtract => graph.subtract(a, b),
@@ -112,7 +112,8 @@ impl Compiler<'_> {
         known.extend(self.constants.keys().cloned());
         known.sort();
         known.dedup();
-        Err(ErrorKind::UnknownName {
+        Err(ErrorKind::Unknown {
+            what: "name",
             name: name.to_owned(),
             suggestion: closest(name, known.iter().map(String::as_str)),
             known,
@@ -130,7 +131,7 @@ impl Compiler<'_> {
                     return Err(ErrorKind::NoSuchVariable { name, index, count });
                 }
             };
-            let variable = self.graph.variable(variable)?;
+            let variable = self.graph.add_node(Node::Variable(variable))?;
             sum = self.graph.add(sum, variable)?;
         }
         Ok(sum)

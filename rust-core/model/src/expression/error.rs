@@ -63,17 +63,6 @@ pub enum ErrorKind {
     #[error("this `(` is never closed")]
     Unclosed,
 
-    /// A name followed by `(` is no function.
-    #[error("unknown function `{name}`{}", hint(.suggestion, .known))]
-    UnknownFunction {
-        /// The name in the text.
-        name: String,
-        /// The known functions.
-        known: Vec<String>,
-        /// The function that was probably meant.
-        suggestion: Option<String>,
-    },
-
     /// A function has too few or too many arguments.
     #[error("`{function}` takes {expected} argument(s), not {found}")]
     ArgumentCount {
@@ -85,9 +74,11 @@ pub enum ErrorKind {
         found: usize,
     },
 
-    /// A name is neither a constant nor a variable.
-    #[error("unknown name `{name}`{}", hint(.suggestion, .known))]
-    UnknownName {
+    /// A name followed by `(` is no function, or another name is neither a constant nor a variable.
+    #[error("unknown {what} `{name}`{}", hint(.suggestion, .known))]
+    Unknown {
+        /// What the name should be: `function` or `name`.
+        what: &'static str,
         /// The name in the text.
         name: String,
         /// The known names.

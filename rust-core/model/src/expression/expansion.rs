@@ -13,13 +13,10 @@ use super::graph::{Id, Node};
 pub struct Expansion {
     /// For each number of variables the products of monomials that are kept.
     products: Vec<Vec<[u16; 3]>>,
+    /// Number of variables of the present expansion.
+    variables: usize,
     /// The polynomial of each node.
     values: Vec<f64>,
-    scratch: Scratch,
-}
-
-#[derive(Debug, Clone, Default)]
-struct Scratch {
     nilpotent: Vec<f64>,
     sum: Vec<f64>,
     product: Vec<f64>,
@@ -43,13 +40,12 @@ impl Expansion {
         }
         let size = 3usize.pow(count as u32);
         let nodes = formula.nodes();
-        self.values.clear();
-        self.values.resize(nodes.len() * size, 0.0);
-        let Scratch { nilpotent, sum, product } = &mut self.scratch;
-        let mut algebra =
-            Algebra { products: &self.products[count], variables: count, nilpotent, sum, product };
+        self.variables = count;
+        let mut values = std::mem::take(&mut self.values);
+        values.clear();
+        values.resize(nodes.len() * size, 0.0);
         for (index, node) in nodes.iter().enumerate() {
-            let (before, rest) = self.values.split_at_mut(index * size);
+            let (before, rest) = values.split_at_mut(index * size);
             let of = |id: Id| &before[id.index() * size..][..size];
             let out = &mut rest[..size];
             match *node {
@@ -63,19 +59,19 @@ impl Expansion {
                 Node::Add(a, b) => combine(out, of(a), of(b), |a, b| a + b),
                 Node::Subtract(a, b) => combine(out, of(a), of(b), |a, b| a - b),
                 Node::Negate(a) => combine(out, of(a), of(a), |a, _| -a),
-                Node::Multiply(a, b) => algebra.multiply(of(a), of(b), out),
+                Node::Multiply(a, b) => self.multiply(of(a), of(b), out),
                 Node::Divide(a, b) => {
                     let mut inverse = vec![0.0; size];
-                    algebra.compose(of(b), &mut inverse, |b, t| power_series(t, -1.0, |m| b.powi(m as i32)));
-                    algebra.multiply(of(a), &inverse, out);
+                    self.compose(of(b), &mut inverse, |b, t| power_series(t, -1.0, |m| b.powi(m as i32)));
+                    self.multiply(of(a), &inverse, out);
                 }
-                Node::IntegerPower(a, n) if n > 0 => algebra.integer_power(of(a), n as u32, out),
+                Node::IntegerPower(a, n) if n > 0 => self.integer_power(of(a), n as u32, out),
                 Node::IntegerPower(a, n) => {
                     let power = |a: f64| move |m: f64| integer_power(a, m as i32);
-                    algebra.compose(of(a), out, |a, t| power_series(t, f64::from(n), power(a)));
+                    self.compose(of(a), out, |a, t| power_series(t, f64::from(n), power(a)));
                 }
-                Node::Power(a, b) => algebra.power(of(a), of(b), out),
-                Node::Unary(function, a) => algebra.unary(function, of(a), out),
+                Node::Power(a, b) => self.power(of(a), of(b), out),
+                Node::Unary(function, a) => self.unary(function, of(a), out),
                 Node::Select { left, right, then, otherwise } => {
                     let choice = select(of(left)[0], of(right)[0], 1.0, 0.0);
                     match choice {
@@ -86,6 +82,7 @@ impl Expansion {
                 }
             }
         }
+        self.values = values;
         &self.values[(nodes.len() - 1) * size..]
     }
 }
@@ -119,21 +116,13 @@ fn power_series(t: &mut [f64], p: f64, power: impl Fn(f64) -> f64) {
 }
 
 /// Arithmetic of polynomials in several ε, each with ε³ = 0.
-struct Algebra<'a> {
-    products: &'a [[u16; 3]],
-    variables: usize,
-    nilpotent: &'a mut Vec<f64>,
-    sum: &'a mut Vec<f64>,
-    product: &'a mut Vec<f64>,
-}
-
-impl Algebra<'_> {
+impl Expansion {
     fn multiply(&self, a: &[f64], b: &[f64], out: &mut [f64]) {
-        multiply(self.products, a, b, out);
+        multiply(&self.products[self.variables], a, b, out);
     }
 
-    fn integer_power(&mut self, a: &[f64], n: u32, out: &mut [f64]) {
-        let products = self.products;
+    fn integer_power(&self, a: &[f64], n: u32, out: &mut [f64]) {
+        let products = &self.products[self.variables];
         // The chain of squares works on indices into a list of polynomials.
         let mut chain = vec![a.to_vec()];
         let last = multiply_up(0usize, n, |x, y| {
@@ -156,6 +145,7 @@ impl Algebra<'_> {
         let order = 2 * (0..self.variables as u32).filter(|k| occurs(*k)).count();
         let mut t = [0.0; 2 * Expansion::MOST + 1];
         series(a[0], &mut t[..=order]);
+        let products = &self.products[self.variables];
         self.nilpotent.clear();
         self.nilpotent.extend_from_slice(a);
         self.nilpotent[0] = 0.0;
@@ -164,11 +154,11 @@ impl Algebra<'_> {
         self.sum[0] = t[order];
         self.product.resize(a.len(), 0.0);
         for j in (0..order).rev() {
-            multiply(self.products, self.sum, self.nilpotent, self.product);
-            std::mem::swap(self.sum, self.product);
+            multiply(products, &self.sum, &self.nilpotent, &mut self.product);
+            std::mem::swap(&mut self.sum, &mut self.product);
             self.sum[0] += t[j];
         }
-        out.copy_from_slice(self.sum);
+        out.copy_from_slice(&self.sum);
     }
 
     fn power(&mut self, a: &[f64], b: &[f64], out: &mut [f64]) {

@@ -140,7 +140,7 @@ impl<'a> Values<'a> {
         let key = (operation, constant.to_bits(), from);
         let place = *self.known.entry(key).or_insert(next);
         if place == next {
-            self.code.push(Instruction { operation, constant, from, to: next });
+            self.code.push(Instruction { operation, constant, from, operands: operands.len(), to: next });
         }
         place
     }
@@ -164,7 +164,7 @@ fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) ->
     }
     for (index, instruction) in code.iter().enumerate().rev() {
         if last_use[instruction.to].is_some() {
-            for &place in &instruction.from[..instruction.operation.operands()] {
+            for &place in &instruction.from[..instruction.operands] {
                 last_use[place] = last_use[place].max(Some(index));
             }
         }
@@ -185,7 +185,7 @@ fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) ->
             registers - 1
         });
         let mut from = instruction.from;
-        for operand in 0..instruction.operation.operands() {
+        for operand in 0..instruction.operands {
             let place = instruction.from[operand];
             from[operand] = moved[place];
             let is_first = !instruction.from[..operand].contains(&place);

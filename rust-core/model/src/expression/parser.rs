@@ -16,14 +16,11 @@ impl Ast {
     /// [`MAX_DEPTH`] is an error like any other.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
         if text.len() > MAX_LENGTH {
-            let mut offset = MAX_LENGTH;
-            while !text.is_char_boundary(offset) {
-                offset -= 1;
-            }
+            let offset = text.floor_char_boundary(MAX_LENGTH);
             return Err(Span::new(offset, text.len() - offset).error(ErrorKind::TooLong));
         }
         let mut parser =
-            Parser { text, steps: Vec::new(), operands: Vec::new(), waiting: Vec::new(), depth: 0 };
+            Parser { text, steps: Vec::new(), operands: Vec::new(), waiting: Vec::new(), callee: None };
         let mut lexer = Lexer::new(text);
         // An operand (after signs and openings) and an operator alternate.
         let mut wants_operand = true;
@@ -48,15 +45,13 @@ enum Waiting {
         at: Span,
         call: Option<(Function, Span, usize)>,
     },
-    /// A function's name, until its `(` is read.
-    Callee(Function, Span),
 }
 
 impl Waiting {
     /// Precedence of the operator; an opening has none.
     fn strength(self) -> u8 {
         match self {
-            Waiting::Open { .. } | Waiting::Callee(..) => 0,
+            Waiting::Open { .. } => 0,
             Waiting::Binary(binary) => strength(binary),
             Waiting::Sign(_) => 3,
         }
@@ -64,7 +59,7 @@ impl Waiting {
 
     /// Whether it adds a level of nesting; other operators are written out before those of equal precedence.
     fn nests(self) -> bool {
-        !matches!(self, Waiting::Callee(..)) && !matches!(self.strength(), 1 | 2)
+        !matches!(self.strength(), 1 | 2)
     }
 }
 
@@ -82,7 +77,8 @@ struct Parser<'a> {
     /// Places of the operands that wait for their operator.
     operands: Vec<Span>,
     waiting: Vec<Waiting>,
-    depth: usize,
+    /// A function and the place of its name, until its `(` is read.
+    callee: Option<(Function, Span)>,
 }
 
 impl Parser<'_> {
@@ -92,7 +88,7 @@ impl Parser<'_> {
             Token::Number(value) => self.leaf(Action::Number(value), span),
             Token::Name(name) if self.is_called(span) => {
                 let function = Function::named(name).ok_or_else(|| unknown(name, span))?;
-                self.wait(Waiting::Callee(function, span), span)?;
+                self.callee = Some((function, span));
                 return Ok(true);
             }
             Token::Name("pi") => self.leaf(Action::Number(PI), span),
@@ -101,11 +97,7 @@ impl Parser<'_> {
             }
             Token::Name(name) => self.leaf(Action::Name(name.to_owned()), span),
             Token::Symbol('(') => {
-                let mut call = None;
-                if let Some(&Waiting::Callee(function, name)) = self.waiting.last() {
-                    self.waiting.pop();
-                    call = Some((function, name, 0));
-                }
+                let call = self.callee.take().map(|(function, name)| (function, name, 0));
                 self.wait(Waiting::Open { at: span, call }, span)?;
                 return Ok(true);
             }
@@ -160,7 +152,7 @@ impl Parser<'_> {
 
     fn close(&mut self, span: Span) -> Result<(), ExpressionError> {
         self.settle(1);
-        let Some(Waiting::Open { at, call }) = self.pop() else {
+        let Some(Waiting::Open { at, call }) = self.waiting.pop() else {
             return Err(self.unexpected(span, "an operator: there is no `(` to close"));
         };
         match call {
@@ -195,7 +187,7 @@ impl Parser<'_> {
         while let Some(&waiting) = self.waiting.last()
             && waiting.strength() >= at_least
         {
-            self.pop();
+            self.waiting.pop();
             let Some(right) = self.operands.pop() else { return };
             match waiting {
                 Waiting::Sign(sign) => self.leaf(Action::Negate, sign.to(right)),
@@ -203,7 +195,7 @@ impl Parser<'_> {
                     let left = self.operands.pop().unwrap_or(right);
                     self.leaf(Action::Binary(binary), left.to(right));
                 }
-                Waiting::Open { .. } | Waiting::Callee(..) => {}
+                Waiting::Open { .. } => {}
             }
         }
     }
@@ -215,18 +207,11 @@ impl Parser<'_> {
     }
 
     fn wait(&mut self, waiting: Waiting, span: Span) -> Result<(), ExpressionError> {
-        self.depth += usize::from(waiting.nests());
-        if self.depth > MAX_DEPTH {
-            return Err(span.error(ErrorKind::TooDeep));
-        }
         self.waiting.push(waiting);
-        Ok(())
-    }
-
-    fn pop(&mut self) -> Option<Waiting> {
-        let waiting = self.waiting.pop()?;
-        self.depth -= usize::from(waiting.nests());
-        Some(waiting)
+        match self.waiting.iter().filter(|waiting| waiting.nests()).count() > MAX_DEPTH {
+            true => Err(span.error(ErrorKind::TooDeep)),
+            false => Ok(()),
+        }
     }
 
     fn is_called(&self, name: Span) -> bool {
@@ -242,7 +227,8 @@ impl Parser<'_> {
 
 fn unknown(name: &str, span: Span) -> ExpressionError {
     let known = Function::ALL.map(|entry| entry.0);
-    span.error(ErrorKind::UnknownFunction {
+    span.error(ErrorKind::Unknown {
+        what: "function",
         name: name.to_owned(),
         suggestion: in_other_words(name).or_else(|| closest(name, known)),
         known: known.map(str::to_owned).to_vec(),

@@ -21,9 +21,11 @@ pub struct Program {
 pub(super) struct Instruction {
     pub operation: Operation,
     pub constant: f64,
-    /// Places of the operands; entries beyond the operation's number of operands are ignored. A place
-    /// below the number of variables is a variable, the others are registers.
+    /// Places of the operands; entries beyond their number are ignored. A place below the number of
+    /// variables is a variable, the others are registers.
     pub from: [usize; 4],
+    /// Number of operands.
+    pub operands: usize,
     /// A register that contains no operand, so that inputs and output never overlap.
     pub to: usize,
 }
@@ -52,27 +54,6 @@ pub(super) enum Operation {
     Unary(Unary),
     /// Selects c if a ≤ b, and d otherwise.
     Select,
-}
-
-impl Operation {
-    pub fn operands(self) -> usize {
-        match self {
-            Operation::Set => 0,
-            Operation::Negate
-            | Operation::Shift
-            | Operation::SubtractFrom
-            | Operation::Scale
-            | Operation::DivideInto
-            | Operation::PowerConstant
-            | Operation::Unary(_) => 1,
-            Operation::Add
-            | Operation::Subtract
-            | Operation::Multiply
-            | Operation::Divide
-            | Operation::Power => 2,
-            Operation::Select => 4,
-        }
-    }
 }
 
 /// The place of a result.

@@ -18,10 +18,6 @@ impl Graph {
         self.add_node(Node::Constant(Bits::new(value)))
     }
 
-    pub fn variable(&mut self, index: u32) -> Built {
-        self.add_node(Node::Variable(index))
-    }
-
     pub fn as_constant(&self, id: Id) -> Option<f64> {
         self.node(id).constant()
     }
@@ -148,14 +144,6 @@ impl Graph {
             }
         }
         self.add_node(Node::Select { left, right, then, otherwise })
-    }
-
-    pub fn min(&mut self, a: Id, b: Id) -> Built {
-        self.select(a, b, a, b)
-    }
-
-    pub fn max(&mut self, a: Id, b: Id) -> Built {
-        self.select(b, a, a, b)
     }
 
     fn is_zero(&self, id: Id) -> bool {

@@ -7,7 +7,7 @@ use super::interaction::{PairTable, ThermostatEntry};
 use crate::continuation::Bounds;
 use crate::curve::pressure_table;
 use crate::curve::{Curve, CurveForm, Pressure};
-use crate::document::{FileError, FileErrorKind, Located};
+use crate::document::{FileError, Located};
 use crate::expression::{Ast, Expansion, Formula, Variables};
 use crate::fluid::{
     ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
@@ -118,15 +118,7 @@ fn bind_slopes(
     };
     let mut stated: Vec<Option<Formula>> = vec![None; variables.count];
     for (name, ast) in slopes {
-        let Some(members) = variables.names.get(&name.value) else {
-            let known = variables.names.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-            let named = name.value.clone();
-            return Err(name.error(FileErrorKind::UnknownName {
-                what: "density variable",
-                name: named,
-                known,
-            }));
-        };
+        let members = name.among("density variable", &variables.names)?;
         let formula = compile(ast)?;
         for v in members {
             if stated[*v].replace(formula.clone()).is_some() {

@@ -1,5 +1,4 @@
 use super::names::check_identifier;
-use super::species_index;
 use crate::continuation::Continuation;
 use crate::document::{FileError, FileErrorKind, Located, Section, Value};
 use crate::kernel::KernelKind;
@@ -52,13 +51,11 @@ pub fn read(
 
 fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Result<DensityEntry, FileError> {
     let choices: Vec<(&str, KernelKind)> = KernelKind::ALL.iter().map(|k| (k.name(), *k)).collect();
-    let kernel = table.require("kernel")?.one_of("kernel", &choices)?.value;
-    let force_kernel = table
-        .get("force_kernel")
-        .map_or(Ok(kernel), |value| value.one_of("kernel", &choices).map(|kernel| kernel.value))?;
+    let kernel = table.require("kernel")?.one_of("kernel", &choices)?;
+    let force_kernel =
+        table.get("force_kernel").map_or(Ok(kernel), |value| value.one_of("kernel", &choices))?;
     let range = Number::require(table, "range")?;
-    let includes_self =
-        table.get("self").map_or(Ok(false), |value| value.boolean().map(|flag| flag.value))?;
+    let includes_self = table.get("self").map_or(Ok(false), |value| value.boolean())?;
     let correction = match table.get("correction") {
         Some(value) => read_correction(&value, species)?,
         None => vec![Vec::new(); species.len() * species.len()],
@@ -74,7 +71,7 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
             if bounds.is_none() {
                 return Err(value.error("has no meaning without bounds"));
             }
-            value.one_of("continuation", &choices)?.value
+            value.one_of("continuation", &choices)?
         }
         None => Continuation::default(),
     };
@@ -106,7 +103,9 @@ fn read_correction(value: &Value, species: &[String]) -> Result<Vec<Vec<Number>>
         let Some((of, by)) = key.value.split_once('|') else {
             return Err(key.error("expected \"A|B\", the density of A felt by B"));
         };
-        let index = |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()));
+        let index = |name: &str| {
+            key.clone().map(|_| name.trim().to_owned()).among("species", species.iter().zip(0usize..))
+        };
         all[index(by)? * count + index(of)?] = coefficients(&value)?;
     }
     Ok(all)

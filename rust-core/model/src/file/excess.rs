@@ -1,7 +1,6 @@
 use super::density::DensityEntry;
-use super::species_index;
 use crate::curve::{Spline, read_spline};
-use crate::document::{FileError, FileErrorKind, Located, Place, Section, Value};
+use crate::document::{FileError, Located, Place, Section, Value};
 use crate::expression::Ast;
 use crate::number::read_formula;
 use std::path::Path;
@@ -35,7 +34,7 @@ pub fn read(
     let Some(value) = root.get("excess_free_energy") else { return Ok(all) };
     let section = value.section()?;
     for (name, value) in section.entries() {
-        let index = species_index(&species.value, &name)?;
+        let index: usize = name.among("species", species.value.iter().zip(0..))?;
         all[index] = match value.as_section() {
             None => ExcessEntry::Formula(read_formula(&value)?),
             Some(table) => read_curve(&table, species.value.len(), densities, directory)?,
@@ -80,7 +79,7 @@ fn read_curve(
                 section.only(["table"])?;
                 let file = section.require("table")?;
                 let spline = Arc::new(read_spline(&file, directory, ["rho", "p"])?);
-                return Ok(ExcessEntry::PressureTable { spline, density, place: file.place().clone() });
+                return Ok(ExcessEntry::PressureTable { spline, density, place: file.place.clone() });
             }
             let names_file = |text: &str| {
                 let extension = Path::new(text).extension().and_then(|e| e.to_str());
@@ -122,20 +121,15 @@ fn read_density(
     table: &Section,
     densities: &[DensityEntry],
 ) -> Result<usize, FileError> {
-    let known = || densities.iter().map(|d| d.name.as_str()).collect::<Vec<_>>().join(", ");
+    let names: Vec<&str> = densities.iter().map(|d| d.name.as_str()).collect();
     match (named, densities) {
-        (Some(value), _) => {
-            let name = value.string()?.value;
-            densities.iter().position(|d| d.name == name).ok_or_else(|| {
-                value.error(FileErrorKind::UnknownName { what: "density", name, known: known() })
-            })
-        }
+        (Some(value), _) => value.string()?.among("density", names.iter().zip(0..)),
         (None, [_]) => Ok(0),
         (None, []) => {
             Err(table.error("depends on a density, and the model has none").with_help("write a [density.n]"))
         }
         (None, _) => Err(table
-            .error(format!("does not say which density it depends on: {}", known()))
+            .error(format!("does not say which density it depends on: {}", names.join(", ")))
             .with_help("write density = \"name\" in the braces")),
     }
 }

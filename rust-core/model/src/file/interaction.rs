@@ -1,4 +1,3 @@
-use super::species_index;
 use crate::document::{FileError, Section, Source, Value};
 use crate::fluid::{ExcessFreeEnergy, Fluid};
 use crate::number::Number;
@@ -25,7 +24,8 @@ pub struct ThermostatEntry {
 
 fn read_between(value: &Value, species: &[String]) -> Result<[usize; 2], FileError> {
     let [a, b] = &value.array()?[..] else { return Err(value.error("expected two species")) };
-    Ok([species_index(species, &a.string()?)?, species_index(species, &b.string()?)?])
+    let index = |name: &Value| name.string()?.among("species", species.iter().zip(0..));
+    Ok([index(a)?, index(b)?])
 }
 
 /// Reads every `[[pair]]`.
@@ -47,13 +47,8 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
     for item in value.array()? {
         let table = item.section()?;
         let between = table.get("between").map(|value| read_between(&value, species)).transpose()?;
-        let same = |a: [usize; 2], b: [usize; 2]| a == b || a == [b[1], b[0]];
-        let twice = entries.iter().any(|e| match (e.between, between) {
-            (None, None) => true,
-            (Some(a), Some(b)) => same(a, b),
-            _ => false,
-        });
-        if twice {
+        let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
+        if entries.iter().any(|e| e.between.map(sorted) == between.map(sorted)) {
             return Err(table.error("this pair of species has a thermostat already"));
         }
         entries.push(ThermostatEntry {
@@ -70,12 +65,10 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
 /// must not look like an ideal mixture.
 pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileError> {
     let count = fluid.species.len();
+    // Row-major for pairs of species in order; the entries below the diagonal stay false.
     let mut coupled = vec![false; count * count];
-    for term in &fluid.pairs {
-        let [a, b] = term.between;
-        coupled[a * count + b] = true;
-        coupled[b * count + a] = true;
-    }
+    let mut couple = |a: usize, b: usize| coupled[a.min(b) * count + a.max(b)] = true;
+    fluid.pairs.iter().for_each(|term| couple(term.between[0], term.between[1]));
     for (alpha, excess) in fluid.excess.iter().enumerate() {
         for variable in 0..fluid.variables() {
             let depends = match excess {
@@ -84,9 +77,7 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
                 ExcessFreeEnergy::Slopes(law) => law.slopes[variable].is_constant() != Some(0.0),
             };
             if depends {
-                let beta = variable % count;
-                coupled[alpha * count + beta] = true;
-                coupled[beta * count + alpha] = true;
+                couple(alpha, variable % count);
             }
         }
     }

@@ -11,7 +11,7 @@ mod units;
 
 use super::fluid::Fluid;
 use crate::document::keys::{of_another_kind, read_known};
-use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
+use crate::document::{Document, FileError, Section, Source};
 use density::DensityEntry;
 use excess::ExcessEntry;
 use interaction::{PairTable, ThermostatEntry};
@@ -26,10 +26,13 @@ pub use units::Units;
 #[derive(Debug, Clone)]
 pub struct Model {
     source: Arc<Source>,
-    title: String,
-    reference: Option<String>,
+    /// The title in the file.
+    pub title: String,
+    /// The publication that the model comes from.
+    pub reference: Option<String>,
     dimensions: usize,
-    units: Option<Units>,
+    /// The units of the model's numbers, if the file states them.
+    pub units: Option<Units>,
     literature: Vec<Published>,
     species: Vec<String>,
     parameters: BTreeMap<String, f64>,
@@ -74,11 +77,11 @@ impl Model {
         let species = names::read_species(&root)?;
         let parameters = parameters::read(&root)?;
         let densities = density::read(&root, &species.value, &parameters)?;
-        let excess = excess::read(&root, &species, &densities, document.directory())?;
-        let pairs = interaction::read_pairs(&root, &species.value, document.directory())?;
+        let excess = excess::read(&root, &species, &densities, &document.directory)?;
+        let pairs = interaction::read_pairs(&root, &species.value, &document.directory)?;
         let thermostats = interaction::read_thermostats(&root, &species.value)?;
         let model = Model {
-            source: Arc::clone(document.source()),
+            source: Arc::clone(&document.source),
             title,
             reference,
             dimensions,
@@ -97,24 +100,9 @@ impl Model {
         Ok(model)
     }
 
-    /// The title in the file.
-    pub fn title(&self) -> &str {
-        &self.title
-    }
-
-    /// The publication that the model comes from.
-    pub fn reference(&self) -> Option<&str> {
-        self.reference.as_deref()
-    }
-
     /// The number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
-    }
-
-    /// The units of the model's numbers, if the file states them.
-    pub fn units(&self) -> Option<Units> {
-        self.units
     }
 
     /// The published values of the fluid at a temperature.
@@ -148,20 +136,10 @@ impl Model {
 
 fn read_dimensions(root: &Section) -> Result<usize, FileError> {
     let Some(value) = root.get("dimensions") else { return Ok(3) };
-    match value.count()?.value {
+    match value.count()? {
         d @ (2 | 3) => Ok(d as usize),
         _ => Err(value.error("must be 2 or 3")),
     }
-}
-
-/// The index of a species by its name.
-fn species_index(species: &[String], name: &Located<String>) -> Result<usize, FileError> {
-    let unknown = || FileErrorKind::UnknownName {
-        what: "species",
-        name: name.value.clone(),
-        known: species.join(", "),
-    };
-    species.iter().position(|s| *s == name.value).ok_or_else(|| name.error(unknown()))
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ pub fn read_species(root: &Section) -> Result<Located<Vec<String>>, FileError> {
         }
         names.push(name);
     }
-    Ok(Located { value: names, place: value.place().clone() })
+    Ok(Located { value: names, place: value.place.clone() })
 }
 
 /// Checks that a parameter or density has a name that formulas can use.

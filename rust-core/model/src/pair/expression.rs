@@ -1,7 +1,7 @@
 use super::{FormEntry, PairForm};
 use crate::document::keys::{Key, REQUIRED, ValueKind, keys};
 use crate::document::{FileError, Located, Section};
-use crate::expression::{Ast, Formula, Program, TooLarge, Variables};
+use crate::expression::{Ast, Formula, Program, Variables};
 use crate::number::{Number, formula_error, read_formula};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,14 +18,6 @@ pub struct ExpressionPair {
 
 /// Number of distances at which a formula is evaluated at once.
 const LANES: usize = 64;
-
-impl ExpressionPair {
-    /// Builds `φ` from a formula whose variable 0 is `r`, cut at `range`.
-    pub fn new(phi: &Formula, range: f64) -> Result<ExpressionPair, TooLarge> {
-        let slope = phi.derivative(0)?;
-        Ok(ExpressionPair { program: Program::new(&[phi, &slope]), energy: Program::new(&[phi]), range })
-    }
-}
 
 /// The form `expression` in the model file.
 #[derive(Debug, Clone)]
@@ -58,7 +50,10 @@ impl FormEntry for ExpressionEntry {
         let variables = Variables { count: 1, names: BTreeMap::from([("r".to_owned(), vec![0])]) };
         let range = self.range.positive(constants)?;
         Formula::compile(&self.phi.value, constants, &variables)
-            .and_then(|formula| Ok(ExpressionPair::new(&formula, range)?))
+            .and_then(|phi| {
+                let program = Program::new(&[&phi, &phi.derivative(0)?]);
+                Ok(ExpressionPair { program, energy: Program::new(&[&phi]), range })
+            })
             .map_err(|e| formula_error(&self.phi, e))
     }
 }
@@ -82,13 +77,8 @@ impl PairForm for ExpressionPair {
 
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
         let mut work = Vec::new();
-        let mut out = [0.0; 2 * LANES];
         for ((r, phi), slope) in r.chunks(LANES).zip(phi.chunks_mut(LANES)).zip(slope.chunks_mut(LANES)) {
-            let lanes = r.len();
-            let out = &mut out[..2 * lanes];
-            self.program.eval_block(lanes, r, out, &mut work);
-            phi.copy_from_slice(&out[..lanes]);
-            slope.copy_from_slice(&out[lanes..]);
+            self.program.eval_block_into(r.len(), r, [phi, slope].into_iter(), &mut work);
         }
     }
 }

@@ -97,7 +97,8 @@ macro_rules! pair_table {
                     $name,
                     |table, directory| <$entry>::read(table, directory).map(PairEntry::$variant),
                 )),+];
-                (form.one_of("form", readers)?.value)(table, directory)
+                let read = form.one_of("form", readers)?;
+                read(table, directory)
             }
 
             /// The potential for these parameters of the model, kT among them.
@@ -178,14 +179,21 @@ mod tests {
 
     #[test]
     fn slopes_are_derivatives() {
-        slope_is_derivative(&Soft::new(25.0, 1.0), &[]);
-        slope_is_derivative(&Soft::new(-40.0, 0.8), &[]);
-        slope_is_derivative(&SplineAttractive::new(9.5, 2.0, 1.0, 0.8, 1.0), &[0.4, 0.5, 0.8]);
+        slope_is_derivative(&Soft { strength: 25.0, range: 1.0 }, &[]);
+        slope_is_derivative(&Soft { strength: -40.0, range: 0.8 }, &[]);
+        let spline = SplineAttractive {
+            repulsion: 19.0,
+            attraction: 9.5,
+            repulsion_range: 0.8,
+            attraction_range: 1.0,
+        };
+        slope_is_derivative(&spline, &[0.4, 0.5, 0.8]);
         let r: Vec<f64> = (0..=50).map(|k| 0.02 * k as f64).collect();
         let phi = r.iter().map(|r| 12.5 * (1.0 - r) * (1.0 - r)).collect();
-        let table = TablePair::new(Arc::new(crate::curve::Spline::new(r, phi).unwrap()), 1.0);
+        let spline = Arc::new(crate::curve::Spline::new(r, phi).unwrap());
+        let table = TablePair { spline, range: 1.0 };
         slope_is_derivative(&table, &[]);
-        let soft = Soft::new(25.0, 1.0);
+        let soft = Soft { strength: 25.0, range: 1.0 };
         for k in 0..100 {
             let (table, soft) = (table.at(0.01 * k as f64), soft.at(0.01 * k as f64));
             assert!((table.0 - soft.0).abs() < 1e-12 && (table.1 - soft.1).abs() < 1e-11);

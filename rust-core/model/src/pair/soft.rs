@@ -10,16 +10,10 @@ use std::path::Path;
 /// The form is that of Groot and Warren; Warren eq. (3)–(4), with the range written out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Soft {
-    /// The strength `a`: the force at contact.
+    /// The strength `a`: the force at contact, energy over length; negative attracts.
     pub strength: f64,
-    range: f64,
-}
-
-impl Soft {
-    /// Takes the strength `a` (energy over length; negative attracts) and the range `R > 0`.
-    pub fn new(strength: f64, range: f64) -> Soft {
-        Soft { strength, range }
-    }
+    /// The range `R > 0`.
+    pub range: f64,
 }
 
 /// The form `soft` in the model file.
@@ -48,7 +42,7 @@ impl FormEntry for SoftEntry {
 
     fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<Soft, FileError> {
         let strength = self.strength.evaluate(constants)?.value;
-        Ok(Soft::new(strength, self.range.positive(constants)?))
+        Ok(Soft { strength, range: self.range.positive(constants)? })
     }
 }
 

@@ -28,24 +28,6 @@ pub fn spline_shape(r: f64, range: f64) -> (f64, f64) {
     if s < 1.0 { (CubicSpline::value(s), CubicSpline::slope(s) / range) } else { (0.0, 0.0) }
 }
 
-impl SplineAttractive {
-    /// Takes the strength `a`, the amplitudes `A` and `B`, and the ranges `R_A` and `R_B`.
-    pub fn new(
-        strength: f64,
-        repulsion: f64,
-        attraction: f64,
-        repulsion_range: f64,
-        attraction_range: f64,
-    ) -> SplineAttractive {
-        SplineAttractive {
-            repulsion: strength * repulsion,
-            attraction: strength * attraction,
-            repulsion_range,
-            attraction_range,
-        }
-    }
-}
-
 /// The form `spline` in the model file.
 #[derive(Debug, Clone)]
 pub struct SplineEntry {
@@ -90,13 +72,13 @@ impl FormEntry for SplineEntry {
     fn bind(&self, constants: &BTreeMap<String, f64>) -> Result<SplineAttractive, FileError> {
         let [strength, a, b, range_a, range_b] = &*self.numbers;
         let value = |number: &Number| number.evaluate(constants).map(|x| x.value);
-        Ok(SplineAttractive::new(
-            value(strength)?,
-            value(a)?,
-            value(b)?,
-            range_a.positive(constants)?,
-            range_b.positive(constants)?,
-        ))
+        let strength = value(strength)?;
+        Ok(SplineAttractive {
+            repulsion: strength * value(a)?,
+            attraction: strength * value(b)?,
+            repulsion_range: range_a.positive(constants)?,
+            attraction_range: range_b.positive(constants)?,
+        })
     }
 }
 

@@ -13,14 +13,8 @@ use std::sync::Arc;
 pub struct TablePair {
     /// The spline through the rows.
     pub spline: Arc<Spline>,
-    range: f64,
-}
-
-impl TablePair {
-    /// Takes the spline, and cuts it at `range`.
-    pub fn new(spline: Arc<Spline>, range: f64) -> TablePair {
-        TablePair { spline, range }
-    }
+    /// The distance at which it is cut.
+    pub range: f64,
 }
 
 /// The form `table` in the model file.
@@ -49,7 +43,7 @@ impl FormEntry for TableEntry {
         let file = table.require("file")?;
         Ok(TableEntry {
             spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
-            file: file.place().clone(),
+            file: file.place.clone(),
             range: table.get("range").map(|value| Number::read(&value)).transpose()?,
         })
     }
@@ -65,7 +59,7 @@ impl FormEntry for TableEntry {
             return Err(number.evaluate(constants)?.error(message));
         }
         check(&self.spline, range).map_err(|message| self.file.error(message))?;
-        Ok(TablePair::new(Arc::clone(&self.spline), range))
+        Ok(TablePair { spline: Arc::clone(&self.spline), range })
     }
 }
 

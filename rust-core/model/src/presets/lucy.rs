@@ -12,16 +12,20 @@ use super::coefficients::{PresetError, WarrenPair, pair_text, quoted, upper_tria
 use crate::file::Model;
 use std::fmt::Write;
 
-/// Writes the model file of [`lucy_mdpd`].
+/// Builds the model of the law of LAMMPS's `mdpd` for species `species` of masses `masses`, with `pairs` a row-major table of
+/// the coefficients (the upper triangle is read). `A`, `B`, `γ`, `r_c` and `r_d` may all differ by pair.
 ///
 /// The reported energy `Σ_i Σ_β c r_d^{d+1} B n_β ρ_i`, `c_3 = π/30`, `c_2 = π/24`, is that of Warren's
 /// ψ, `c r_d^{d+1} B n²`, where all coefficients are equal; the force is not its gradient.
-pub(super) fn lucy_mdpd_text(
+///
+/// # Errors
+/// Fails for a pair without coefficients, and if the number of masses differs from that of species; also for a range that is not positive, a negative γ, or more than 16 different `r_d`.
+pub fn lucy_mdpd(
     species: &[String],
     pairs: &[Option<WarrenPair>],
     masses: &[f64],
     dimensions: usize,
-) -> Result<String, PresetError> {
+) -> Result<Model, PresetError> {
     let count = species.len();
     let upper = upper_triangle(count, pairs, None)?;
     if masses.len() != count {
@@ -75,7 +79,7 @@ pub(super) fn lucy_mdpd_text(
         }
     }
     text += &pair_text(&names, &upper);
-    Ok(text)
+    Ok(Model::parse("mdpd/psi", &text)?)
 }
 
 /// Name of a density: `n`, or `n1`, `n2` … where there are several.
@@ -95,21 +99,6 @@ fn strength(pair: WarrenPair, dimensions: usize) -> String {
     if dimensions == 2 { format!("(pi/24*{rd:?}^3*({b:?}))") } else { format!("(pi/30*{rd:?}^4*({b:?}))") }
 }
 
-/// Builds the model of the law of LAMMPS's `mdpd` for species `species` of masses `masses`, with `pairs` a row-major table of
-/// the coefficients (the upper triangle is read). `A`, `B`, `γ`, `r_c` and `r_d` may all differ by pair.
-///
-/// # Errors
-/// Fails for a pair without coefficients, and if the number of masses differs from that of species; also for a range that is not positive, a negative γ, or more than 16 different `r_d`.
-pub fn lucy_mdpd(
-    species: &[String],
-    pairs: &[Option<WarrenPair>],
-    masses: &[f64],
-    dimensions: usize,
-) -> Result<Model, PresetError> {
-    let text = lucy_mdpd_text(species, pairs, masses, dimensions)?;
-    Ok(Model::parse("mdpd/psi", &text)?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,7 +109,7 @@ mod tests {
 
     #[test]
     fn masses_are_needed_for_every_species() {
-        let error = lucy_mdpd_text(&["A".into()], &[pair(-40.0, 25.0, 1.0, 0.75)], &[], 3).unwrap_err();
+        let error = lucy_mdpd(&["A".into()], &[pair(-40.0, 25.0, 1.0, 0.75)], &[], 3).unwrap_err();
         assert_eq!(error, PresetError::Shape);
     }
 

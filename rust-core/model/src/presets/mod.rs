@@ -8,4 +8,4 @@ mod warren;
 pub use coefficients::{PresetError, WarrenPair};
 pub use lucy::lucy_mdpd;
 pub use spline::{SplinePair, spline_dpd};
-pub use warren::{ForceLaw, warren_ab, warren_ab_text};
+pub use warren::{ForceLaw, warren_ab};

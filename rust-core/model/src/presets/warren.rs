@@ -5,7 +5,7 @@
 //! π/30`, `c_2 = π/24` (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) / (2 c_d r_d^{d+1})`.
 
 use super::coefficients::{PresetError, WarrenPair, pair_text, quoted, upper_triangle};
-use super::lucy::lucy_mdpd_text;
+use super::lucy::lucy_mdpd;
 use crate::file::Model;
 use std::fmt::Write;
 
@@ -19,19 +19,20 @@ pub enum ForceLaw {
     LucyLammps,
 }
 
-/// Writes the model file of Warren's A/B model for species `species`, with `pairs` a row-major table
-/// of the coefficients (the upper triangle is read).
+/// Builds Warren's A/B model for species `species`, as a model file. `pairs` is a row-major table of the
+/// coefficients, of which the upper triangle is read.
 ///
 /// # Errors
-/// Fails for a pair without coefficients, and for coefficients without a potential where `law` has one.
-pub fn warren_ab_text(
+/// Fails for a pair without coefficients, and for coefficients without a potential where `law` has one;
+/// also for a range that is not positive or a negative γ.
+pub fn warren_ab(
     species: &[String],
     pairs: &[Option<WarrenPair>],
     dimensions: usize,
     law: ForceLaw,
-) -> Result<String, PresetError> {
+) -> Result<Model, PresetError> {
     if law == ForceLaw::LucyLammps {
-        return lucy_mdpd_text(species, pairs, &vec![1.0; species.len()], dimensions);
+        return lucy_mdpd(species, pairs, &vec![1.0; species.len()], dimensions);
     }
     let upper = upper_triangle(species.len(), pairs, None)?;
     let first = upper[0].2;
@@ -62,20 +63,6 @@ pub fn warren_ab_text(
         let _ = writeln!(text, "{name} = \"{coefficient} * B * n^2\"");
     }
     text += &pair_text(&names, &upper);
-    Ok(text)
-}
-
-/// Builds the model of [`warren_ab_text`].
-///
-/// # Errors
-/// Fails as [`warren_ab_text`]; also for a range that is not positive or a negative γ.
-pub fn warren_ab(
-    species: &[String],
-    pairs: &[Option<WarrenPair>],
-    dimensions: usize,
-    law: ForceLaw,
-) -> Result<Model, PresetError> {
-    let text = warren_ab_text(species, pairs, dimensions, law)?;
     Ok(Model::parse("mdpd/psi", &text)?)
 }
 

@@ -28,7 +28,7 @@ pub fn about(scene: &Scene) -> About {
     About {
         program: format!("psidpd {}", env!("CARGO_PKG_VERSION")),
         title: scene.title.clone(),
-        model: scene.model.title().to_owned(),
+        model: scene.model.title.clone(),
         dimensions: scene.model.dimensions(),
         species: scene.model.species().to_vec(),
         masses: scene.mass.clone(),

@@ -36,7 +36,7 @@ impl Arrangement {
         match (lattice, section.get("min_distance")) {
             (None, None) => Ok(Arrangement::Random { min_distance: 0.0 }),
             (None, Some(value)) => Ok(Arrangement::Random { min_distance: value.positive()? }),
-            (Some(lattice), None) => Ok(Arrangement::Lattice(lattice.value)),
+            (Some(lattice), None) => Ok(Arrangement::Lattice(lattice)),
             (Some(_), Some(value)) => Err(value
                 .error("a lattice is given too, which sets the distances of its sites: give one of them")),
         }

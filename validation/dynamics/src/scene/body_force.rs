@@ -1,8 +1,7 @@
 //! `[[body_force]]`: accelerations of some of the particles.
 
-use super::composition::species_of;
 use super::number::{axis, vector};
-use super::{BodyForce, FileError, FileErrorKind, Initial, Model, Section, Tags};
+use super::{BodyForce, FileError, Initial, Model, Section, Tags};
 
 pub fn read(root: &Section, model: &Model, initial: &Initial) -> Result<Vec<BodyForce>, FileError> {
     let Some(value) = root.get("body_force") else { return Ok(Vec::new()) };
@@ -28,7 +27,7 @@ fn read_one(section: &Section, model: &Model, initial: &Initial) -> Result<BodyF
 fn read_species(section: &Section, model: &Model) -> Result<Vec<i32>, FileError> {
     let Some(value) = section.get("species") else { return Ok(Vec::new()) };
     let items = value.array()?;
-    let species = items.iter().map(|item| Ok(species_of(&item.string()?, model.species())? as i32));
+    let species = items.iter().map(|item| item.string()?.among("species", model.species().iter().zip(0..)));
     let species: Vec<i32> = species.collect::<Result<_, FileError>>()?;
     if species.is_empty() {
         return Err(value.error("names no species"));
@@ -40,16 +39,11 @@ fn read_parts(section: &Section, initial: &Initial) -> Result<Tags, FileError> {
     let Some(value) = section.get("parts") else { return Ok(Tags::All) };
     let mut wanted = Vec::new();
     for item in value.array()? {
-        let name = item.string()?.value;
-        let Some(part) = initial.parts().iter().find(|p| p.name == name) else {
-            let known: Vec<&str> = initial.parts().iter().map(|p| p.name.as_str()).collect();
-            let known = known.join(", ");
-            return Err(item.error(FileErrorKind::UnknownName { what: "part", name, known }));
-        };
+        let part = item.string()?.among("part", initial.parts().iter().map(|p| (&p.name, p)))?;
         if part.frozen {
-            return Err(item.error(format!("\"{name}\" is frozen: no force moves it")));
+            return Err(item.error(format!("\"{}\" is frozen: no force moves it", part.name)));
         }
-        wanted.push(name);
+        wanted.push(part.name.clone());
     }
     if wanted.is_empty() {
         return Err(value.error("names no part"));

@@ -1,7 +1,6 @@
 //! `composition` and `species` of a filled region.
 
-use super::{FileError, FileErrorKind, Section};
-use psidpd_core::document::Located;
+use super::{FileError, Section};
 
 /// Number fractions of the species, in the order of the model; they add up to 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +11,8 @@ impl Composition {
     pub(super) fn read(initial: &Section, species: &[String]) -> Result<Composition, FileError> {
         let mut fractions = vec![0.0; species.len()];
         if let Some(value) = initial.get("species") {
-            fractions[species_of(&value.string()?, species)?] = 1.0;
+            let index: usize = value.string()?.among("species", species.iter().zip(0..))?;
+            fractions[index] = 1.0;
             if let Some(both) = initial.get("composition") {
                 return Err(both.error("species is given too: give one of them"));
             }
@@ -24,8 +24,8 @@ impl Composition {
         };
         let section = value.section()?;
         for (name, value) in section.entries() {
-            let index = species_of(&name, species)?;
-            let fraction = value.number()?.value;
+            let index: usize = name.among("species", species.iter().zip(0..))?;
+            let fraction = value.number()?;
             if !(0.0..=1.0).contains(&fraction) {
                 return Err(value.error(format!("must be from 0 to 1, is {fraction}")));
             }
@@ -60,14 +60,6 @@ impl Composition {
         }
         shares
     }
-}
-
-/// The index of a species of the model.
-pub fn species_of(name: &Located<String>, species: &[String]) -> Result<usize, FileError> {
-    species.iter().position(|s| *s == name.value).ok_or_else(|| {
-        let (name_of, known) = (name.value.clone(), species.join(", "));
-        name.error(FileErrorKind::UnknownName { what: "species", name: name_of, known })
-    })
 }
 
 #[cfg(test)]

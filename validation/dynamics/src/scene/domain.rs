@@ -51,10 +51,10 @@ fn read_boundary(section: &Section, dimensions: usize) -> Result<Option<[bool; 3
     let mut periodic = [true; 3];
     let Some(value) = section.get("boundary") else { return Ok(None) };
     match value.as_array() {
-        None => periodic[..dimensions].fill(value.one_of("boundary", &BOUNDARIES)?.value),
+        None => periodic[..dimensions].fill(value.one_of("boundary", &BOUNDARIES)?),
         Some(items) if items.len() == dimensions => {
             for (periodic, item) in periodic.iter_mut().zip(items) {
-                *periodic = item.one_of("boundary", &BOUNDARIES)?.value;
+                *periodic = item.one_of("boundary", &BOUNDARIES)?;
             }
         }
         Some(items) => {

@@ -158,8 +158,7 @@ fn read_data(path: &Path, model: &Model, periodic: Option<[bool; 3]>) -> Result<
 fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
     let Some(value) = section.get("frozen_ids") else { return Ok(Tags::none()) };
     let wrong = |message: String| value.error(message);
-    let ids: Vec<u64> =
-        value.array()?.iter().map(|v| v.count().map(|c| c.value)).collect::<Result<_, _>>()?;
+    let ids: Vec<u64> = value.array()?.iter().map(|v| v.count()).collect::<Result<_, _>>()?;
     let [first, last] = ids[..] else {
         return Err(wrong(format!(
             "expected the first and the last id, found an array of length {}",

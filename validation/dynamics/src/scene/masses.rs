@@ -1,6 +1,5 @@
 //! `[masses]`: the mass of each species.
 
-use super::composition::species_of;
 use super::{FileError, Initial, Section};
 
 /// Reads the masses; by default those of the data file, or 1.
@@ -11,7 +10,7 @@ pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec
     };
     let Some(value) = root.get("masses") else { return Ok(mass) };
     for (name, value) in value.section()?.entries() {
-        mass[species_of(&name, species)?] = value.positive()?;
+        mass[name.among("species", species.iter().zip(0usize..))?] = value.positive()?;
     }
     Ok(mass)
 }

@@ -94,7 +94,7 @@ impl Scene {
             let known = model.as_ref().and_then(|m| m.root().get("parameters")?.as_section()?.get(name));
             known.is_some()
         };
-        let (text, of_model) = edits::edit_scene(document.source().text(), edits, &parameters)?;
+        let (text, of_model) = edits::edit_scene(document.source.text(), edits, &parameters)?;
         Scene::read(&Document::parse(&path.display().to_string(), &text)?, base, &of_model)
     }
 
@@ -114,7 +114,7 @@ impl Scene {
         let title = root.get("title").map(|value| value.string()).transpose()?;
         let (model_path, model) = read_model(&root.require("model")?, base, of_model)?;
         let kt = root.require("kT")?.positive()?;
-        let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
+        let seed = root.get("seed").map_or(Ok(1), |value| value.count())?;
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
         let device = root.get("device").map_or(Ok(Device::Cpu), |value| read_device(&value))?;
         let (initial, domain) = initial::read(&root, &model, base)?;
@@ -127,18 +127,18 @@ impl Scene {
         let place = Place { fluid, domain: &domain, stages: &names, timeless, slab, drive };
         let observe = observe::read(&root, &place)?;
         let scene = Scene {
-            title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
+            title: title.map_or_else(|| model.title.clone(), |t| t.value),
             model_path,
             kt,
             seed,
-            precision: precision.transpose()?.map(|p| p.value),
+            precision: precision.transpose()?,
             device,
             mass: masses::read(&root, model.species(), &initial)?,
             frozen: initial.frozen(),
             body_forces,
             output: output::read(&root)?,
             observe,
-            source: root.source().clone(),
+            source: root.place.source.clone(),
             folder: base.to_owned(),
             stages,
             model,
@@ -280,7 +280,7 @@ fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Mo
     });
     match model {
         Ok(model) => Ok((path, model)),
-        Err(error) => match error.kind() {
+        Err(error) => match &*error.kind {
             FileErrorKind::Unreadable(why) => {
                 let message = format!("the model file {} cannot be read: {why}", path.display());
                 Err(value.error(message).with_help("the path is relative to the scene file"))

@@ -13,5 +13,5 @@ pub fn vector(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {
 pub const AXES: [(&str, usize); 3] = [("x", 0), ("y", 1), ("z", 2)];
 
 pub fn axis(value: &Value, dimensions: usize) -> Result<usize, FileError> {
-    Ok(value.one_of("axis", &AXES[..dimensions])?.value)
+    value.one_of("axis", &AXES[..dimensions])
 }

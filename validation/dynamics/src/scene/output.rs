@@ -49,11 +49,11 @@ pub fn read(root: &Section) -> Result<Output, FileError> {
     ];
     for (key, interval) in intervals {
         if let Some(value) = section.get(key) {
-            *interval = value.count()?.value;
+            *interval = value.count()?;
         }
     }
     if let Some(value) = section.get("checkpoint") {
-        output.checkpoint = Some(value.count()?.value);
+        output.checkpoint = Some(value.count()?);
     }
     Ok(output)
 }

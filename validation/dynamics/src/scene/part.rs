@@ -63,7 +63,7 @@ impl<'a> Common<'a> {
                 let count = (density.positive()? * volume).round();
                 check_count(count, |why| density.error(why))
             }
-            (None, Some(count), _) => check_count(count.count()?.value as f64, |why| count.error(why)),
+            (None, Some(count), _) => check_count(count.count()? as f64, |why| count.error(why)),
             (None, None, Some(density)) => check_count((density * volume).round(), |why| section.error(why)),
             (None, None, None) => Err(section.error("needs a density or a count")),
         }
@@ -102,7 +102,7 @@ impl<'a> Common<'a> {
             Some(value) => value.string()?.value,
             None => format!("part {}", index + 1),
         };
-        let frozen = section.get("frozen").map_or(Ok(false), |v| v.boolean().map(|b| b.value))?;
+        let frozen = section.get("frozen").map_or(Ok(false), |v| v.boolean())?;
         let moves = ["velocity", "velocities"].iter().find_map(|key| section.get(key));
         if let Some(value) = moves.filter(|_| frozen) {
             return Err(value.error("the part is frozen, and does not move"));

@@ -117,7 +117,7 @@ fn read_short(
 }
 
 fn read_steps(value: &Value) -> Result<u64, FileError> {
-    match value.count()?.value {
+    match value.count()? {
         0 => Err(value.error("must be at least 1")),
         // Each of two stages may have half of the largest number of steps.
         steps if steps > MOST_STEPS / 2 => Err(value.error(format!("more than {MOST_STEPS} steps in all"))),
@@ -127,7 +127,7 @@ fn read_steps(value: &Value) -> Result<u64, FileError> {
 
 /// Reads the stages of one table: a ramp makes one stage for each level.
 fn read_one(section: &Section, default: &Stage) -> Result<Vec<Stage>, FileError> {
-    let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean().map(|b| b.value));
+    let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean());
     let stage = Stage {
         name: section.require("name")?.string()?.value,
         steps: read_steps(&section.require("steps")?)?,
@@ -179,7 +179,7 @@ fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError>
     let most = MOST_LEVELS.min(steps);
     let levels = match levels {
         None => DEFAULT_LEVELS.min(steps),
-        Some(value) => match value.count()?.value {
+        Some(value) => match value.count()? {
             n if (1..=most).contains(&n) => n,
             n => return Err(value.error(format!("must be from 1 to {most}, is {n}"))),
         },
@@ -197,7 +197,7 @@ fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError>
 /// Reads the integrator of a stage or of the scene; `default` if the file gives none.
 fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator, FileError> {
     let mut integrator = match section.get("integrator") {
-        Some(value) => value.one_of("integrator", &Integrator::NAMED)?.value,
+        Some(value) => value.one_of("integrator", &Integrator::NAMED)?,
         None => default,
     };
     let kind = integrator;
@@ -209,7 +209,7 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     if let (Some(value), Some((lambda, [low, high]))) =
         (own("lambda", |other| other.settings().lambda.is_some())?, lambda)
     {
-        *lambda = value.number()?.value;
+        *lambda = value.number()?;
         if !(low..=high).contains(lambda) {
             return Err(value.error(format!("must be from {low} to {high}, is {lambda}")));
         }
@@ -217,14 +217,14 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     if let (Some(value), Some(gradient)) =
         (own("gradient", |other| other.settings().gradient.is_some())?, gradient)
     {
-        *gradient = value.number()?.value;
+        *gradient = value.number()?;
         if !(0.0..=1.0).contains(gradient) {
             return Err(value.error(format!("must be from 0 to 1, is {gradient}")));
         }
     }
     let couples = |other: &mut Integrator| other.settings().coupling.is_some();
     if let (Some(value), Some(coupling)) = (own("thermostat_step", couples)?, &mut coupling) {
-        coupling.update = value.one_of("thermostat_step", &THERMOSTAT_STEPS)?.value;
+        coupling.update = value.one_of("thermostat_step", &THERMOSTAT_STEPS)?;
     }
     if let (Some(value), Some(coupling)) = (own("thermostat_every", couples)?, &mut coupling) {
         coupling.every = read_steps(&value)?;
@@ -241,7 +241,7 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     }
     let noise = noise.or(coupling.map(|coupling| &mut coupling.noise));
     if let (Some(value), Some(noise)) = (own("noise", |other| other.noise().is_some())?, noise) {
-        *noise = value.one_of("noise", &Law::ALL)?.value;
+        *noise = value.one_of("noise", &Law::ALL)?;
     }
     Ok(integrator)
 }

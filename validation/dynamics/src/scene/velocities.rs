@@ -19,13 +19,13 @@ impl Velocities {
     /// Reads the velocities of a filled region.
     pub(super) fn read(section: &Section) -> Result<Velocities, FileError> {
         let Some(value) = section.get("velocities") else { return Ok(Velocities::default()) };
-        Ok(value.one_of("velocities", &Self::NAMES[..2])?.value.unwrap_or_default())
+        Ok(value.one_of("velocities", &Self::NAMES[..2])?.unwrap_or_default())
     }
 
     /// Reads the velocities of a start from a file: `None` keeps those of the file, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let Some(value) = initial.get("velocities") else { return Ok((!keep).then(Velocities::default)) };
-        Ok(value.one_of("velocities", &Self::NAMES)?.value)
+        value.one_of("velocities", &Self::NAMES)
     }
 
     /// Draws velocities of particles of the masses `mass`.

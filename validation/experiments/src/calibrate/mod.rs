@@ -228,7 +228,7 @@ pub fn calibrate(
         deviation: (p.pressure.value - t.wanted).abs() / t.scale,
     });
     Ok(Calibration {
-        title: model.title().to_owned(),
+        title: model.title.clone(),
         kt: options.kt,
         density: name,
         pairs: species.iter().flat_map(|a| species.iter().map(move |b| format!("{b}|{a}"))).collect(),

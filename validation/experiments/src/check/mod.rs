@@ -39,8 +39,8 @@ pub fn check(model: &Model, kt: f64, densities: Option<&[f64]>) -> Result<Findin
     let pressure = at.map(|(theory, rho)| theory.pressure(rho));
     let state = warnings::State { densities, pressure, stability: stability.as_ref(), no_theory };
     Ok(Findings {
-        title: model.title().to_owned(),
-        reference: model.reference().map(str::to_owned),
+        title: model.title.clone(),
+        reference: model.reference.clone(),
         plan: plan.to_string(),
         kt,
         pressure,

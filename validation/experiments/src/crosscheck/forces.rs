@@ -328,7 +328,7 @@ mod tests {
         let right = point_of(Simulation::new(&model, 1.0, state.clone(), SEED).unwrap(), step).unwrap();
         let whole = right.against(&plain(&model, &state, step).unwrap());
         assert!(whole.force < 1e-11 && whole.energy < 1e-11 && whole.virial < 1e-11, "{whole:?}");
-        let text = SET6.model_text(ForceLaw::Conservative, GAMMA).unwrap();
+        let text = model.source().text();
         let wrong = |from: &str, to: &str| {
             assert!(text.contains(from), "{text}");
             let model = Model::parse("wrong.toml", &text.replace(from, to)).unwrap();

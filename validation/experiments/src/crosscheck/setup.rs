@@ -78,7 +78,7 @@ impl<'a> Setup<'a> {
         match self.code {
             Code::Psi => {
                 let path = folder.join("model.toml");
-                std::fs::write(&path, self.set.model_text(self.law, self.gamma)?)
+                std::fs::write(&path, self.set.model(self.law, self.gamma)?.source().text())
                     .map_err(ExperimentError::io(&path))?;
             }
             Code::Eam => {

@@ -24,8 +24,8 @@ fn a_program_without_gpus_says_how_to_build_one_with_them() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let Err(RunError::File(error)) = Runner::begin(&scene, &out, Begin::New) else { panic!() };
-    assert!(error.to_string().contains("s.toml:6:") && error.kind().to_string().contains("built without"));
-    assert!(error.help().unwrap().contains("--features gpu"), "{error}");
+    assert!(error.to_string().contains("s.toml:6:") && error.kind.to_string().contains("built without"));
+    assert!(error.help.as_ref().unwrap().contains("--features gpu"), "{error}");
     assert!(!out.join("thermo.csv").exists() && Live::new(scene, std::num::NonZeroUsize::MIN).is_err());
     // As with the option, where no file has the key.
     let scene = Scene { device: Device::Gpu(0), ..support::scene(SET6, SCENE).unwrap() };

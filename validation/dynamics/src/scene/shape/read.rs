@@ -99,7 +99,7 @@ impl Shapes<'_> {
         let thickness = self.read_thickness(section, axis)?;
         let [mut low, mut high] = self.whole().bounds(self.dimensions);
         let middle = match section.get("at") {
-            Some(value) => value.number()?.value,
+            Some(value) => value.number()?,
             None => 0.5 * (low[axis] + high[axis]),
         };
         (low[axis], high[axis]) = (middle - 0.5 * thickness, middle + 0.5 * thickness);
@@ -107,7 +107,7 @@ impl Shapes<'_> {
     }
 
     fn read_layer(&self, section: &Section) -> Result<Shape, FileError> {
-        let (axis, upper) = section.require("face")?.one_of("face", &FACES[..2 * self.dimensions])?.value;
+        let (axis, upper) = section.require("face")?.one_of("face", &FACES[..2 * self.dimensions])?;
         let thickness = self.read_thickness(section, axis)?;
         let [mut low, mut high] = self.whole().bounds(self.dimensions);
         match upper {

@@ -5,7 +5,7 @@ use crate::models::VAN_DER_WAALS;
 use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid, mean_field, with_parameters};
 use psidpd_core::model::Model;
-use psidpd_core::theory::{MeanField, critical_point_of_model};
+use psidpd_core::theory::{MeanField, critical_point};
 
 /// x_c = b ρ_c and kT_c b/a, the paper's eqs (14)–(16).
 fn critical(alpha: f64) -> [f64; 2] {
@@ -26,7 +26,8 @@ pub fn fig1(_: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentErr
         let text = with_parameters(VAN_DER_WAALS, &[("alpha3", alpha)])?;
         let [x, t] = critical(alpha);
         let (rho, kt) = (x / b, t * a / b);
-        let found = critical_point_of_model(&Model::parse("model.toml", &text)?, [0.2 * kt, 3.0 * kt])?;
+        let model = Model::parse("model.toml", &text)?;
+        let found = critical_point(&|kt| Ok(model.at(kt)?), [0.2 * kt, 3.0 * kt])?;
         outcome.equal(format!("kT_c b/a, alpha_3 = {alpha}"), found.parameter * b / a, [t, 1e-6 * t]);
         outcome.equal(format!("b rho_c, alpha_3 = {alpha}"), found.density * b, [x, 1e-4 * x]);
         let inverse = |share: f64, rho: f64| -> Result<f64, ExperimentError> {
