@@ -40,7 +40,7 @@ impl PairThermostat {
         pool: &Pool,
         work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let PairThermostat { planes, set, inertia, inverse_mass, sums, solution, .. } = self;
+        let PairThermostat { planes, set, masses, sums, solution, .. } = self;
         let (Sums { p, of_plane }, Solution { change, residual, .. }) = (sums, solution);
         let mut rest = [&mut p[..], residual, change];
         let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
@@ -48,7 +48,7 @@ impl PairThermostat {
             .map(|((image, below), plane)| {
                 let own = plane.own.clone();
                 let [p, residual, solution] = rest.each_mut().map(|rest| take(rest, own.len()));
-                let (inertia, inverse_mass) = (&inertia[own.clone()], &inverse_mass[own]);
+                let (inertia, inverse_mass) = (&masses.inertia[own.clone()], &masses.inverse[own]);
                 (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
             })
             .collect();

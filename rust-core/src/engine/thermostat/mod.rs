@@ -88,9 +88,7 @@ pub struct PairThermostat {
     planes: Vec<PlanePairs>,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
-    /// Mass of each sorted particle; 0 where it is infinite.
-    inertia: Vec<f64>,
-    inverse_mass: Vec<f64>,
+    masses: Masses,
     sums: Sums,
     solution: Solution,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
@@ -102,6 +100,14 @@ pub struct PairThermostat {
     exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
+}
+
+/// Masses of the sorted particles.
+#[derive(Debug, Default)]
+struct Masses {
+    /// Mass of each; 0 where it is infinite.
+    inertia: Vec<f64>,
+    inverse: Vec<f64>,
 }
 
 impl PairThermostat {
@@ -118,8 +124,7 @@ impl PairThermostat {
             lists: PairLists::new(set, plan.dimensions),
             planes: Vec::new(),
             is_exact: settings.precision == Precision::Double,
-            inertia: Vec::new(),
-            inverse_mass: Vec::new(),
+            masses: Masses::default(),
             sums: Sums::default(),
             solution: Solution::default(),
             impulses: Vec::new(),
@@ -173,8 +178,8 @@ impl PairThermostat {
         }
         self.measure(pool, around.domain, particles, species_of_kind);
         let order = self.lists.order();
-        fill(pool, &mut self.inverse_mass, order, |k| mass(k).recip());
-        fill(pool, &mut self.inertia, order, |k| {
+        fill(pool, &mut self.masses.inverse, order, |k| mass(k).recip());
+        fill(pool, &mut self.masses.inertia, order, |k| {
             let m = mass(k);
             if m.is_finite() { m } else { 0.0 }
         });
@@ -216,7 +221,7 @@ impl PairThermostat {
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let moving = self.inertia.iter().filter(|m| **m > 0.0).count();
+        let moving = self.masses.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
@@ -224,7 +229,7 @@ impl PairThermostat {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let inverse = self.inverse_mass[i] + self.inverse_mass[j];
+                let inverse = self.masses.inverse[i] + self.masses.inverse[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     squares += along * along / inverse;

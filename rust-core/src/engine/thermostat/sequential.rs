@@ -44,9 +44,9 @@ impl PairThermostat {
         reversed: bool,
         draws: bool,
     ) -> [f64; 6] {
-        let PairThermostat { planes, lists, inverse_mass, kt, dt, noise, impulses, .. } = self;
+        let PairThermostat { planes, lists, masses, kt, dt, noise, impulses, .. } = self;
         impulses.resize_with(planes.len(), Vec::new);
-        let (planes, inverse_mass, kt) = (&planes[..], &inverse_mass[..], *kt);
+        let (planes, inverse_mass, kt) = (&planes[..], &masses.inverse[..], *kt);
         let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
         let mut sets = sets(planes);
