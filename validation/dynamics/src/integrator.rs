@@ -141,7 +141,6 @@ pub struct Properties {
 impl Integrator {
     /// Names in scene files, and what they mean with all other keys left out.
     pub const NAMED: [(&str, Integrator); 13] = [
-        ("monte-carlo", Integrator::MonteCarlo { sweeps: 1, max_move: None }),
         ("velocity-verlet", Integrator::VelocityVerlet),
         ("groot-warren", Integrator::GrootWarren { lambda: GROOT_WARREN }),
         ("dpd-vv", Integrator::DpdVv { noise: Law::Gaussian }),
@@ -161,11 +160,12 @@ impl Integrator {
                 coupling: Coupling::DEFAULT,
             },
         ),
+        ("monte-carlo", Integrator::MonteCarlo { sweeps: 1, max_move: None }),
     ];
 
     /// Those with a time step.
     pub const ALL: [(&str, Integrator); 12] = {
-        let [_, timed @ ..] = Integrator::NAMED;
+        let [timed @ .., _] = Integrator::NAMED;
         timed
     };
 
