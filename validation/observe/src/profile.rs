@@ -151,8 +151,11 @@ pub fn slab_edges(profile: &[(f64, f64)]) -> Option<Edges> {
     })
 }
 
-/// The height of a bin, and both flanks as (distance from the centre, density) with increasing distances.
-fn flanks(profile: &[(f64, f64)]) -> Option<(f64, [Vec<(f64, f64)>; 2])> {
+/// A density against the distance from the centre, with increasing distances.
+type Flank = Vec<(f64, f64)>;
+
+/// The height of a bin, and both flanks.
+fn flanks(profile: &[(f64, f64)]) -> Option<(f64, [Flank; 2])> {
     let count = profile.len();
     if count < 2 * FLANK_BINS || !profile.iter().all(|(z, rho)| z.is_finite() && rho.is_finite()) {
         return None;
