@@ -240,7 +240,7 @@ fn what_a_gpu_cannot_do_is_done_otherwise_or_refused() {
     let summed =
         engine.sum_densities(Surroundings::Box(&domain), &all.request(None).particles).unwrap().to_vec();
     assert!(summed.len() == 64 && summed.iter().all(|n| *n > 0.0));
-    // Another temperature.
+    // The engine goes on at another temperature.
     let mut gpu = engine.use_device(None).unwrap();
     gpu.set_fluid(&model.at(2.0).unwrap()).unwrap();
     gpu.map_kinds(&[-1, 0, -1, -1, -1]);

@@ -50,7 +50,7 @@ impl PairThermostat {
                 vectors::run(set, Weigh { block, images: places.images, laws: &laws });
             };
             if is_exact && list.exact.is_empty() {
-                // Each is read often.
+                // Each position is read often.
                 let x: Vec<_> = (own.start..own.end + next.len()).map(|k| places.x(k)).collect();
                 measure(list, |k| x[k - own.start], with_stretch, &mut block, law, weigh);
             }

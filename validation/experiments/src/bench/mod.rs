@@ -93,7 +93,7 @@ struct Case {
 struct Bench<'a> {
     asked: &'a Asked,
     place: Place,
-    /// By fluid and size.
+    /// The cases by fluid and size.
     cases: BTreeMap<(&'static str, usize), Case>,
     progress: &'a Progress,
 }

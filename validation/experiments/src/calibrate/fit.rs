@@ -9,7 +9,7 @@ use serde::Serialize;
 /// A polynomial with the standard error of each coefficient.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
-    /// In ascending powers.
+    /// Coefficients in ascending powers.
     pub coefficients: Vec<f64>,
     /// One standard deviation of each; none of a coefficient that is not fitted.
     pub errors: Vec<Option<f64>>,

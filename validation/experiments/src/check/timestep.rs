@@ -42,9 +42,9 @@ pub struct StepEstimate {
     pub stage: String,
     pub integrator: String,
     pub dt: f64,
-    /// ω.
+    /// Frequency ω.
     pub frequency: f64,
-    /// κ.
+    /// Drag κ.
     pub drag: f64,
     /// Relative error of the configurational temperature.
     pub error: f64,
@@ -107,9 +107,9 @@ fn longest(error: impl Fn(f64) -> f64) -> f64 {
 
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    /// ω.
+    /// Frequency ω.
     frequency: f64,
-    /// κ.
+    /// Drag κ.
     drag: f64,
     /// ∂p/∂ρ at constant composition, if positive.
     resistance: Option<f64>,

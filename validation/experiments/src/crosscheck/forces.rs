@@ -22,7 +22,7 @@ pub const SEED: u64 = 20_030_520;
 /// What a code says of a configuration.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
-    /// By tag.
+    /// Forces by tag.
     pub forces: Vec<[f64; 3]>,
     energy: f64,
     /// xx, yy, zz, xy, xz, yz.

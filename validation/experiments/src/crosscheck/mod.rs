@@ -60,7 +60,7 @@ impl Context<'_> {
 /// What a part of the validation adds to the report.
 #[derive(Debug, Default)]
 pub struct Part {
-    /// Of its checks.
+    /// The topic of its checks.
     topic: &'static str,
     pub checks: Vec<Check>,
     pub section: Section,

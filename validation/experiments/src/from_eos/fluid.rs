@@ -123,7 +123,7 @@ mod tests {
         close(units.tension, 2.62176e-3);
         // The target tension of the model, in its own unit.
         close(liquid.tension / units.tension, 8.84711);
-        // The same in the file.
+        // The file states the same tension.
         let text = model(&substance, &liquid, &units, &options, -40.0, "psidpd").unwrap();
         assert!(text.contains("surface tension 2.6217") && text.contains("e-3 N/m"), "{text}");
     }

@@ -30,7 +30,7 @@ use std::path::Path;
 
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Kelvin.
+    /// Temperature in kelvin.
     pub temperature: f64,
     /// Molecules in a particle.
     pub molecules: f64,
@@ -64,7 +64,7 @@ pub struct Property {
 #[derive(Debug, Clone, Serialize)]
 pub struct Found {
     pub substance: String,
-    /// Kelvin.
+    /// Temperature in kelvin.
     pub temperature: f64,
     /// Molecules in a particle.
     pub molecules: f64,

@@ -27,7 +27,7 @@ pub enum Extent {
     /// The integrators that are recommended, in mixed precision, and velocity Verlet in double.
     Quick,
     All,
-    /// That, and 10⁶ steps.
+    /// All integrators, and long runs of 10⁶ steps.
     Full,
 }
 

@@ -1,5 +1,3 @@
-//! Tests.
-
 use super::data::{Column, data_file};
 use super::*;
 

@@ -107,9 +107,9 @@ impl CellOrder {
             &[
                 // SAFETY: the stages follow each other, each with every part.
                 &|part| unsafe { sorting.count(set, part) },
-                // SAFETY: as before.
+                // SAFETY: all parts are counted when this stage begins.
                 &|part| unsafe { sorting.sum(part) },
-                // SAFETY: as before.
+                // SAFETY: all parts are summed when this stage begins.
                 &|part| unsafe { sorting.write(part) },
             ],
         );

@@ -94,7 +94,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         pool.each(slabs, |slab| {
             let mut since = Instant::now();
             for places in filled_first(order, &slab.units) {
-                // SAFETY: different slabs have disjoint particles, and each slab has one thread; the rest is as above.
+                // SAFETY: different slabs have disjoint particles, each slab has one thread, and no pass reads yet.
                 unsafe { self.particles.fill(set, order, input, places) };
             }
             lap(&mut since, &mut slab.state.times.sort);
@@ -275,7 +275,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
             unsafe { self.slopes.pack(particles, slopes) };
         }
         if unit.plane == 0 && self.order.is_periodic() {
-            // SAFETY: as before, for these particles and their copies, which no other unit has.
+            // SAFETY: the caller promises the same of the copies of these particles, which no other unit has.
             unsafe { self.slopes.copy(of_unit, self.order.particles()) };
         }
     }
