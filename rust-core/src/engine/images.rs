@@ -1,9 +1,7 @@
 use psidpd_passes::domain::PeriodicBox;
 
-/// The periodic images of a host's own particles, as ghosts. The native runner uses them as LAMMPS uses
-/// its communication on one rank.
-///
-/// Ghosts follow the owned particles in every array, so that the engine computes in open space.
+/// The periodic images of particles, as ghosts behind the owned particles in every array: a search for pairs in boxes narrower
+/// than the cut-off, and hosts in tests, compute with them in open space.
 #[derive(Debug, Clone, Default)]
 pub struct Images {
     owned: usize,
