@@ -6,17 +6,7 @@ use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
 /// Finds the parameters with the least sum of squared residuals, and that sum. The search begins at `start`; slopes are
 /// differences over `steps`. The search avoids parameters without residuals. The result is
 /// `None` if `start` has no residuals and if the search fails.
-pub fn least_squares<const N: usize>(
-    start: [f64; N],
-    steps: [f64; N],
-    residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
-) -> Option<([f64; N], f64)> {
-    let (at, sum) = least_squares_of_any(&start, &steps, residuals)?;
-    Some((std::array::from_fn(|k| at[k]), sum))
-}
-
-/// Does the work of [`least_squares`] for any number of parameters.
-pub fn least_squares_of_any(
+pub fn least_squares(
     start: &[f64],
     steps: &[f64],
     residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,

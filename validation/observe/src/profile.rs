@@ -228,11 +228,11 @@ fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]>
     };
     if free {
         let all = |p: &[f64]| residuals([p[0], p[1], p[2], p[3]]);
-        return Some(least_squares([liquid, vapour, step, width], [1e-6; 4], all)?.0);
+        return least_squares(&[liquid, vapour, step, width], &[1e-6; 4], all)?.0.try_into().ok();
     }
     let three = |p: &[f64]| residuals([p[0], 0.0, p[1], p[2]]);
-    let [liquid, place, width] = least_squares([liquid, step, width], [1e-6; 3], three)?.0;
-    Some([liquid, 0.0, place, width])
+    let (found, _) = least_squares(&[liquid, step, width], &[1e-6; 3], three)?;
+    Some([found[0], 0.0, found[1], found[2]])
 }
 
 /// The function ln cosh x + ln 2; callers use only differences of it.

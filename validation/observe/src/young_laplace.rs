@@ -139,7 +139,7 @@ pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
     }
     let sensible = |p: &[f64]| p[0].abs() < 5.0 && (p[1] - widest.ln()).abs() < 3.0;
     let within = |p: &[f64]| sensible(p).then(|| residuals(&points, dimensions, p))?;
-    let (p, least) = least_squares(best?.1, [1e-6, 1e-6, 1e-6 * widest], within)?;
+    let (p, least) = least_squares(&best?.1, &[1e-6, 1e-6, 1e-6 * widest], within)?;
     Some(Fit { bond: p[0], radius: p[1].exp(), apex: p[2], residual: (least / points.len() as f64).sqrt() })
 }
 

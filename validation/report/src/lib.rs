@@ -35,3 +35,9 @@ pub fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     }
     found
 }
+
+/// The lowest and the highest of the values that are finite; infinity and its negative if there are none.
+pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let wider = |[low, high]: [f64; 2], v: f64| [low.min(v), high.max(v)];
+    values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
+}

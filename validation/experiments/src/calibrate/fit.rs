@@ -3,7 +3,7 @@
 use super::point::Point;
 use nalgebra::{DMatrix, DVector};
 use psidpd_core::model::Polynomial;
-use psidpd_observe::least_squares::{least_squares_of_any, slopes};
+use psidpd_observe::least_squares::{least_squares, slopes};
 use serde::Serialize;
 
 /// A polynomial with the standard error of each coefficient.
@@ -123,7 +123,7 @@ pub fn fit_pressure(
     let coefficient = |m: usize| start.0.get(m).copied().unwrap_or(0.0);
     let from: Vec<f64> = (0..=degree).map(|m| coefficient(m) * unit[m]).collect();
     let steps = vec![1e-6 * largest; degree + 1];
-    let (found, _) = least_squares_of_any(&from, &steps, residuals)?;
+    let (found, _) = least_squares(&from, &steps, residuals)?;
     let inverse = slopes(&found, &steps, residuals)?.pseudo_inverse(1e-12).ok()?;
     let errors = (0..=degree)
         .map(|m| {

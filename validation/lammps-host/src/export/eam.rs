@@ -55,7 +55,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     if let Some(d) = pass {
         check_density(fluid, d)?;
     }
-    let (species, cutoff) = (fluid.species.len() as f64, potential_range(fluid));
+    let (species, cutoff) = (fluid.species.len() as f64, fluid.conservative_range().max(f64::MIN_POSITIVE));
     let rows = cutoff / grid.spacing;
     let numbers = species * (grid.densities as f64 + rows) + 0.5 * species * (species + 1.0) * rows;
     if numbers.is_nan() || numbers > f64::from(MOST) {
@@ -88,16 +88,12 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
         cutoff,
         embedding: &embedding,
         density: &|_, r| pass.map_or(0.0, |d| fluid.densities[d].kernel.value(r)),
-        pair: &|a, b, r| plan.linear_pair_energy(a, b, r) + pair_energy(fluid, a, b, r),
+        pair: &|a, b, r| {
+            let acting = fluid.pairs.iter().filter(|p| p.acts(a, b, r));
+            plan.linear_pair_energy(a, b, r) + acting.map(|p| p.potential.at(r).0).sum::<f64>()
+        },
     };
     Ok(table.write(path)?)
-}
-
-/// The longest range of the potential energy; thermostats may reach further.
-fn potential_range(fluid: &Fluid) -> f64 {
-    let densities = fluid.densities.iter().map(|d| d.kernel.range());
-    let pairs = fluid.pairs.iter().map(|p| p.potential.range());
-    densities.chain(pairs).fold(f64::MIN_POSITIVE, f64::max)
 }
 
 fn check_density(fluid: &Fluid, d: usize) -> Result<(), LammpsError> {
@@ -150,16 +146,6 @@ fn embedding(fluid: &Fluid, alpha: usize, pass: Option<usize>, n: f64) -> f64 {
             curve.at(if pass == Some(curve.density) { n + own(curve.density) } else { own(curve.density) })[0]
         }
     }
-}
-
-fn pair_energy(fluid: &Fluid, a: usize, b: usize, r: f64) -> f64 {
-    fluid
-        .pairs
-        .iter()
-        .filter(|p| p.between == [a, b] || p.between == [b, a])
-        .filter(|p| r < p.potential.range())
-        .map(|p| p.potential.at(r).0)
-        .sum()
 }
 
 #[cfg(test)]

@@ -121,7 +121,8 @@ impl ContactAngle {
             Some(points.iter().map(|p| (p[2] / total).sqrt() * away(circle, p)).collect())
         };
         let start = linear_circle(&points)?;
-        let ([centre, radius], sum) = least_squares(start, [1e-5 * start[1]; 2], residuals)?;
+        let (found, sum) = least_squares(&start, &[1e-5 * start[1]; 2], residuals)?;
+        let (centre, radius) = (found[0], found[1]);
         let rise = centre - self.surface();
         // A circle that does not reach the surface has no base: a drop beside the wall, or a film that covers it.
         let cosine = (-rise / radius).clamp(-1.0, 1.0);
