@@ -96,26 +96,7 @@ impl Engine {
     /// # Errors
     /// Fails as [`Plan::new`].
     pub fn new(fluid: &Fluid, settings: Settings) -> Result<Engine, TooLarge> {
-        Engine::with_pool(fluid, settings, Arc::new(Pool::new(settings.threads)))
-    }
-
-    /// Creates an engine with a given thread pool, which others may use too.
-    ///
-    /// # Errors
-    /// Fails as [`Plan::new`].
-    pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Engine, TooLarge> {
-        Ok(Engine::of_plan(Plan::new(fluid)?, settings, pool))
-    }
-
-    /// Creates an engine with a faulty sweep, for tests that a check finds the fault.
-    ///
-    /// # Errors
-    /// Fails as [`Plan::new`].
-    #[doc(hidden)]
-    pub fn with_fault(fluid: &Fluid, settings: Settings, fault: Fault) -> Result<Engine, TooLarge> {
-        let mut plan = Plan::new(fluid)?;
-        plan.fault = Some(fault);
-        Ok(Engine::of_plan(plan, settings, Arc::new(Pool::new(settings.threads))))
+        Ok(Engine::of_plan(Plan::new(fluid)?, settings, Arc::new(Pool::new(settings.threads))))
     }
 
     fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
@@ -127,6 +108,34 @@ impl Engine {
             path: None,
             number: 0,
         }
+    }
+
+    /// Takes the same model at another temperature, or other settings. The map of types and the restriction to sums over
+    /// pairs stay. Counts begin anew; there are no special pairs, no exclusions and no device.
+    ///
+    /// # Errors
+    /// Fails as [`Plan::new`].
+    pub fn renew(&mut self, fluid: &Fluid, settings: Settings) -> Result<(), TooLarge> {
+        let mut plan = Plan::new(fluid)?;
+        plan.species_of_type.clone_from(&self.plan().species_of_type);
+        self.replace(plan, settings);
+        Ok(())
+    }
+
+    /// Makes the sweep faulty until the engine is renewed, for tests that a check finds the fault.
+    #[doc(hidden)]
+    pub fn falsify(&mut self, fault: Fault) {
+        let mut plan = self.plan().clone();
+        plan.fault = Some(fault);
+        self.replace(plan, self.settings());
+    }
+
+    fn replace(&mut self, plan: Plan, settings: Settings) {
+        let pool = match settings.threads == self.settings().threads {
+            true => Arc::clone(self.pool()),
+            false => Arc::new(Pool::new(settings.threads)),
+        };
+        *self = Engine { pair_sums_only: self.pair_sums_only, ..Engine::of_plan(plan, settings, pool) };
     }
 
     /// The plan of the fluid's passes.
@@ -174,11 +183,14 @@ impl Engine {
         self.sweep.sweep.plan.map_kinds(kinds)
     }
 
-    /// Makes later evaluations on a GPU, or on none, and returns the one before. The host then maps its types again.
+    /// Makes later evaluations on a GPU, or on none, and returns the one before.
     ///
     /// The GPU computes forces and totals; sums over pairs compute what else is requested. There may be no special
     /// pairs and no exclusions.
-    pub fn use_device(&mut self, device: Option<Box<dyn DevicePath>>) -> Option<Box<dyn DevicePath>> {
+    pub fn use_device(&mut self, mut device: Option<Box<dyn DevicePath>>) -> Option<Box<dyn DevicePath>> {
+        if let Some(device) = &mut device {
+            device.map_kinds(&self.plan().species_of_type);
+        }
         std::mem::replace(&mut self.device, device)
     }
 

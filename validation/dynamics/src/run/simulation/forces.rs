@@ -18,7 +18,6 @@ pub(super) struct Forces {
     /// The number of the positions of the last evaluation, [`Particles::moves`].
     moves: u64,
     all_densities: bool,
-    pair_sums_only: bool,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
     pub earlier_out_of_bounds: [u64; 2],
 }
@@ -33,7 +32,6 @@ impl Forces {
             tally: Tally::default(),
             moves: 0,
             all_densities: false,
-            pair_sums_only: false,
             earlier_out_of_bounds: [0; 2],
         })
     }
@@ -91,17 +89,12 @@ impl Forces {
         }
     }
 
-    pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
-        let (settings, pool) = (self.engine.settings(), self.engine.pool().clone());
-        self.replace(Engine::with_pool(&self.model.at(kt)?, settings, pool)?);
-        self.kt = kt;
+    /// Takes another temperature, or other settings.
+    pub fn renew(&mut self, kt: f64, settings: Settings) -> Result<(), RunError> {
+        let out_of_bounds = self.out_of_bounds();
+        self.engine.renew(&self.model.at(kt)?, settings)?;
+        (self.kt, self.earlier_out_of_bounds) = (kt, out_of_bounds);
         Ok(())
-    }
-
-    fn replace(&mut self, engine: Engine) {
-        self.earlier_out_of_bounds = self.out_of_bounds();
-        self.engine = engine;
-        self.engine.use_pair_sums_only(self.pair_sums_only);
     }
 
     pub fn out_of_bounds(&self) -> [u64; 2] {
@@ -114,17 +107,14 @@ impl Simulation {
     /// Makes forces wrong until settings or the temperature are set: tests use it to check that errors of
     /// forces are noticed.
     #[doc(hidden)]
-    pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
-        let Forces { model, kt, engine, .. } = &self.forces;
-        let engine = Engine::with_fault(&model.at(*kt)?, engine.settings(), fault)?;
-        self.forces.replace(engine);
-        Ok(())
+    pub fn falsify(&mut self, fault: Fault) {
+        self.forces.earlier_out_of_bounds = self.forces.out_of_bounds();
+        self.forces.engine.falsify(fault);
     }
 
     /// Sets the settings of later evaluations; the default is double precision on one thread.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
-        let Forces { model, kt, .. } = &self.forces;
-        self.forces.replace(Engine::new(&model.at(*kt)?, settings)?);
+        self.forces.renew(self.kt(), settings)?;
         self.thermostat.follow(&self.forces);
         Ok(())
     }
@@ -186,7 +176,6 @@ impl Simulation {
 
     /// Sets whether the pair sums do every evaluation; they are slower and use double precision.
     pub fn use_pair_sums_only(&mut self, only: bool) {
-        self.forces.pair_sums_only = only;
         self.forces.engine.use_pair_sums_only(only);
     }
 
