@@ -41,10 +41,14 @@ pub trait Evaluate {
     fn fetch_slopes(&mut self, all: usize);
 
     /// Values of single particles in the last evaluation.
-    fn results(&self) -> Results<'_>;
+    fn results(&self) -> Results<'_> {
+        Results::default()
+    }
 
     /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
-    fn excess(&mut self) -> &[f64];
+    fn excess(&mut self) -> &[f64] {
+        &[]
+    }
 }
 
 /// A path of another crate, for a GPU: [`Engine::use_device`](super::Engine::use_device).
