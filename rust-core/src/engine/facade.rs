@@ -330,14 +330,6 @@ impl Engine {
     }
 
     /// The path of the last evaluation.
-    fn last(&self) -> &dyn Evaluate {
-        match (self.path, &self.device) {
-            (Some(Path::PairSums(_)), _) => &self.pair_sums,
-            (Some(Path::Device), Some(device)) => &**device,
-            _ => &self.sweep,
-        }
-    }
-
     fn last_mut(&mut self) -> &mut dyn Evaluate {
         match (self.path, &mut self.device) {
             (Some(Path::PairSums(_)), _) => &mut self.pair_sums,
@@ -353,12 +345,11 @@ impl Engine {
 
     /// Values of single particles in the last evaluation.
     pub fn results(&self) -> Results<'_> {
-        // Densities after an evaluation on a GPU are summed by this engine.
-        let last: &dyn Evaluate = if self.path == Some(Path::Device) { &self.sweep } else { self.last() };
-        let results = last.results();
-        Results {
-            order: results.order.filter(|_| self.path.is_some_and(|path| path != Path::Device)),
-            ..results
+        let order = (self.path == Some(Path::Sweep)).then(|| self.sweep.sweep.order());
+        match self.path {
+            Some(Path::PairSums(_)) => self.pair_sums.results(),
+            // Densities after an evaluation on a GPU are summed by this engine.
+            _ => Results { densities: &self.sweep.densities, order, ..Results::default() },
         }
     }
 
@@ -393,10 +384,11 @@ impl Engine {
 
     /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
     pub fn excess(&mut self) -> &[f64] {
-        if self.path.is_none() {
-            return &[];
+        match self.path {
+            Some(Path::PairSums(_)) => &self.pair_sums.excess,
+            Some(Path::Sweep) => self.sweep.excess(),
+            Some(Path::Device) | None => &[],
         }
-        self.last_mut().excess()
     }
 
     /// Gets the slopes of owned particles after [`Engine::forces`], with room for `all` particles and ghosts;
@@ -416,8 +408,11 @@ impl Engine {
     ///
     /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
     /// density. The force includes the many-body part, if slopes are available.
-    pub fn single(&self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
-        self.pair_sums.single(kinds, r, self.last().slopes(), particles)
+    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
+        let slopes = std::mem::take(self.last_mut().slopes_mut());
+        let found = self.pair_sums.single(kinds, r, &slopes, particles);
+        *self.last_mut().slopes_mut() = slopes;
+        found
     }
 
     /// Size in bytes of the arrays over particles and pairs.

@@ -295,10 +295,6 @@ impl Evaluate for GpuForces {
         self.finish(request, force, false)
     }
 
-    fn slopes(&self) -> &[f64] {
-        &self.slopes
-    }
-
     fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.slopes
     }

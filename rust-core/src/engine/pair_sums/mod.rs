@@ -69,7 +69,7 @@ pub struct PairSums {
     /// Whether all densities are summed, or only those that forces need.
     has_all_densities: bool,
     /// ψ of owned particles.
-    excess: Vec<f64>,
+    pub(super) excess: Vec<f64>,
     slopes: Vec<f64>,
     particle_energy: Vec<f64>,
     particle_virial: Vec<[f64; 6]>,
@@ -206,6 +206,16 @@ impl PairSums {
         Ok(&self.densities)
     }
 
+    /// Values of single particles in the last evaluation.
+    pub(super) fn results(&self) -> Results<'_> {
+        Results {
+            densities: &self.densities,
+            particle_energy: &self.particle_energy,
+            particle_virial: &self.particle_virial,
+            order: None,
+        }
+    }
+
     fn evaluate_excess(&mut self, tag: &[i32]) -> Result<(), EngineError> {
         let slope_width = self.plan.slope_width();
         self.excess.clear();
@@ -302,28 +312,11 @@ impl Evaluate for PairSums {
         }
     }
 
-    fn slopes(&self) -> &[f64] {
-        &self.slopes
-    }
-
     fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.slopes
     }
 
     fn fetch_slopes(&mut self, all: usize) {
         self.slopes.resize(self.plan.slope_width() * all, 0.0);
-    }
-
-    fn results(&self) -> Results<'_> {
-        Results {
-            densities: &self.densities,
-            particle_energy: &self.particle_energy,
-            particle_virial: &self.particle_virial,
-            order: None,
-        }
-    }
-
-    fn excess(&mut self) -> &[f64] {
-        &self.excess
     }
 }
