@@ -120,11 +120,6 @@ impl Style {
         })
     }
 
-    /// The number of threads that run.
-    pub fn threads(&self) -> usize {
-        self.engine.settings().threads.get()
-    }
-
     /// Describes the computation, and the letters of the coefficients, for the log.
     ///
     /// `search` says where pairs come from, and whether LAMMPS lists them; `apart`, whether a fix has the thermostat.
