@@ -4,8 +4,7 @@ use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Fault, PassCounts, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally,
-    Want,
+    self, Engine, Fault, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally, Want,
 };
 use psidpd_core::model::Model;
 
@@ -17,7 +16,6 @@ pub(super) struct Forces {
     pub tally: Tally,
     /// The number of the positions of the last evaluation, [`Particles::moves`].
     moves: u64,
-    all_densities: bool,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
     pub earlier_out_of_bounds: [u64; 2],
 }
@@ -31,7 +29,6 @@ impl Forces {
             kt,
             tally: Tally::default(),
             moves: 0,
-            all_densities: false,
             earlier_out_of_bounds: [0; 2],
         })
     }
@@ -53,8 +50,6 @@ impl Forces {
             }
             self.check_width(&state.domain)?;
         }
-        let step = step.filter(|_| self.engine.plan().needs_velocities());
-        let want = Want { densities: want.densities || self.all_densities, ..want };
         let particles =
             engine::Particles { owned: state.len(), x: &state.x, tag: &state.tag, kind: &state.species };
         let request = Request { particles, v: &state.v, step, want };
@@ -132,9 +127,8 @@ impl Simulation {
         if let Some(name) = self.device_name() {
             return format!("{name}, in single precision, with positions exact to 2^-32 of the box");
         }
-        let Forces { engine, all_densities, .. } = &self.forces;
-        let want = Want { densities: *all_densities, ..Want::FORCES };
-        engine.path_for(Surroundings::Box(&self.particles.now().domain), want).describe(engine.settings())
+        let path = self.engine().path_for(Surroundings::Box(&self.particles.now().domain), Want::FORCES);
+        path.describe(self.settings())
     }
 
     pub fn model(&self) -> &Model {
@@ -156,22 +150,6 @@ impl Simulation {
             return counts;
         }
         self.forces.out_of_bounds()
-    }
-
-    /// Number of runs of each pass of the engine since the last change of temperature.
-    pub fn counts(&self) -> PassCounts {
-        self.forces.engine.statistics().counts
-    }
-
-    /// Local densities of the particles in the last evaluation, if [`Simulation::sum_all_densities`] enabled
-    /// them: one for each density and species, density-major.
-    pub fn local_densities(&self) -> &[f64] {
-        self.forces.engine.results().densities
-    }
-
-    /// Sets whether evaluations compute every density of the model.
-    pub fn sum_all_densities(&mut self, all: bool) {
-        self.forces.all_densities = all;
     }
 
     /// Sets whether the pair sums do every evaluation; they are slower and use double precision.
