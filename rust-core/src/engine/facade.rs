@@ -227,14 +227,12 @@ impl Engine {
 
     /// The path that an evaluation of `want` would take.
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
-        let fits = match surroundings {
-            Surroundings::Listed(..) => return Path::PairSums(Reason::ListedPairs),
-            Surroundings::Box(domain) | Surroundings::Ghosts(Around { domain, .. }, _) => {
-                match &self.device {
-                    Some(device) => device.fits(domain),
-                    None => self.sweep.sweep.fits(domain),
-                }
-            }
+        let Some(Around { domain, .. }) = surroundings.around() else {
+            return Path::PairSums(Reason::ListedPairs);
+        };
+        let fits = match &self.device {
+            Some(device) => device.fits(domain),
+            None => self.sweep.sweep.fits(domain),
         };
         if self.pair_sums_only {
             Path::PairSums(Reason::Asked)

@@ -129,11 +129,7 @@ impl Evaluate for SweepPath {
         request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<(), EngineError> {
-        let around = match surroundings {
-            Surroundings::Ghosts(around, _) => around,
-            Surroundings::Box(domain) => Around { domain, images: &[] },
-            Surroundings::Listed(..) => return Err(EngineError::Host("a sweep finds its pairs itself")),
-        };
+        let around = surroundings.around().ok_or(EngineError::Host("a sweep finds its pairs itself"))?;
         self.begin(around, request)?;
         self.sweep.first(around, request, force)
     }

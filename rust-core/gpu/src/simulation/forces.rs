@@ -263,11 +263,7 @@ impl Evaluate for GpuForces {
         request: &Request,
         _: &mut [[f64; 3]],
     ) -> Result<(), EngineError> {
-        let around = match surroundings {
-            Surroundings::Ghosts(around, _) => around,
-            Surroundings::Box(domain) => Around { domain, images: &[] },
-            Surroundings::Listed(..) => return Err(EngineError::Host("a gpu finds its pairs itself")),
-        };
+        let around = surroundings.around().ok_or(EngineError::Host("a gpu finds its pairs itself"))?;
         self.load(around, request)?;
         if self.width() > 0 && !self.places.is_empty() {
             let totals = request.want.energy || request.want.virial;

@@ -148,12 +148,8 @@ impl PairSums {
         }
         if !self.special.is_empty() || !self.exclusions.marks.is_empty() {
             self.exclusions.check(species.len())?;
-            let domain = match surroundings {
-                Surroundings::Box(domain) => domain,
-                Surroundings::Ghosts(around, _) => around.domain,
-                Surroundings::Listed(..) => {
-                    return Err(EngineError::Host("special pairs cannot be combined with listed pairs"));
-                }
+            let Some(Around { domain, .. }) = surroundings.around() else {
+                return Err(EngineError::Host("special pairs cannot be combined with listed pairs"));
             };
             scale(&mut self.pairs, &self.special, &self.exclusions, domain, dimensions, cutoff)?;
         }
