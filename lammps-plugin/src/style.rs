@@ -189,19 +189,13 @@ impl Style {
 
     /// Local densities of owned particles, per unit volume of LAMMPS.
     pub fn local_densities(&mut self) -> &[f64] {
-        if self.scale.is_one() {
-            return self.engine.results().densities;
-        }
         let volume = self.scale.length.powi(self.model.dimensions() as i32);
         times(self.engine.results().densities, 1.0 / volume, &mut self.converted.densities)
     }
 
     /// ψ of owned particles, in LAMMPS's units of energy.
     pub fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {
-        guard(|| match self.scale.is_one() {
-            true => Ok(self.engine.excess()),
-            false => Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)),
-        })
+        guard(|| Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)))
     }
 }
 

@@ -36,10 +36,10 @@ impl Style {
             let Some(thermostat) = thermostat else { return Ok(false) };
             thermostat.take(engine);
             let around = Around { domain: &scale.domain(extent)?, images };
-            let taken = converted.take(scale, atoms, None);
+            let (request, _) = converted.take(scale, atoms, None);
             let unit = scale.velocity().powi(2) / scale.energy;
             let mass: &[f64] = &mass.iter().map(|m| m * unit).collect::<Vec<_>>();
-            let particles = Particles { owned: mass.len(), ..taken.request.particles };
+            let particles = Particles { owned: mass.len(), ..request.particles };
             let pool = engine.pool();
             let rank = Rank { around, particles, species_of_kind: &engine.plan().species_of_type, mass };
             thermostat.find_pairs_of_rank(pool, &rank, heat.time / scale.time, heat.virial)?;
