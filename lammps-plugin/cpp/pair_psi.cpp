@@ -186,7 +186,7 @@ void PairPsi::init_style()
   check_box();
   lost_atoms.begin(atom, world);
   // LAMMPS sizes its buffers by this; later communications never send more.
-  comm_forward = static_cast<int>((*style)->variables());
+  comm_forward = static_cast<int>((*style)->facts().variables);
   exclusions.begin(neighbor, atom->ntypes);
 
   why_listed.clear();
@@ -223,7 +223,7 @@ void PairPsi::advise()
   if (lmp->suffix_enable)
     warn("there is no accelerated variant, and the suffix has no effect: use the keywords 'precision mixed' and "
          "'threads'");
-  const size_t used = (*style)->threads();
+  const size_t used = (*style)->facts().threads;
   if (used < given.threads)
     warn("threads " + std::to_string(given.threads) + " is more than the processors that this process may use: using " +
          std::to_string(used) + ", with the same results");
@@ -276,7 +276,7 @@ double PairPsi::init_one(int i, int j)
          ": this style does not mix them, set them with pair_coeff");
   refresh();
   exclusions.ask(i, j);
-  return (*style)->cutoff();
+  return (*style)->facts().cutoff;
 }
 
 // Writes the present temperature, which may have changed since pair_style gave it.

@@ -56,14 +56,14 @@ bool PairPsi::is_narrow() const
   double height[3];
   heights(domain, height);
   for (int k = 0; k < domain->dimension; k++)
-    if (domain->periodicity[k] && height[k] < 2.0 * (*style)->cutoff()) return true;
+    if (domain->periodicity[k] && height[k] < 2.0 * (*style)->facts().cutoff) return true;
   return false;
 }
 
 // Stops at callers that need energies of single pairs: a many-body energy belongs to particles.
 void PairPsi::check_callers()
 {
-  if ((*style)->slope_width() == 0) return;
+  if ((*style)->facts().slope_width == 0) return;
   for (int k = 0; k < modify->nfix; k++)
     if (strncmp(modify->fix[k]->style, "bond/swap", 9) == 0)
       stop("fix bond/swap decides on the energies of single pairs: it cannot be used with a many-body style");
@@ -86,7 +86,7 @@ void PairPsi::check_device()
 // Two images of one pair would draw the same noise in a box shorter than twice its range.
 void PairPsi::check_box()
 {
-  const double range = (*style)->noise_range();
+  const double range = (*style)->facts().noise_range;
   double height[3];
   heights(domain, height);
   for (int k = 0; k < domain->dimension; k++)
@@ -107,7 +107,7 @@ void PairPsi::check_plane()
     mine[1] = std::max(mine[1], -z);
   }
   MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, world);
-  if (all[0] + all[1] > 1e-6 * (*style)->cutoff())
+  if (all[0] + all[1] > 1e-6 * (*style)->facts().cutoff)
     stop("in two dimensions all atoms must have the same z, found " + std::to_string(-all[1]) + " to " +
          std::to_string(all[0]) + ": use a box that is thinner than the lattice, or 'set group all z 0'");
 }
@@ -115,7 +115,7 @@ void PairPsi::check_plane()
 void PairPsi::check_ghosts()
 {
   if (comm->mode != Comm::SINGLE) return;
-  const double cutoff = (*style)->cutoff();
+  const double cutoff = (*style)->facts().cutoff;
   double height[3] = {1.0, 1.0, 1.0};
   // In a triclinic box LAMMPS gives lengths as fractions of the box.
   if (domain->triclinic) heights(domain, height);

@@ -95,7 +95,7 @@ void PairPsi::find_densities(const Atoms &atoms, const Request &request, rust::S
 // Sends slopes from owners to ghosts.
 void PairPsi::forward()
 {
-  const int width = static_cast<int>((*style)->slope_width());
+  const int width = static_cast<int>((*style)->facts().slope_width);
   // Inside a hybrid LAMMPS has sized its buffers before it knew the number of our columns; its buffers fit positions.
   const int most = force->pair == this ? width : 3;
   for (int first = 0; first < width; first += comm_forward) {
@@ -135,7 +135,7 @@ void PairPsi::compute(int eflag, int vflag)
 
   Request request;
   // A minimiser follows the gradient of U, to which drag and noise do not belong.
-  request.thermostat = fluid.needs_velocities() && !apart && update->whichflag != 2;
+  request.thermostat = fluid.facts().needs_velocities && !apart && update->whichflag != 2;
   request.seed = given.seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
   request.dt = update->dt;
@@ -181,7 +181,7 @@ void PairPsi::compute(int eflag, int vflag)
   }
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += totals.virial[k];
-  const double unit = fluid.energy_unit();
+  const double unit = fluid.facts().energy_unit;
   if (eflag_atom) {
     const auto energy = fluid.particle_energy();
     for (size_t i = 0; i < reach; i++) eatom[i] += unit * energy[i];
@@ -195,12 +195,12 @@ void PairPsi::compute(int eflag, int vflag)
 
 int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
 {
-  return exchange.pack(n, list, buf, pbc_flag, pbc, (*style)->slopes_mut().data(), (*style)->slope_width());
+  return exchange.pack(n, list, buf, pbc_flag, pbc, (*style)->slopes_mut().data(), (*style)->facts().slope_width);
 }
 
 void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
-  exchange.unpack(n, first, buf, (*style)->slopes_mut().data(), (*style)->slope_width());
+  exchange.unpack(n, first, buf, (*style)->slopes_mut().data(), (*style)->facts().slope_width);
 }
 
 // Passes pairs that are left out, or scaled, to the engine, unless it has them.
@@ -218,7 +218,7 @@ bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
   const int all = atom->nlocal + atom->nghost;
   if (i < 0 || j < 0 || i >= all || j >= all) return false;
   if (atom->type[i] != itype || atom->type[j] != jtype) return false;
-  const double range = (*style)->cutoff();
+  const double range = (*style)->facts().cutoff;
   double d[3];
   for (int k = 0; k < 3; k++) d[k] = atom->x[i][k] - atom->x[j][k];
   const auto agrees = [&] {
@@ -242,7 +242,7 @@ bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
 double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
 {
   // Without densities a pair's energy depends on its distance alone, and not on the last evaluation.
-  const bool many_body = (*style)->slope_width() > 0;
+  const bool many_body = (*style)->facts().slope_width > 0;
   if (many_body && !is_pair(i, j, itype, jtype, rsq))
     stop_here("asked for the energy of a pair that the last evaluation does not contain, as of an atom to be inserted or "
               "moved: a many-body energy is not a sum over pairs; fix gcmc and fix widom need full_energy with a many-body "
@@ -275,7 +275,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   columns = 0;
   if (!density && has_device()) stop("device gpu has no psi of single atoms: use device cpu");
   if (!density) return attempt([&] { return const_cast<double *>((*style)->excess_of_owned().data()); });
-  const size_t width = (*style)->variables();
+  const size_t width = (*style)->facts().variables;
   if (width == 0) return nullptr;
   // Forces may not have needed all densities.
   tell_left_out(false);

@@ -63,7 +63,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   if (!acts) return;
   rust::Slice<double> v;
   if (owned > 0) v = {atom->v[0], 3 * owned};
-  const double velocity = fluid.velocity_unit(), energy = fluid.energy_unit();
+  const double velocity = fluid.facts().velocity_unit, energy = fluid.facts().energy_unit;
   const auto times = [&](double factor) {
     if (factor != 1.0) std::for_each(v.begin(), v.end(), [=](double &c) { c *= factor; });
   };

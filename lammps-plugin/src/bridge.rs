@@ -8,6 +8,23 @@ use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
 mod ffi {
+    /// What a style knows of its fluid without an evaluation, in the units of LAMMPS.
+    struct Facts {
+        cutoff: f64,
+        slope_width: usize,
+        /// The number of densities times the number of species: the largest slope width.
+        variables: usize,
+        needs_velocities: bool,
+        /// Range of the noise; 0 without noise.
+        noise_range: f64,
+        /// One unit of energy of the model; multiply energies and virials of particles by it.
+        energy_unit: f64,
+        /// One unit of velocity of the model.
+        velocity_unit: f64,
+        /// The number of threads that run.
+        threads: usize,
+    }
+
     /// Coefficients of one pair of types, in the order of `pair_coeff`.
     #[derive(Clone, Copy, PartialEq)]
     struct Coefficients {
@@ -154,18 +171,11 @@ mod ffi {
 
         fn set_temperature(self: &mut Style, kt: f64) -> Result<()>;
         fn description(self: &Style, search: &str, listed: bool, apart: bool) -> String;
-        fn cutoff(self: &Style) -> f64;
-        fn slope_width(self: &Style) -> usize;
-        /// The number of densities times the number of species: the largest slope width.
-        fn variables(self: &Style) -> usize;
-        fn needs_velocities(self: &Style) -> bool;
-        /// Range of the noise; 0 without noise.
-        fn noise_range(self: &Style) -> f64;
+        fn facts(self: &Style) -> Facts;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
         /// Evaluates on the device of a name: `cpu`, `gpu` or `gpu:N`.
         fn use_device(self: &mut Style, name: &str) -> Result<()>;
-        fn threads(self: &Style) -> usize;
         /// Sets the pairs with reduced strength for all later evaluations, unless LAMMPS lists the pairs.
         fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
         /// Sets excluded pairs by two words for each atom and ghost, the members of `Mark`; an empty slice excludes none.
@@ -203,16 +213,12 @@ mod ffi {
         /// Copies slopes of owned particles after an evaluation without ghosts, and makes room for those of ghosts.
         fn fetch_slopes(self: &mut Style, all: usize) -> Result<()>;
         fn forces(self: &mut Style, atoms: &Atoms, request: &Request, f: &mut [f64]) -> Result<Totals>;
-        /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of particles by it.
-        fn energy_unit(self: &Style) -> f64;
-        /// One unit of velocity of the model in the units of LAMMPS.
-        fn velocity_unit(self: &Style) -> f64;
         fn particle_energy(self: &Style) -> &[f64];
         /// Virials, six numbers for each particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Sums all densities at the positions of the last evaluation.
         fn sum_densities(self: &mut Style, atoms: &Atoms) -> Result<()>;
-        /// Densities of owned particles, a row of [`variables`] for each.
+        /// Densities of owned particles, a row of `Facts::variables` for each.
         fn local_densities(self: &mut Style) -> &[f64];
         /// ψ of owned particles.
         fn excess_of_owned(self: &mut Style) -> Result<&[f64]>;
@@ -319,9 +325,18 @@ impl Request {
 }
 
 impl Style {
-    fn variables(&self) -> usize {
-        let plan = self.engine.plan();
-        plan.densities().count() * plan.species.len()
+    fn facts(&self) -> ffi::Facts {
+        let (plan, scale) = (self.engine.plan(), &self.scale);
+        ffi::Facts {
+            cutoff: scale.length * plan.cutoff,
+            slope_width: plan.slope_width(),
+            variables: plan.densities().count() * plan.species.len(),
+            needs_velocities: plan.needs_velocities(),
+            noise_range: scale.length * plan.noise_range().unwrap_or(0.0),
+            energy_unit: scale.energy,
+            velocity_unit: scale.velocity(),
+            threads: self.engine.settings().threads.get(),
+        }
     }
 
     fn set_special_pairs(&mut self, pairs: &[ffi::SpecialPair]) -> Result<(), StyleError> {
@@ -358,32 +373,8 @@ impl Style {
         })
     }
 
-    fn energy_unit(&self) -> f64 {
-        self.scale.energy
-    }
-
-    fn velocity_unit(&self) -> f64 {
-        self.scale.velocity()
-    }
-
     fn memory(&self) -> usize {
         self.engine.memory()
-    }
-
-    fn cutoff(&self) -> f64 {
-        self.scale.length * self.engine.plan().cutoff
-    }
-
-    fn slope_width(&self) -> usize {
-        self.engine.plan().slope_width()
-    }
-
-    fn needs_velocities(&self) -> bool {
-        self.engine.plan().needs_velocities()
-    }
-
-    fn noise_range(&self) -> f64 {
-        self.scale.length * self.engine.plan().noise_range().unwrap_or(0.0)
     }
 
     fn particle_energy(&self) -> &[f64] {

@@ -1,13 +1,14 @@
 //! Evaluations in the units of LAMMPS.
 
 use crate::bridge::{self, Atoms, Extent, Listed, Totals};
-use crate::converted::{Converted, Taken, times, triples};
+use crate::converted::{Converted, times, triples};
 use crate::error::StyleError;
 use crate::style::{Style, guard};
 use crate::units::Scale;
 use nalgebra::Matrix3;
 use psidpd_core::engine::{
-    Around, Newton, PairsOfHost, Particles, PeriodicBox, Request, Step, Surroundings, Tally, Want,
+    Around, Engine, EngineError, Newton, PairsOfHost, Particles, PeriodicBox, Request, Step, Surroundings,
+    Tally, Want,
 };
 
 impl Scale {
@@ -21,27 +22,46 @@ impl Scale {
 }
 
 impl Converted {
-    /// Converts a request to units of the model; `None` stands for forces without drag and noise.
+    /// Converts a request to units of the model; `None` stands for forces without drag and noise. Beside it is room for
+    /// forces.
     pub fn take<'a>(
         &'a mut self,
         scale: &Scale,
         atoms: &Atoms<'a>,
         request: Option<&bridge::Request>,
-    ) -> Taken<'a> {
-        let (mut x, mut v) = (atoms.x, if request.is_some() { atoms.v } else { &[] });
-        if !scale.is_one() {
-            x = times(x, 1.0 / scale.length, &mut self.x);
-            v = times(v, 1.0 / scale.velocity(), &mut self.v);
-        }
+    ) -> (Request<'a>, &'a mut Vec<f64>) {
+        let x = times(atoms.x, 1.0 / scale.length, &mut self.x);
+        let v = if request.is_some() { atoms.v } else { &[] };
+        let v = times(v, 1.0 / scale.velocity(), &mut self.v);
         let particles = Particles { owned: atoms.owned, x: triples(x), tag: atoms.tag, kind: atoms.kind };
         let step = request.filter(|request| request.thermostat);
         let step = step.map(|r| Step { seed: r.seed, number: r.step, dt: r.dt / scale.time });
         let want = request.map_or(Want::FORCES, bridge::Request::want);
-        Taken { request: Request { particles, v: triples(v), step, want }, forces: &mut self.forces }
+        (Request { particles, v: triples(v), step, want }, &mut self.forces)
     }
 }
 
 impl Style {
+    /// Runs `evaluate` on the request and on forces in units of the model, and adds these to `f`.
+    fn add_forces<R>(
+        &mut self,
+        atoms: &Atoms,
+        request: &bridge::Request,
+        f: &mut [f64],
+        evaluate: impl FnOnce(&mut Engine, &Request, &mut [[f64; 3]]) -> Result<R, EngineError>,
+    ) -> Result<R, StyleError> {
+        let Style { engine, scale, converted, .. } = self;
+        let (request, forces) = converted.take(scale, atoms, Some(request));
+        if scale.is_one() {
+            return Ok(evaluate(engine, &request, f.as_chunks_mut::<3>().0)?);
+        }
+        forces.clear();
+        forces.resize(f.len(), 0.0);
+        let result = evaluate(engine, &request, forces.as_chunks_mut::<3>().0)?;
+        f.iter_mut().zip(&*forces).for_each(|(f, force)| *f += scale.force() * force);
+        Ok(result)
+    }
+
     /// Adds to `f` all forces on atoms in a box that this rank has all of.
     pub fn evaluate(
         &mut self,
@@ -51,10 +71,10 @@ impl Style {
         f: &mut [f64],
     ) -> Result<Totals, StyleError> {
         guard(|| {
-            let Style { engine, scale, converted, .. } = self;
-            let domain = scale.domain(extent)?;
-            let taken = converted.take(scale, atoms, Some(request));
-            let tally = taken.add_forces(scale, f, |request, f| engine.forces(&domain, request, f, true))?;
+            let domain = self.scale.domain(extent)?;
+            let tally = self.add_forces(atoms, request, f, |engine, request, f| {
+                engine.forces(&domain, request, f, true)
+            })?;
             Ok(self.totals(&tally))
         })
     }
@@ -94,10 +114,10 @@ impl Style {
         request: &bridge::Request,
         f: &mut [f64],
     ) -> Result<(), StyleError> {
-        let Style { engine, pending, scale, converted, .. } = self;
-        *pending = None;
-        let taken = converted.take(scale, atoms, Some(request));
-        *pending = Some(taken.add_forces(scale, f, |request, f| engine.first(surroundings, request, f))?);
+        self.pending = None;
+        let pending =
+            self.add_forces(atoms, request, f, |engine, request, f| engine.first(surroundings, request, f))?;
+        self.pending = Some(pending);
         Ok(())
     }
 
@@ -105,9 +125,9 @@ impl Style {
     pub fn sum_densities(&mut self, atoms: &Atoms) -> Result<(), StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
-            let taken = converted.take(scale, atoms, None);
+            let (request, _) = converted.take(scale, atoms, None);
             // LAMMPS has ghosts on all sides of its atoms, also across periods.
-            engine.sum_densities(Surroundings::ghosts(Newton::On), &taken.request.particles)?;
+            engine.sum_densities(Surroundings::ghosts(Newton::On), &request.particles)?;
             Ok(())
         })
     }
@@ -139,12 +159,11 @@ impl Style {
         f: &mut [f64],
     ) -> Result<Totals, StyleError> {
         guard(|| {
-            let Style { engine, pending, scale, converted, .. } = self;
-            let pending = pending.take().ok_or_else(|| {
+            let pending = self.pending.take().ok_or_else(|| {
                 StyleError("the second half of an evaluation needs the first half before it".to_owned())
             })?;
-            let taken = converted.take(scale, atoms, Some(request));
-            let tally = taken.add_forces(scale, f, |request, f| pending.finish(engine, request, f))?;
+            let tally =
+                self.add_forces(atoms, request, f, |engine, request, f| pending.finish(engine, request, f))?;
             Ok(self.totals(&tally))
         })
     }

@@ -11,7 +11,6 @@ use psidpd_core::engine::{Engine, Path as EnginePath, Pending, Pool, Precision, 
 use psidpd_core::model::Model;
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 
 /// A model at the style's temperature, ready to compute.
 #[derive(Debug)]
@@ -25,11 +24,7 @@ pub struct Style {
     pub(crate) thermostat: Option<PairThermostat>,
     /// Iterations of the thermostat at earlier temperatures and settings.
     pub(crate) effort_before: Effort,
-    settings: Settings,
-    pub(crate) pool: Arc<Pool>,
     kt: f64,
-    /// Species of each type, from 0; entry 0 is unused, as LAMMPS counts types from 1.
-    pub(crate) kinds: Vec<i32>,
     /// Meaning of the letters of pair_coeff, for the log.
     letters: Option<&'static str>,
     /// One unit of the model in units of LAMMPS.
@@ -58,7 +53,7 @@ impl Style {
                 model.dimensions()
             )));
         }
-        // LAMMPS counts types from 1.
+        // Entry 0 is unused, as LAMMPS counts types from 1.
         let mut kinds = vec![-1];
         for name in names {
             let species = model.species().iter().position(|s| s == name);
@@ -75,8 +70,8 @@ impl Style {
             }
         }
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
-        let pool = Arc::new(Pool::new(settings.threads));
-        let engine = engine_at(&model, kt, &kinds, settings, &pool)?;
+        let mut engine = Engine::new(&model.at(kt)?, settings)?;
+        engine.map_kinds(&kinds)?;
         let thermostat = PairThermostat::new(engine.plan(), kt, &settings);
         Ok(Style {
             model,
@@ -84,10 +79,7 @@ impl Style {
             pending: None,
             thermostat,
             effort_before: Effort::default(),
-            settings,
-            pool,
             kt,
-            kinds,
             letters: None,
             scale: Scale::ONE,
             converted: Converted::default(),
@@ -98,19 +90,20 @@ impl Style {
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
         guard(|| {
             self.kt = kt / self.scale.energy;
-            self.rebuild()
+            self.rebuild(self.engine.settings())
         })
     }
 
-    fn rebuild(&mut self) -> Result<(), StyleError> {
+    fn rebuild(&mut self, settings: Settings) -> Result<(), StyleError> {
         self.effort_before = self.effort_so_far();
-        let mut engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
-        if let Some(mut device) = self.engine.use_device(None) {
-            device.set_fluid(&self.model.at(self.kt)?)?;
-            engine.use_device(Some(device));
+        let fluid = self.model.at(self.kt)?;
+        let device = self.engine.use_device(None);
+        self.engine.renew(&fluid, settings)?;
+        if let Some(mut device) = device {
+            device.set_fluid(&fluid)?;
+            self.engine.use_device(Some(device));
         }
-        self.engine = engine;
-        self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &self.settings);
+        self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &settings);
         Ok(())
     }
 
@@ -119,20 +112,12 @@ impl Style {
         guard(|| {
             let precision = if mixed { Precision::Mixed } else { Precision::Double };
             let threads = at_once(Pool::count(threads)?);
-            if (precision, threads) == (self.settings.precision, self.settings.threads) {
+            let settings = self.engine.settings();
+            if (precision, threads) == (settings.precision, settings.threads) {
                 return Ok(());
             }
-            if threads != self.settings.threads {
-                self.pool = Arc::new(Pool::new(threads));
-            }
-            self.settings = Settings { precision, threads, ..self.settings };
-            self.rebuild()
+            self.rebuild(Settings { precision, threads, ..settings })
         })
-    }
-
-    /// The number of threads that run.
-    pub fn threads(&self) -> usize {
-        self.settings.threads.get()
     }
 
     /// Describes the computation, and the letters of the coefficients, for the log.
@@ -204,32 +189,14 @@ impl Style {
 
     /// Local densities of owned particles, per unit volume of LAMMPS.
     pub fn local_densities(&mut self) -> &[f64] {
-        if self.scale.is_one() {
-            return self.engine.results().densities;
-        }
         let volume = self.scale.length.powi(self.model.dimensions() as i32);
         times(self.engine.results().densities, 1.0 / volume, &mut self.converted.densities)
     }
 
     /// ψ of owned particles, in LAMMPS's units of energy.
     pub fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {
-        guard(|| match self.scale.is_one() {
-            true => Ok(self.engine.excess()),
-            false => Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)),
-        })
+        guard(|| Ok(times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)))
     }
-}
-
-fn engine_at(
-    model: &Model,
-    kt: f64,
-    kinds: &[i32],
-    settings: Settings,
-    pool: &Arc<Pool>,
-) -> Result<Engine, StyleError> {
-    let mut engine = Engine::with_pool(&model.at(kt)?, settings, pool.clone())?;
-    engine.map_kinds(kinds)?;
-    Ok(engine)
 }
 
 #[cfg(test)]

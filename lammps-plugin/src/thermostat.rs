@@ -32,15 +32,16 @@ impl Style {
         heat: &Heat,
     ) -> Result<bool, StyleError> {
         guard(|| {
-            let Style { thermostat, engine, pool, kinds, scale, converted, .. } = self;
+            let Style { thermostat, engine, scale, converted, .. } = self;
             let Some(thermostat) = thermostat else { return Ok(false) };
             thermostat.take(engine);
             let around = Around { domain: &scale.domain(extent)?, images };
-            let taken = converted.take(scale, atoms, None);
+            let (request, _) = converted.take(scale, atoms, None);
             let unit = scale.velocity().powi(2) / scale.energy;
             let mass: &[f64] = &mass.iter().map(|m| m * unit).collect::<Vec<_>>();
-            let particles = Particles { owned: mass.len(), ..taken.request.particles };
-            let rank = Rank { around, particles, species_of_kind: kinds, mass };
+            let particles = Particles { owned: mass.len(), ..request.particles };
+            let pool = engine.pool();
+            let rank = Rank { around, particles, species_of_kind: &engine.plan().species_of_type, mass };
             thermostat.find_pairs_of_rank(pool, &rank, heat.time / scale.time, heat.virial)?;
             let law = if heat.uniform { Law::Uniform } else { Law::Gaussian };
             thermostat.draw(pool, heat.seed, heat.step, Stream(0), law);
@@ -53,7 +54,7 @@ impl Style {
         guard(|| {
             let Some(thermostat) = &mut self.thermostat else { return Ok([0.0; 6]) };
             let v = v.as_chunks_mut::<3>().0;
-            let virial = thermostat.act(&self.pool, Update::Midpoint, v);
+            let virial = thermostat.act(self.engine.pool(), Update::Midpoint, v);
             finite(v)?;
             Ok(virial)
         })
@@ -63,7 +64,7 @@ impl Style {
     pub fn thermostat_begin(&mut self, vectors: &mut [f64]) -> Result<Round, StyleError> {
         guard(|| {
             let Some(thermostat) = &mut self.thermostat else { return Ok(round(Need::Nothing([0.0; 6]))) };
-            Ok(round(thermostat.begin_midpoint(&self.pool, vectors.as_chunks_mut::<3>().0)?))
+            Ok(round(thermostat.begin_midpoint(self.engine.pool(), vectors.as_chunks_mut::<3>().0)?))
         })
     }
 
@@ -77,7 +78,7 @@ impl Style {
         guard(|| {
             let Some(thermostat) = &mut self.thermostat else { return Ok(round(Need::Nothing([0.0; 6]))) };
             let (vectors, v) = (vectors.as_chunks_mut::<3>().0, v.as_chunks_mut::<3>().0);
-            let need = thermostat.go_on(&self.pool, totals, vectors, v)?;
+            let need = thermostat.go_on(self.engine.pool(), totals, vectors, v)?;
             if let Need::Nothing(_) = need {
                 finite(v)?;
             }

@@ -24,12 +24,10 @@ impl Style {
 
     #[cfg(feature = "gpu")]
     fn use_gpu(&mut self, number: usize) -> Result<(), StyleError> {
-        use psidpd_core::engine::DevicePath;
         let failed = |error: psidpd_gpu::GpuError| StyleError(format!("device gpu: {error}"));
         let device = psidpd_gpu::Device::open(Some(number)).map_err(failed)?;
         let fluid = self.model.at(self.kt)?;
-        let mut forces = psidpd_gpu::GpuForces::new(&device, &fluid).map_err(failed)?;
-        forces.map_kinds(&self.kinds);
+        let forces = psidpd_gpu::GpuForces::new(&device, &fluid).map_err(failed)?;
         self.engine.use_device(Some(Box::new(forces)));
         Ok(())
     }

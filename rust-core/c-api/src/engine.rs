@@ -59,26 +59,24 @@ pub const PSIDPD_WANT_PARTICLE_VIRIAL: u32 = 8;
 /// For `want`: sum every density of the model, also those that no force needs.
 pub const PSIDPD_WANT_DENSITIES: u32 = 16;
 
-/// The bits of `want`.
-const WANT: u32 = PSIDPD_WANT_ENERGY
-    | PSIDPD_WANT_VIRIAL
-    | PSIDPD_WANT_PARTICLE_ENERGY
-    | PSIDPD_WANT_PARTICLE_VIRIAL
-    | PSIDPD_WANT_DENSITIES;
-
 /// Translates the bits of `want`; fails for other bits.
 pub(super) fn want_of(bits: u32) -> Result<engine::Want, Failure> {
-    if bits & !WANT != 0 {
-        return Err(Failure::argument(format!("want has unknown bits: {bits:#x}")));
-    }
-    let has = |bit| bits & bit != 0;
-    Ok(engine::Want {
+    let mut rest = bits;
+    let mut has = |bit: u32| {
+        rest &= !bit;
+        bits & bit != 0
+    };
+    let want = engine::Want {
         energy: has(PSIDPD_WANT_ENERGY),
         virial: has(PSIDPD_WANT_VIRIAL),
         particle_energy: has(PSIDPD_WANT_PARTICLE_ENERGY),
         particle_virial: has(PSIDPD_WANT_PARTICLE_VIRIAL),
         densities: has(PSIDPD_WANT_DENSITIES),
-    })
+    };
+    match rest {
+        0 => Ok(want),
+        _ => Err(Failure::argument(format!("want has unknown bits: {bits:#x}"))),
+    }
 }
 
 /// # Safety

@@ -110,8 +110,9 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
         unsafe {
             let engine = exclusive(engine, "engine")?;
             let domain = copied(r#box, "box")?.domain()?;
-            complete(engine, request, force, tally, |engine, _, request, force| {
-                engine.forces(&domain, request, force, true)
+            complete(engine, request, force, tally, |engine, request, force| {
+                engine.state = State::Nothing;
+                Ok(engine.engine.forces(&domain, request, force, true)?)
             })
         }
     })
@@ -214,24 +215,21 @@ pub unsafe extern "C" fn psidpd_engine_second(
             if !matches!(engine.state, State::First(_)) {
                 return Err(not_before("psidpd_engine_first"));
             }
-            let first_forces = std::mem::take(&mut engine.first_forces);
-            let done = complete(engine, request, force, tally, |engine, state, request, force| {
-                let State::First(pending) = state else {
-                    return Err(engine::EngineError::Host("there is no first half"));
+            complete(engine, request, force, tally, |engine, request, force| {
+                let State::First(pending) = std::mem::replace(&mut engine.state, State::Nothing) else {
+                    return Err(not_before("psidpd_engine_first"));
                 };
-                let sums = pending.finish(engine, request, force)?;
-                for (force, first) in force.iter_mut().zip(&first_forces) {
+                let sums = pending.finish(&mut engine.engine, request, force)?;
+                for (force, first) in force.iter_mut().zip(&engine.first_forces) {
                     (0..3).for_each(|c| force[c] += first[c]);
                 }
                 Ok(sums)
-            });
-            engine.first_forces = first_forces;
-            done
+            })
         }
     })
 }
 
-/// Adds to `force` the forces that `work` computes, and puts their sums in `*tally`.
+/// Adds to `force` the forces that `work` computes, and puts their sums in `*tally`. `work` discards the state of before.
 ///
 /// # Safety
 /// `request` is null or at a request, whose arrays are as long as it says; `force` is null or has three numbers for each
@@ -241,12 +239,7 @@ unsafe fn complete(
     request: *const Request,
     force: *mut f64,
     tally: *mut Tally,
-    work: impl FnOnce(
-        &mut engine::Engine,
-        State,
-        &engine::Request,
-        &mut [[f64; 3]],
-    ) -> Result<engine::Tally, engine::EngineError>,
+    work: impl FnOnce(&mut Engine, &engine::Request, &mut [[f64; 3]]) -> Result<Tally, Failure>,
 ) -> Result<(), Failure> {
     // SAFETY: the caller promises that `request` is null or at a request.
     let given = unsafe { copied(request, "request")? };
@@ -259,8 +252,7 @@ unsafe fn complete(
     // overlaps none of those that have as many.
     let (request, force) =
         unsafe { (given.checked(engine)?, array_mut(force.cast::<[f64; 3]>(), all, "force")?) };
-    let state = std::mem::replace(&mut engine.state, State::Nothing);
-    let sums = work(&mut engine.engine, state, &request, force)?;
+    let sums = work(engine, &request, force)?;
     engine.state = State::Whole;
     if let Some(out) = out {
         out.put(sums);

@@ -1,6 +1,6 @@
 //! What a host passes to a simulation, and what it gets back.
 
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{PeriodicBox, Tally};
 
 /// Box, masses and forces from outside.
 #[derive(Debug, Clone)]
@@ -77,14 +77,8 @@ pub enum Rule {
 /// Sums over particles and pairs at the end of a step. Tensors have the order xx, yy, zz, xy, xz, yz.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Totals {
-    /// Sum of the excess free energies.
-    pub excess: f64,
-    /// Sum of the pair energies, with those of densities that every ψ is linear in.
-    pub pair: f64,
-    /// Virial `Σ r_ij ⊗ F_ij` of the conservative forces.
-    pub virial: [f64; 6],
-    /// Virial of drag and noise; of the thermostat's impulses over Δt where it is not part of the forces.
-    pub thermostat_virial: [f64; 6],
+    /// Energies and virials; that of the thermostat is of its impulses over Δt where it is not part of the forces.
+    pub tally: Tally,
     /// `Σ m v v`.
     pub momentum_flux: [f64; 6],
     /// `Σ m v`.

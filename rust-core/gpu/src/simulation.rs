@@ -11,6 +11,7 @@ use crate::settings::{FROZEN, MOST_BODY_FORCES};
 use crate::shader::{ENTRIES, Shader};
 use crate::{Device, GpuError, Particles, Rule, Settings, Totals, Unsupported};
 use arrays::{Arrays, BOXES, COUNTS, FORCES, POSITIONS, SUMS, VELOCITIES};
+use psidpd_core::engine::Tally;
 use psidpd_core::model::Fluid;
 
 /// Device time of one kernel.
@@ -340,10 +341,12 @@ fn sums_of(partial: &[f32]) -> Totals {
     let entries = || partial.chunks_exact(ENTRIES as usize);
     let sum = |k: usize| entries().map(|block| f64::from(block[k])).sum::<f64>();
     Totals {
-        excess: sum(0),
-        pair: sum(1),
-        virial: std::array::from_fn(|k| sum(2 + k)),
-        thermostat_virial: std::array::from_fn(|k| sum(8 + k)),
+        tally: Tally {
+            excess: sum(0),
+            pair: sum(1),
+            virial: std::array::from_fn(|k| sum(2 + k)),
+            thermostat_virial: std::array::from_fn(|k| sum(8 + k)),
+        },
         momentum_flux: std::array::from_fn(|k| sum(14 + k)),
         momentum: std::array::from_fn(|k| sum(20 + k)),
         support_force: std::array::from_fn(|k| sum(23 + k)),

@@ -243,7 +243,6 @@ fn what_a_gpu_cannot_do_is_done_otherwise_or_refused() {
     // The engine goes on at another temperature.
     let mut gpu = engine.use_device(None).unwrap();
     gpu.set_fluid(&model.at(2.0).unwrap()).unwrap();
-    gpu.map_kinds(&[-1, 0, -1, -1, -1]);
     engine.use_device(Some(gpu));
     assert!((energy(&mut engine, &all, Want::TOTALS).unwrap() / cold - 2.0).abs() < 1e-5);
     // Particles that do not interact, and faults.

@@ -56,8 +56,8 @@ fn errors(device: &Device, fluid: &Fluid, domain: &PeriodicBox, particles: &Part
         conservative,
         difference((&found, &found.force), (particles, &all)) / largest(&all),
         // Energies that cancel are known to 10⁻⁶ kT per particle.
-        (totals.excess + totals.pair - truth.energy).abs() / truth.energy.abs().max(x.len() as f64),
-        error(totals.virial, truth.virial).max(error(with_heat.thermostat_virial, of_heat)),
+        (totals.tally.energy() - truth.energy).abs() / truth.energy.abs().max(x.len() as f64),
+        error(totals.tally.virial, truth.virial).max(error(with_heat.tally.thermostat_virial, of_heat)),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! The calls of the engine to each of its paths.
 
 use super::error::EngineError;
-use super::request::{Request, Results};
+use super::request::Request;
 use super::surroundings::Surroundings;
 use crate::model::Fluid;
 use psidpd_passes::domain::PeriodicBox;
@@ -31,20 +31,11 @@ pub trait Evaluate {
     /// The second half of an evaluation, with the slopes of ghosts: adds the other forces.
     fn second(&mut self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError>;
 
-    /// Slopes of owned particles in the last evaluation, followed by those of ghosts.
-    fn slopes(&self) -> &[f64];
-
-    /// The slopes, for the host to write those of ghosts.
+    /// Slopes of owned particles in the last evaluation, followed by those of ghosts, which the host writes.
     fn slopes_mut(&mut self) -> &mut Vec<f64>;
 
     /// Gets the slopes of owned particles after [`Evaluate::whole`], with room for `all`.
     fn fetch_slopes(&mut self, all: usize);
-
-    /// Values of single particles in the last evaluation.
-    fn results(&self) -> Results<'_>;
-
-    /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
-    fn excess(&mut self) -> &[f64];
 }
 
 /// A path of another crate, for a GPU: [`Engine::use_device`](super::Engine::use_device).

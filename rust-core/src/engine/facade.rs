@@ -96,26 +96,7 @@ impl Engine {
     /// # Errors
     /// Fails as [`Plan::new`].
     pub fn new(fluid: &Fluid, settings: Settings) -> Result<Engine, TooLarge> {
-        Engine::with_pool(fluid, settings, Arc::new(Pool::new(settings.threads)))
-    }
-
-    /// Creates an engine with a given thread pool, which others may use too.
-    ///
-    /// # Errors
-    /// Fails as [`Plan::new`].
-    pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Engine, TooLarge> {
-        Ok(Engine::of_plan(Plan::new(fluid)?, settings, pool))
-    }
-
-    /// Creates an engine with a faulty sweep, for tests that a check finds the fault.
-    ///
-    /// # Errors
-    /// Fails as [`Plan::new`].
-    #[doc(hidden)]
-    pub fn with_fault(fluid: &Fluid, settings: Settings, fault: Fault) -> Result<Engine, TooLarge> {
-        let mut plan = Plan::new(fluid)?;
-        plan.fault = Some(fault);
-        Ok(Engine::of_plan(plan, settings, Arc::new(Pool::new(settings.threads))))
+        Ok(Engine::of_plan(Plan::new(fluid)?, settings, Arc::new(Pool::new(settings.threads))))
     }
 
     fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
@@ -127,6 +108,34 @@ impl Engine {
             path: None,
             number: 0,
         }
+    }
+
+    /// Takes the same model at another temperature, or other settings. The map of types and the restriction to sums over
+    /// pairs stay. Counts begin anew; there are no special pairs, no exclusions and no device.
+    ///
+    /// # Errors
+    /// Fails as [`Plan::new`].
+    pub fn renew(&mut self, fluid: &Fluid, settings: Settings) -> Result<(), TooLarge> {
+        let mut plan = Plan::new(fluid)?;
+        plan.species_of_type.clone_from(&self.plan().species_of_type);
+        self.replace(plan, settings);
+        Ok(())
+    }
+
+    /// Makes the sweep faulty until the engine is renewed, for tests that a check finds the fault.
+    #[doc(hidden)]
+    pub fn falsify(&mut self, fault: Fault) {
+        let mut plan = self.plan().clone();
+        plan.fault = Some(fault);
+        self.replace(plan, self.settings());
+    }
+
+    fn replace(&mut self, plan: Plan, settings: Settings) {
+        let pool = match settings.threads == self.settings().threads {
+            true => Arc::clone(self.pool()),
+            false => Arc::new(Pool::new(settings.threads)),
+        };
+        *self = Engine { pair_sums_only: self.pair_sums_only, ..Engine::of_plan(plan, settings, pool) };
     }
 
     /// The plan of the fluid's passes.
@@ -174,11 +183,14 @@ impl Engine {
         self.sweep.sweep.plan.map_kinds(kinds)
     }
 
-    /// Makes later evaluations on a GPU, or on none, and returns the one before. The host then maps its types again.
+    /// Makes later evaluations on a GPU, or on none, and returns the one before.
     ///
     /// The GPU computes forces and totals; sums over pairs compute what else is requested. There may be no special
     /// pairs and no exclusions.
-    pub fn use_device(&mut self, device: Option<Box<dyn DevicePath>>) -> Option<Box<dyn DevicePath>> {
+    pub fn use_device(&mut self, mut device: Option<Box<dyn DevicePath>>) -> Option<Box<dyn DevicePath>> {
+        if let Some(device) = &mut device {
+            device.map_kinds(&self.plan().species_of_type);
+        }
         std::mem::replace(&mut self.device, device)
     }
 
@@ -215,14 +227,12 @@ impl Engine {
 
     /// The path that an evaluation of `want` would take.
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
-        let fits = match surroundings {
-            Surroundings::Listed(..) => return Path::PairSums(Reason::ListedPairs),
-            Surroundings::Box(domain) | Surroundings::Ghosts(Around { domain, .. }, _) => {
-                match &self.device {
-                    Some(device) => device.fits(domain),
-                    None => self.sweep.sweep.fits(domain),
-                }
-            }
+        let Some(Around { domain, .. }) = surroundings.around() else {
+            return Path::PairSums(Reason::ListedPairs);
+        };
+        let fits = match &self.device {
+            Some(device) => device.fits(domain),
+            None => self.sweep.sweep.fits(domain),
         };
         if self.pair_sums_only {
             Path::PairSums(Reason::Asked)
@@ -318,14 +328,6 @@ impl Engine {
     }
 
     /// The path of the last evaluation.
-    fn last(&self) -> &dyn Evaluate {
-        match (self.path, &self.device) {
-            (Some(Path::PairSums(_)), _) => &self.pair_sums,
-            (Some(Path::Device), Some(device)) => &**device,
-            _ => &self.sweep,
-        }
-    }
-
     fn last_mut(&mut self) -> &mut dyn Evaluate {
         match (self.path, &mut self.device) {
             (Some(Path::PairSums(_)), _) => &mut self.pair_sums,
@@ -341,12 +343,11 @@ impl Engine {
 
     /// Values of single particles in the last evaluation.
     pub fn results(&self) -> Results<'_> {
-        // Densities after an evaluation on a GPU are summed by this engine.
-        let last: &dyn Evaluate = if self.path == Some(Path::Device) { &self.sweep } else { self.last() };
-        let results = last.results();
-        Results {
-            order: results.order.filter(|_| self.path.is_some_and(|path| path != Path::Device)),
-            ..results
+        let order = (self.path == Some(Path::Sweep)).then(|| self.sweep.sweep.order());
+        match self.path {
+            Some(Path::PairSums(_)) => self.pair_sums.results(),
+            // Densities after an evaluation on a GPU are summed by this engine.
+            _ => Results { densities: &self.sweep.densities, order, ..Results::default() },
         }
     }
 
@@ -381,10 +382,11 @@ impl Engine {
 
     /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
     pub fn excess(&mut self) -> &[f64] {
-        if self.path.is_none() {
-            return &[];
+        match self.path {
+            Some(Path::PairSums(_)) => &self.pair_sums.excess,
+            Some(Path::Sweep) => self.sweep.excess(),
+            Some(Path::Device) | None => &[],
         }
-        self.last_mut().excess()
     }
 
     /// Gets the slopes of owned particles after [`Engine::forces`], with room for `all` particles and ghosts;
@@ -404,8 +406,11 @@ impl Engine {
     ///
     /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
     /// density. The force includes the many-body part, if slopes are available.
-    pub fn single(&self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
-        self.pair_sums.single(kinds, r, self.last().slopes(), particles)
+    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
+        let slopes = std::mem::take(self.last_mut().slopes_mut());
+        let found = self.pair_sums.single(kinds, r, &slopes, particles);
+        *self.last_mut().slopes_mut() = slopes;
+        found
     }
 
     /// Size in bytes of the arrays over particles and pairs.

@@ -39,7 +39,7 @@ pub struct Plan {
     title: String,
     /// The species of each of the host's types, negative for particles that do not interact; at first types are species
     /// indices.
-    pub(super) species_of_type: Vec<i32>,
+    pub species_of_type: Vec<i32>,
     /// Whether the forces have a potential.
     pub conservative: bool,
 }

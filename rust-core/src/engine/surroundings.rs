@@ -13,10 +13,19 @@ pub enum Surroundings<'a> {
     Listed(PairsOfHost<'a>, Newton),
 }
 
-impl Surroundings<'_> {
+impl<'a> Surroundings<'a> {
     /// A rank whose ghosts stand for everything beyond its own particles, including periodic images.
     pub fn ghosts(newton: Newton) -> Surroundings<'static> {
         Surroundings::Ghosts(Around { domain: &PeriodicBox::OPEN, images: &[] }, newton)
+    }
+
+    /// The box and its ghosts; `None` if the host lists the pairs.
+    pub fn around(self) -> Option<Around<'a>> {
+        match self {
+            Surroundings::Box(domain) => Some(Around { domain, images: &[] }),
+            Surroundings::Ghosts(around, _) => Some(around),
+            Surroundings::Listed(..) => None,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::error::EngineError;
 use super::evaluate::Evaluate;
 use super::fault::Fault;
 use super::pair_sums::Corrections;
-use super::request::{Request, Results};
+use super::request::Request;
 use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::Sweep;
 use psidpd_passes::domain::PeriodicBox;
@@ -67,6 +67,14 @@ impl SweepPath {
         !self.densities.is_empty()
     }
 
+    /// ψ of owned particles in the last evaluation.
+    pub fn excess(&mut self) -> &[f64] {
+        if self.excess.is_empty() {
+            self.sweep.local_densities(&mut self.excess, &mut Vec::new());
+        }
+        &self.excess
+    }
+
     /// Computes the contributions of special pairs, and adds those to the densities.
     fn begin(&mut self, around: Around, request: &Request) -> Result<(), EngineError> {
         let SweepPath { sweep, special, corrections, excludes_special, .. } = self;
@@ -121,11 +129,7 @@ impl Evaluate for SweepPath {
         request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<(), EngineError> {
-        let around = match surroundings {
-            Surroundings::Ghosts(around, _) => around,
-            Surroundings::Box(domain) => Around { domain, images: &[] },
-            Surroundings::Listed(..) => return Err(EngineError::Host("a sweep finds its pairs itself")),
-        };
+        let around = surroundings.around().ok_or(EngineError::Host("a sweep finds its pairs itself"))?;
         self.begin(around, request)?;
         self.sweep.first(around, request, force)
     }
@@ -139,26 +143,11 @@ impl Evaluate for SweepPath {
         Ok(tally)
     }
 
-    fn slopes(&self) -> &[f64] {
-        &self.sweep.slopes
-    }
-
     fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.sweep.slopes
     }
 
     fn fetch_slopes(&mut self, all: usize) {
         self.sweep.fetch_slopes(all);
-    }
-
-    fn results(&self) -> Results<'_> {
-        Results { densities: &self.densities, order: Some(self.sweep.order()), ..Results::default() }
-    }
-
-    fn excess(&mut self) -> &[f64] {
-        if self.excess.is_empty() {
-            self.sweep.local_densities(&mut self.excess, &mut Vec::new());
-        }
-        &self.excess
     }
 }

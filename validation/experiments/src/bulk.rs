@@ -88,7 +88,7 @@ pub fn run(
 ) -> Result<Observed, RunError> {
     let mut runner = Runner::begin(scene, folder, begin)?;
     runner.set_threads(threads)?;
-    fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
+    fault.into_iter().for_each(|fault| runner.falsify(fault));
     let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
     runner.run_to_end(&mut |p| bar.set(p.step))?;

@@ -47,7 +47,7 @@ pub fn simulation(
 ) -> Result<Simulation, ExperimentError> {
     let mut simulation = Simulation::new(model, kt, state.clone(), seed)?;
     simulation.set_settings(Settings { precision, ..Settings::default() })?;
-    fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
+    fault.into_iter().for_each(|fault| simulation.falsify(fault));
     Ok(simulation)
 }
 

@@ -47,15 +47,15 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let mut simulation = Simulation::new(&model, kt.unwrap_or(arguments.kt), state, 1)?;
     // Other codes are compared with the plain sum over pairs.
     simulation.use_pair_sums_only(true);
-    simulation.sum_all_densities(true);
-    simulation.compute(Want::TOTALS, None)?;
-    let width = simulation.local_densities().len() / simulation.len().max(1);
+    simulation.compute(Want { densities: true, ..Want::TOTALS }, None)?;
+    let densities = simulation.engine().results().densities;
+    let width = densities.len() / simulation.len().max(1);
     let forces = Forces {
         energy: simulation.potential_energy(),
         virial: simulation.tally().virial,
         density: match width {
             0 => vec![Vec::new(); simulation.len()],
-            _ => simulation.local_densities().chunks_exact(width).map(<[f64]>::to_vec).collect(),
+            _ => densities.chunks_exact(width).map(<[f64]>::to_vec).collect(),
         },
         forces: simulation.forces().to_vec(),
     };

@@ -8,9 +8,9 @@ use super::arrays::{COUNTS, EXCHANGE, POSITIONS, STATUS, SUMS, VELOCITIES};
 use super::status::Status;
 use super::{read, sums_of};
 use crate::geometry::Geometry;
-use crate::{Device, Fault, GpuError, Settings, Totals};
+use crate::{Device, Fault, GpuError, Settings};
 use psidpd_core::engine::{
-    Around, DevicePath, EngineError, Evaluate, PeriodicBox, Request, Results, Surroundings, Tally,
+    Around, DevicePath, EngineError, Evaluate, PeriodicBox, Request, Surroundings, Tally,
 };
 use psidpd_core::model::Fluid;
 
@@ -162,7 +162,7 @@ impl GpuForces {
     }
 
     /// Reads `width` numbers of each owned particle and, if asked for, the totals; fails if a kernel found a fault.
-    fn collect(&mut self, width: usize, totals: bool) -> Result<(Vec<f32>, Status, Totals), EngineError> {
+    fn collect(&mut self, width: usize, totals: bool) -> Result<(Vec<f32>, Status, Tally), EngineError> {
         let numbers = self.owned * width;
         let machine = &mut self.machine;
         let Some(arrays) = &machine.arrays else {
@@ -186,9 +186,9 @@ impl GpuForces {
                 Fault::Velocity | Fault::Runaway => EngineError::Device(stop.to_string()),
             });
         }
-        let totals = sums_of(&found[numbers + size_of::<Status>() / 4..]);
+        let tally = sums_of(&found[numbers + size_of::<Status>() / 4..]).tally;
         found.truncate(numbers);
-        Ok((found, status, totals))
+        Ok((found, status, tally))
     }
 
     /// Copies the slopes of owned particles to the host, with room for `all`.
@@ -230,16 +230,15 @@ impl GpuForces {
             runs.all("give_forces", [0.0; 4], 0);
         });
         machine.submit(&list).map_err(failed)?;
-        let (found, status, sums) = self.collect(3, totals)?;
+        let (found, status, tally) = self.collect(3, totals)?;
         self.machine.count_status(&status);
-        let Totals { excess, pair, virial, thermostat_virial, .. } = sums;
         for (place, f) in self.places.iter().zip(found.as_chunks::<3>().0) {
             let Some(sum) = force.get_mut(*place as usize) else {
                 return Err(EngineError::Host("there is no room for the forces on owned particles"));
             };
             (0..3).for_each(|k| sum[k] += f64::from(f[k]));
         }
-        Ok(Tally { excess, pair, virial, thermostat_virial })
+        Ok(tally)
     }
 }
 
@@ -264,11 +263,7 @@ impl Evaluate for GpuForces {
         request: &Request,
         _: &mut [[f64; 3]],
     ) -> Result<(), EngineError> {
-        let around = match surroundings {
-            Surroundings::Ghosts(around, _) => around,
-            Surroundings::Box(domain) => Around { domain, images: &[] },
-            Surroundings::Listed(..) => return Err(EngineError::Host("a gpu finds its pairs itself")),
-        };
+        let around = surroundings.around().ok_or(EngineError::Host("a gpu finds its pairs itself"))?;
         self.load(around, request)?;
         if self.width() > 0 && !self.places.is_empty() {
             let totals = request.want.energy || request.want.virial;
@@ -296,10 +291,6 @@ impl Evaluate for GpuForces {
         self.finish(request, force, false)
     }
 
-    fn slopes(&self) -> &[f64] {
-        &self.slopes
-    }
-
     fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.slopes
     }
@@ -308,14 +299,6 @@ impl Evaluate for GpuForces {
         if self.give_slopes(all).is_err() {
             self.slopes.fill(f64::NAN);
         }
-    }
-
-    fn results(&self) -> Results<'_> {
-        Results::default()
-    }
-
-    fn excess(&mut self) -> &[f64] {
-        &[]
     }
 }
 

@@ -69,7 +69,7 @@ pub struct PairSums {
     /// Whether all densities are summed, or only those that forces need.
     has_all_densities: bool,
     /// ψ of owned particles.
-    excess: Vec<f64>,
+    pub(super) excess: Vec<f64>,
     slopes: Vec<f64>,
     particle_energy: Vec<f64>,
     particle_virial: Vec<[f64; 6]>,
@@ -148,12 +148,8 @@ impl PairSums {
         }
         if !self.special.is_empty() || !self.exclusions.marks.is_empty() {
             self.exclusions.check(species.len())?;
-            let domain = match surroundings {
-                Surroundings::Box(domain) => domain,
-                Surroundings::Ghosts(around, _) => around.domain,
-                Surroundings::Listed(..) => {
-                    return Err(EngineError::Host("special pairs cannot be combined with listed pairs"));
-                }
+            let Some(Around { domain, .. }) = surroundings.around() else {
+                return Err(EngineError::Host("special pairs cannot be combined with listed pairs"));
             };
             scale(&mut self.pairs, &self.special, &self.exclusions, domain, dimensions, cutoff)?;
         }
@@ -204,6 +200,16 @@ impl PairSums {
             self.sum_densities(true);
         }
         Ok(&self.densities)
+    }
+
+    /// Values of single particles in the last evaluation.
+    pub(super) fn results(&self) -> Results<'_> {
+        Results {
+            densities: &self.densities,
+            particle_energy: &self.particle_energy,
+            particle_virial: &self.particle_virial,
+            order: None,
+        }
     }
 
     fn evaluate_excess(&mut self, tag: &[i32]) -> Result<(), EngineError> {
@@ -302,28 +308,11 @@ impl Evaluate for PairSums {
         }
     }
 
-    fn slopes(&self) -> &[f64] {
-        &self.slopes
-    }
-
     fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.slopes
     }
 
     fn fetch_slopes(&mut self, all: usize) {
         self.slopes.resize(self.plan.slope_width() * all, 0.0);
-    }
-
-    fn results(&self) -> Results<'_> {
-        Results {
-            densities: &self.densities,
-            particle_energy: &self.particle_energy,
-            particle_virial: &self.particle_virial,
-            order: None,
-        }
-    }
-
-    fn excess(&mut self) -> &[f64] {
-        &self.excess
     }
 }

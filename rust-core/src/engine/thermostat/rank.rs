@@ -52,17 +52,12 @@ impl PairThermostat {
         virial: bool,
     ) -> Result<(), EngineError> {
         let Rank { around, particles, species_of_kind, mass } = *rank;
-        let all = particles.x.len();
-        if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
-            return Err(EngineError::Host("particle arrays have different lengths"));
-        }
+        particles.check(31)?;
         if mass.len() != particles.owned {
             return Err(EngineError::Host("`mass` must have one entry per owned particle"));
         }
-        if !around.images.is_empty() && around.images.len() != all - particles.owned {
-            return Err(EngineError::Host("`images` must have one entry per ghost"));
-        }
-        if all > 1 << 26 {
+        particles.check_images(around.images)?;
+        if particles.x.len() > 1 << 26 {
             return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
         }
         let species = self.plan.gamma.len().isqrt() as i32;

@@ -99,7 +99,7 @@ fn energy_is_conserved_to_second_order() {
                 squares += (energy(&run) - first).powi(2);
                 count += 1.0;
             }
-            assert_eq!(run.counts().noise, 0);
+            assert_eq!(run.engine().statistics().counts.noise, 0);
         }
         (squares / count).sqrt() / run.len() as f64
     };
@@ -115,7 +115,7 @@ fn momentum_is_conserved() {
         let mut run = simulation(SET6, settled());
         advance(&mut run, 200, 0.01, integrator);
         assert!(momentum(&run).iter().all(|p| p.abs() < 1e-10), "{:?}", momentum(&run));
-        assert!(run.counts().noise > 0);
+        assert!(run.engine().statistics().counts.noise > 0);
     }
 }
 

@@ -74,7 +74,7 @@ fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, Experime
         Ok(runner) => runner,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
     };
-    fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
+    fault.into_iter().for_each(|fault| runner.falsify(fault));
     let mut warnings = Vec::new();
     // An unusual start may be hot or cold until it has settled.
     let last = scene.stages.last().map_or("", |stage| stage.name.as_str());
@@ -137,7 +137,7 @@ fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, ExperimentError>
 fn simulation(scene: &Scene, state: State, fault: Option<Fault>) -> Result<Simulation, RunError> {
     let mut run = scene.simulation(state)?;
     run.set_settings(Settings { precision: scene.precision(), ..Settings::default() })?;
-    fault.map_or(Ok(()), |fault| run.falsify(fault))?;
+    fault.into_iter().for_each(|fault| run.falsify(fault));
     run.set_reordering(true);
     Ok(run)
 }

@@ -4,8 +4,7 @@ use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Fault, PassCounts, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally,
-    Want,
+    self, Engine, Fault, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally, Want,
 };
 use psidpd_core::model::Model;
 
@@ -17,8 +16,6 @@ pub(super) struct Forces {
     pub tally: Tally,
     /// The number of the positions of the last evaluation, [`Particles::moves`].
     moves: u64,
-    all_densities: bool,
-    pair_sums_only: bool,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
     pub earlier_out_of_bounds: [u64; 2],
 }
@@ -32,8 +29,6 @@ impl Forces {
             kt,
             tally: Tally::default(),
             moves: 0,
-            all_densities: false,
-            pair_sums_only: false,
             earlier_out_of_bounds: [0; 2],
         })
     }
@@ -55,8 +50,6 @@ impl Forces {
             }
             self.check_width(&state.domain)?;
         }
-        let step = step.filter(|_| self.engine.plan().needs_velocities());
-        let want = Want { densities: want.densities || self.all_densities, ..want };
         let particles =
             engine::Particles { owned: state.len(), x: &state.x, tag: &state.tag, kind: &state.species };
         let request = Request { particles, v: &state.v, step, want };
@@ -91,17 +84,12 @@ impl Forces {
         }
     }
 
-    pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
-        let (settings, pool) = (self.engine.settings(), self.engine.pool().clone());
-        self.replace(Engine::with_pool(&self.model.at(kt)?, settings, pool)?);
-        self.kt = kt;
+    /// Takes another temperature, or other settings.
+    pub fn renew(&mut self, kt: f64, settings: Settings) -> Result<(), RunError> {
+        let out_of_bounds = self.out_of_bounds();
+        self.engine.renew(&self.model.at(kt)?, settings)?;
+        (self.kt, self.earlier_out_of_bounds) = (kt, out_of_bounds);
         Ok(())
-    }
-
-    fn replace(&mut self, engine: Engine) {
-        self.earlier_out_of_bounds = self.out_of_bounds();
-        self.engine = engine;
-        self.engine.use_pair_sums_only(self.pair_sums_only);
     }
 
     pub fn out_of_bounds(&self) -> [u64; 2] {
@@ -114,17 +102,14 @@ impl Simulation {
     /// Makes forces wrong until settings or the temperature are set: tests use it to check that errors of
     /// forces are noticed.
     #[doc(hidden)]
-    pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
-        let Forces { model, kt, engine, .. } = &self.forces;
-        let engine = Engine::with_fault(&model.at(*kt)?, engine.settings(), fault)?;
-        self.forces.replace(engine);
-        Ok(())
+    pub fn falsify(&mut self, fault: Fault) {
+        self.forces.earlier_out_of_bounds = self.forces.out_of_bounds();
+        self.forces.engine.falsify(fault);
     }
 
     /// Sets the settings of later evaluations; the default is double precision on one thread.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
-        let Forces { model, kt, .. } = &self.forces;
-        self.forces.replace(Engine::new(&model.at(*kt)?, settings)?);
+        self.forces.renew(self.kt(), settings)?;
         self.thermostat.follow(&self.forces);
         Ok(())
     }
@@ -142,9 +127,8 @@ impl Simulation {
         if let Some(name) = self.device_name() {
             return format!("{name}, in single precision, with positions exact to 2^-32 of the box");
         }
-        let Forces { engine, all_densities, .. } = &self.forces;
-        let want = Want { densities: *all_densities, ..Want::FORCES };
-        engine.path_for(Surroundings::Box(&self.particles.now().domain), want).describe(engine.settings())
+        let path = self.engine().path_for(Surroundings::Box(&self.particles.now().domain), Want::FORCES);
+        path.describe(self.settings())
     }
 
     pub fn model(&self) -> &Model {
@@ -168,25 +152,8 @@ impl Simulation {
         self.forces.out_of_bounds()
     }
 
-    /// Number of runs of each pass of the engine since the last change of temperature.
-    pub fn counts(&self) -> PassCounts {
-        self.forces.engine.statistics().counts
-    }
-
-    /// Local densities of the particles in the last evaluation, if [`Simulation::sum_all_densities`] enabled
-    /// them: one for each density and species, density-major.
-    pub fn local_densities(&self) -> &[f64] {
-        self.forces.engine.results().densities
-    }
-
-    /// Sets whether evaluations compute every density of the model.
-    pub fn sum_all_densities(&mut self, all: bool) {
-        self.forces.all_densities = all;
-    }
-
     /// Sets whether the pair sums do every evaluation; they are slower and use double precision.
     pub fn use_pair_sums_only(&mut self, only: bool) {
-        self.forces.pair_sums_only = only;
         self.forces.engine.use_pair_sums_only(only);
     }
 

@@ -9,7 +9,7 @@ use crate::device::{DeviceError, refused_step};
 use crate::integrator::Integrator;
 use crate::particles::BodyForce;
 use psidpd_core::engine::thermostat::Effort;
-use psidpd_core::engine::{EngineError, Tally, Want};
+use psidpd_core::engine::{EngineError, Want};
 use psidpd_gpu::{self as gpu, Fault, GpuError, GpuSimulation, Rule, Stop};
 use std::time::{Duration, Instant};
 
@@ -241,9 +241,8 @@ impl Simulation {
 
     fn take_totals(&mut self) -> Result<(), RunError> {
         let Some(gpu) = &mut self.gpu else { return Ok(()) };
-        let gpu::Totals { excess, pair, virial, thermostat_virial, momentum_flux, support_force, .. } =
-            gpu.machine.totals().map_err(failed)?;
-        self.forces.tally = Tally { excess, pair, virial, thermostat_virial };
+        let gpu::Totals { tally, momentum_flux, support_force, .. } = gpu.machine.totals().map_err(failed)?;
+        self.forces.tally = tally;
         self.particles.set_momentum_flux(momentum_flux);
         self.external.support_force = support_force;
         Ok(())

@@ -85,7 +85,7 @@ impl Simulation {
     /// Sets the temperature of the thermostat and of every formula with kT.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt() {
-            self.forces.set_temperature(kt)?;
+            self.forces.renew(kt, self.settings())?;
             self.thermostat.follow(&self.forces);
             self.monte_carlo.energy = None;
         }
