@@ -85,6 +85,4 @@ pub struct Totals {
     pub momentum: [f64; 3],
     /// The sum of all forces on frozen particles.
     pub support_force: [f64; 3],
-    /// The largest component of a force, in magnitude.
-    pub largest_force: f64,
 }

@@ -338,8 +338,7 @@ impl GpuSimulation {
 
 /// The sums of all workgroups.
 fn sums_of(partial: &[f32]) -> Totals {
-    let entries = || partial.chunks_exact(ENTRIES as usize);
-    let sum = |k: usize| entries().map(|block| f64::from(block[k])).sum::<f64>();
+    let sum = |k: usize| partial.chunks_exact(ENTRIES as usize).map(|block| f64::from(block[k])).sum::<f64>();
     Totals {
         tally: Tally {
             excess: sum(0),
@@ -350,7 +349,6 @@ fn sums_of(partial: &[f32]) -> Totals {
         momentum_flux: std::array::from_fn(|k| sum(14 + k)),
         momentum: std::array::from_fn(|k| sum(20 + k)),
         support_force: std::array::from_fn(|k| sum(23 + k)),
-        largest_force: entries().map(|block| f64::from(block[26])).fold(0.0, f64::max),
     }
 }
 

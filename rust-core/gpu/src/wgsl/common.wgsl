@@ -317,17 +317,6 @@ fn sum_of_group(value: f32, lane: u32) -> f32 {
     return shared_sums[0];
 }
 
-fn largest_of_group(value: f32, lane: u32) -> f32 {
-    workgroupBarrier();
-    shared_sums[lane] = value;
-    for (var half = LANES / 2u; half > 0u; half /= 2u) {
-        workgroupBarrier();
-        if (lane < half) { shared_sums[lane] = max(shared_sums[lane], shared_sums[lane + half]); }
-    }
-    workgroupBarrier();
-    return shared_sums[0];
-}
-
 fn store_sum(block: u32, entry: u32, value: f32, lane: u32) {
     let sum = sum_of_group(value, lane);
     // The last row of groups may be longer than needed.

@@ -174,20 +174,15 @@ fn scan_group(value: u32, lane: u32) -> u32 {
     sorted_box[place] = box_of[i];
 }
 
-// Momentum and its flux, the force on frozen particles, and the largest force.
+// Momentum and its flux, and the force on frozen particles.
 @KERNEL measure {
     var v = vec3(0.0);
     var m = 0.0;
-    var f = vec3(0.0);
     var support = vec3(0.0);
     if (i < P.count) {
         v = vel[i].xyz;
         m = mass_of(vel[i]);
-        f = force[i].xyz;
-        if (is_frozen(vel[i])) {
-            support = f;
-            f = vec3(0.0);
-        }
+        if (is_frozen(vel[i])) { support = force[i].xyz; }
     }
     store_sum(block, 14u, m * v.x * v.x, lane);
     store_sum(block, 15u, m * v.y * v.y, lane);
@@ -199,6 +194,4 @@ fn scan_group(value: u32, lane: u32) -> u32 {
         store_sum(block, 20u + k, m * v[k], lane);
         store_sum(block, 23u + k, support[k], lane);
     }
-    let largest = largest_of_group(max(abs(f.x), max(abs(f.y), abs(f.z))), lane);
-    if (lane == 0u && block < P.blocks) { group_sums[block * ENTRIES + 26u] = largest; }
 }
