@@ -4,7 +4,7 @@ use psidpd_core::model::PresetError;
 use psidpd_core::model::expression::TooLarge;
 use psidpd_core::theory::TheoryError;
 use psidpd_dynamics::run::RunError;
-use psidpd_formats::files::WriteError;
+use psidpd_formats::files::PathError;
 use psidpd_lammps_host::LammpsError;
 use psidpd_observe::ObserveError;
 use psidpd_report::ReportError;
@@ -23,7 +23,7 @@ pub enum ExperimentError {
     #[error(transparent)]
     Report(#[from] ReportError),
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(#[from] PathError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]

@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io { action: &'static str, path: PathBuf, source: std::io::Error },
     #[error("{}: {source}", path.display())]
     Text { path: PathBuf, source: TextError },
     #[error("{}, line {line}: {message}", path.display())]
@@ -24,32 +22,22 @@ pub enum FormatError {
     #[error("{0}")]
     Request(String),
     #[error(transparent)]
-    Write(#[from] WriteError),
+    File(#[from] PathError),
 }
 
-impl FormatError {
-    pub fn read(path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
-        FormatError::io("read", path)
-    }
-
-    /// Makes the error of `map_err` for a file operation.
-    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
-        let path = path.to_owned();
-        move |source| FormatError::Io { action, path, source }
-    }
-}
-
+/// Why an operation on a file or folder failed.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {cause}", path.display())]
-pub struct WriteError {
+#[error("cannot {action} {}: {cause}", path.display())]
+pub struct PathError {
+    pub action: &'static str,
     pub path: PathBuf,
     #[source]
     pub cause: std::io::Error,
 }
 
-impl WriteError {
-    /// Makes the error of `map_err` for operations that write `path`.
-    pub fn at(path: &Path) -> impl FnOnce(std::io::Error) -> WriteError + '_ {
-        move |cause| WriteError { path: path.to_owned(), cause }
+impl PathError {
+    /// Makes the error of `map_err` for an operation on `path`.
+    pub fn at(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> PathError + '_ {
+        move |cause| PathError { action, path: path.to_owned(), cause }
     }
 }

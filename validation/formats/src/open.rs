@@ -1,7 +1,7 @@
 //! Reading a configuration from a file of any format.
 
 use super::configuration::dimensions_of;
-use super::{Configuration, FormatError, read_xyz};
+use super::{Configuration, FormatError, PathError, read_xyz};
 use crate::data::DataFile;
 use crate::dump::{self, DumpReader};
 use nalgebra::{Matrix3, Vector3};
@@ -41,9 +41,9 @@ impl Configuration {
     /// Finds a frame by its number, or the last frame; `None` if the file does not have it.
     fn find(path: &Path, number: Option<usize>) -> Result<Option<Configuration>, FormatError> {
         let content = |message: &str| FormatError::Content { path: path.to_owned(), message: message.into() };
-        let mut file = BufReader::new(open_regular(path).map_err(FormatError::read(path))?);
+        let mut file = BufReader::new(open_regular(path).map_err(PathError::at("read", path))?);
         // Trajectories may be larger than memory, so their frames are read one by one.
-        let start = file.fill_buf().map_err(FormatError::read(path))?;
+        let start = file.fill_buf().map_err(PathError::at("read", path))?;
         let start = String::from_utf8_lossy(start);
         let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
         let found = if first.starts_with("ITEM:") {

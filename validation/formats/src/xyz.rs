@@ -3,7 +3,7 @@
 //! The columns `species`, `pos`, `velo`, `id` have the names of libAtoms and OVITO. The column `Z` stands before `species`
 //! for readers such as ASE that take only chemical elements. It holds the number of the species, counted from 1.
 
-use super::{Configuration, FormatError, Frame};
+use super::{Configuration, FormatError, Frame, PathError};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
 use std::io::{self, BufRead, Write};
@@ -68,7 +68,7 @@ pub fn read_xyz(
     let mut found = None;
     let mut lines = input.lines().enumerate();
     let mut next = || match lines.next() {
-        Some((k, line)) => line.map(|line| Some((k + 1, line))).map_err(FormatError::read(path)),
+        Some((k, line)) => line.map(|line| Some((k + 1, line))).map_err(PathError::at("read", path)),
         None => Ok(None),
     };
     let mut number = 0;

@@ -13,7 +13,8 @@ mod tests;
 use super::error::LammpsError;
 use data::{DataFile, data_file};
 use psidpd_core::document::open_regular;
-use psidpd_formats::FormatError;
+use psidpd_formats::files::write_atomically;
+use psidpd_formats::{FormatError, PathError};
 use std::path::{Path, PathBuf};
 use work::script;
 
@@ -62,7 +63,7 @@ pub fn files(
     overwrite: bool,
 ) -> Result<(Vec<PathBuf>, Converted), LammpsError> {
     let read = |path: &Path| {
-        open_regular(path).and_then(std::io::read_to_string).map_err(LammpsError::io("read", path))
+        open_regular(path).and_then(std::io::read_to_string).map_err(PathError::at("read", path))
     };
     // LAMMPS looks for files in its working folder, most often that of the script.
     let beside = |path: &Path, name: &str| path.parent().unwrap_or(Path::new("")).join(name);
@@ -99,8 +100,7 @@ pub fn files(
         )));
     }
     for (path, text) in &results {
-        psidpd_formats::files::write_atomically(path, text.as_bytes())
-            .map_err(|e| LammpsError::io("write", path)(e.cause))?;
+        write_atomically(path, text.as_bytes())?;
     }
     Ok((results.into_iter().map(|(path, _)| path).collect(), new))
 }

@@ -4,7 +4,7 @@ use crate::device::DeviceError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
 use psidpd_core::model::expression::TooLarge;
-use psidpd_formats::files::WriteError;
+use psidpd_formats::files::PathError;
 use psidpd_formats::memory::MemoryError;
 use std::path::{Path, PathBuf};
 
@@ -101,8 +101,8 @@ impl From<StateError> for RunError {
     }
 }
 
-impl From<WriteError> for RunError {
-    fn from(WriteError { path, cause }: WriteError) -> RunError {
+impl From<PathError> for RunError {
+    fn from(PathError { path, cause, .. }: PathError) -> RunError {
         RunError::Output { path, source: cause }
     }
 }

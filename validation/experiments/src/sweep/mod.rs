@@ -11,7 +11,7 @@ use crate::jobs;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
 use psidpd_dynamics::scene::{Edit, Scene};
-use psidpd_formats::files::{WriteError, write_atomically};
+use psidpd_formats::files::{PathError, write_atomically};
 use psidpd_report::{Headline, headline};
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -67,7 +67,7 @@ pub fn run(
     // What is wrong with the scene itself is said at once, and not once for each run.
     Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
     refuse_other_grid(options, &points)?;
-    std::fs::create_dir_all(&options.out).map_err(WriteError::at(&options.out))?;
+    std::fs::create_dir_all(&options.out).map_err(PathError::at("write", &options.out))?;
     let ended = AtomicUsize::new(0);
     let goes_on = |_: &_| stop.load(Ordering::Relaxed) == 0;
     let threads = options.jobs.get().min(points.len());
