@@ -2,7 +2,7 @@
 
 use super::FormatError;
 pub use super::error::PathError;
-use serde::de::DeserializeOwned;
+use serde::{Serialize, de::DeserializeOwned};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
@@ -16,6 +16,12 @@ use std::path::{Path, PathBuf};
 pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), PathError> {
     let path = path.as_ref();
     write(path, bytes).map_err(PathError::at("write", path))
+}
+
+/// Replaces a file by a value as indented JSON, as [`write_atomically`] does.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PathError> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| PathError::at("write", path)(e.into()))?;
+    write_atomically(path, (text + "\n").as_bytes())
 }
 
 /// Replaces a file whole, through the file `new` in its folder, without waiting for the disk. A killed run leaves at most

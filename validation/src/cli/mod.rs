@@ -248,10 +248,7 @@ fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
 
 /// Writes `value` to the file of `--json`, if the user named one.
 fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), PathError> {
-    let Some(path) = json else { return Ok(()) };
-    let text =
-        serde_json::to_string_pretty(value).map_err(|e| PathError::at("write", path)(e.into()))? + "\n";
-    psidpd_formats::files::write_atomically(path, text.as_bytes())
+    json.map_or(Ok(()), |path| psidpd_formats::files::write_json(path, value))
 }
 
 /// Writes the results of a verb as [`write_json`] does, and ends it: well, or with a failed check.

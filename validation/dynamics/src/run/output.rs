@@ -8,11 +8,12 @@ use crate::scene::{Scene, every};
 use psidpd_formats::dump::write_dump;
 use psidpd_formats::files::{remove_all, remove_if_there};
 use psidpd_formats::{Frame, GsdFile, write_xyz};
-use psidpd_observe::{Observation, write_csv, write_json};
+use psidpd_observe::{Observation, write_csv};
 use psidpd_pictures::{remove_snapshots, remove_vtk, write_snapshot, write_vtk};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 const THERMO: &str = "thermo.csv";
@@ -144,11 +145,20 @@ pub(super) fn write_observations(folder: &Path, observations: &[Observation]) ->
     if observations.is_empty() {
         return Ok(());
     }
-    let (json, tables) = (folder.join(OBSERVABLES), folder.join(TABLES));
+    let tables = folder.join(TABLES);
     write_csv(&tables, observations).map_err(RunError::output(&tables))?;
-    write_json(&json, observations)
-        .and_then(|()| File::open(&json)?.sync_all())
-        .map_err(RunError::output(&json))
+    write_json(&folder.join(OBSERVABLES), &observations)
+}
+
+/// Writes a value as indented JSON and syncs the file to the disk.
+pub(super) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), RunError> {
+    let write = || -> io::Result<()> {
+        let text = serde_json::to_string_pretty(value)? + "\n";
+        let mut file = File::create(path)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    };
+    write().map_err(RunError::output(path))
 }
 
 /// Removes the tables that `observables.json` of an earlier run names, and their folder if it is then empty.

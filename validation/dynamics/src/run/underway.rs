@@ -1,6 +1,6 @@
 //! The course of a run: its steps, its output and its end.
 
-use super::output::write_observations;
+use super::output::{write_json, write_observations};
 use super::watch::Watch;
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
 use crate::checkpoint::Position;
@@ -222,7 +222,7 @@ impl Runner<'_> {
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
-        summary.write(&self.folder.path.join("summary.json"))?;
+        write_json(&self.folder.path.join("summary.json"), &summary)?;
         // From here on the run is finished, even if a later write fails.
         self.checkpoints.good.finished = true;
         self.store_good()?;
