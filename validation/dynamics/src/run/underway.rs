@@ -6,7 +6,7 @@ use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, 
 use crate::checkpoint::Position;
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
-use psidpd_formats::data::DataFile;
+use psidpd_formats::{DataFile, PathError};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -219,7 +219,7 @@ impl Runner<'_> {
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
         let path = self.write_good("final.data")?;
-        std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
+        std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(PathError::at("write", &path))?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
         write_json(&self.folder.path.join("summary.json"), &summary)?;
