@@ -25,6 +25,12 @@ pub use results::{Check, Results};
 pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
 
+/// The lowest and the highest of the finite values.
+pub fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let finite = values.filter(|v| v.is_finite());
+    finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
 /// Each item once, in the order of their first occurrence.
 pub fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
