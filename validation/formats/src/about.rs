@@ -134,7 +134,7 @@ impl About {
         let path = folder.join("about.json");
         let Some(about) = read_json_if_there::<About>(&path)? else { return Ok(None) };
         match about.fault() {
-            Some(message) => Err(FormatError::Content { path, message }),
+            Some(message) => Err(FormatError::content(&path)(message)),
             None => Ok(Some(about)),
         }
     }

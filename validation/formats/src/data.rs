@@ -62,8 +62,7 @@ impl DataFile {
         psidpd_core::document::open_regular(path)
             .and_then(|mut file| file.read_to_end(&mut bytes))
             .map_err(PathError::at("read", path))?;
-        DataFile::parse(&String::from_utf8_lossy(&bytes))
-            .map_err(|source| FormatError::Text { path: path.to_owned(), source })
+        DataFile::parse(&String::from_utf8_lossy(&bytes)).map_err(FormatError::content(path))
     }
 
     /// The line of an atom in a file, counted from 1, for messages.

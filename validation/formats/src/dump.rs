@@ -73,9 +73,7 @@ pub struct DumpReader<R> {
 
 pub fn read(path: &Path) -> Result<Vec<Frame>, FormatError> {
     let file = psidpd_core::document::open_regular(path).map_err(PathError::at("read", path))?;
-    DumpReader::new(io::BufReader::new(file))
-        .collect::<Result<_, _>>()
-        .map_err(|source| FormatError::Text { path: path.to_owned(), source })
+    DumpReader::new(io::BufReader::new(file)).collect::<Result<_, _>>().map_err(FormatError::content(path))
 }
 
 impl<R: BufRead> DumpReader<R> {

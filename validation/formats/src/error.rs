@@ -1,28 +1,24 @@
-use crate::text::TextError;
 use std::path::{Path, PathBuf};
 
 /// Why a file cannot be read, written or made into a picture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    #[error("{}: {source}", path.display())]
-    Text { path: PathBuf, source: TextError },
     #[error("{}, line {line}: {message}", path.display())]
     Xyz { path: PathBuf, line: usize, message: String },
     #[error("{}: {message}", path.display())]
     Content { path: PathBuf, message: String },
-    #[error("{}: {cause}", path.display())]
-    Json {
-        path: PathBuf,
-        #[source]
-        cause: serde_json::Error,
-    },
-    #[error("{}: {message}", path.display())]
-    Picture { path: PathBuf, message: String },
     #[error("{0}")]
     Request(String),
     #[error(transparent)]
     File(#[from] PathError),
+}
+
+impl FormatError {
+    /// Makes the error of `map_err` for the content of a file.
+    pub fn content<E: ToString>(path: &Path) -> impl FnOnce(E) -> FormatError {
+        move |fault| FormatError::Content { path: path.to_owned(), message: fault.to_string() }
+    }
 }
 
 /// Why an operation on a file or folder failed.

@@ -54,7 +54,7 @@ pub fn read_if_there(path: &Path) -> Result<Option<String>, PathError> {
 pub fn read_json_if_there<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FormatError> {
     let parse = |text: String| serde_json::from_str(&text);
     let found = read_if_there(path)?.map(parse).transpose();
-    found.map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
+    found.map_err(FormatError::content(path))
 }
 
 /// Turns the error of a missing file into success.

@@ -81,8 +81,7 @@ pub fn files(
         let from = beside(old, name);
         match out {
             Some(path) if from.is_file() => {
-                let text = data_file(&read(&from)?, *column)
-                    .map_err(|source| FormatError::Text { path: from.clone(), source })?;
+                let text = data_file(&read(&from)?, *column).map_err(FormatError::content(&from))?;
                 results.push((beside(path, &new_name(name, DATA)), text));
             }
             Some(_) => new.by_hand.push(Note {

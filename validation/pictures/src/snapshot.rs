@@ -22,8 +22,7 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatErr
     std::fs::create_dir_all(&snapshots).map_err(PathError::at("write", &snapshots))?;
     let path = snapshots.join(snapshot_name(frame.step));
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
-    let png =
-        image.to_png().map_err(|e| FormatError::Picture { path: path.clone(), message: e.to_string() })?;
+    let png = image.to_png().map_err(FormatError::content(&path))?;
     // The resumed run makes the same step.
     replace_through(&path.with_extension("png.new"), &path, &png)?;
     Ok(path)
