@@ -10,7 +10,6 @@ use psidpd::scene::Scene;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 use std::ffi::CString;
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -157,11 +156,7 @@ pub fn sweep(
     };
     let axes = over.into_iter().map(axis).collect::<PyResult<Vec<Axis>>>()?;
     let threads = thread_count(threads)?;
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let jobs = match jobs {
-        Some(jobs) => thread_count(jobs)?,
-        None => NonZeroUsize::new(cores / threads.get()).unwrap_or(NonZeroUsize::MIN),
-    };
+    let jobs = jobs.map(thread_count).transpose()?;
     let options = Options { scene, edits: Vec::new(), axes, out, jobs, threads, overwrite };
     let stop = AtomicUsize::new(0);
     let (ended, raised) = py.detach(|| {
@@ -179,8 +174,7 @@ pub fn sweep(
         })
     });
     let points = ended.map_err(|_| RunStoppedError::new_err("the sweep failed"))?.map_err(exception)?;
-    let title = options.scene.file_stem().map_or("sweep".into(), |name| name.to_string_lossy());
-    sweeps::write(&options, &title, &points).map_err(exception)?;
+    sweeps::write(&options, &points).map_err(exception)?;
     raised.map_or(Ok(()), Err)
 }
 

@@ -4,6 +4,7 @@ use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Begin, RunError, Runner};
 use psidpd_dynamics::scene::Scene;
+use psidpd_formats::PathError;
 use psidpd_observe::{Measured, Observation};
 use psidpd_report::Progress;
 use std::fmt::Write;
@@ -101,9 +102,8 @@ pub struct Observed(pub Vec<Observation>);
 impl Observed {
     pub fn read(folder: &Path) -> Result<Observed, RunError> {
         let path = folder.join("observables.json");
-        let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };
-        let text = std::fs::read_to_string(&path).map_err(failed)?;
-        serde_json::from_str(&text).map(Observed).map_err(|e| failed(e.into()))
+        let read = || -> std::io::Result<_> { Ok(serde_json::from_str(&std::fs::read_to_string(&path)?)?) };
+        Ok(Observed(read().map_err(PathError::at("read", &path))?))
     }
 
     pub fn get(&self, name: &str) -> Option<&Observation> {

@@ -4,11 +4,11 @@ use psidpd_core::model::PresetError;
 use psidpd_core::model::expression::TooLarge;
 use psidpd_core::theory::TheoryError;
 use psidpd_dynamics::run::RunError;
-use psidpd_formats::files::WriteError;
+use psidpd_formats::files::PathError;
 use psidpd_lammps_host::LammpsError;
 use psidpd_observe::ObserveError;
 use psidpd_report::ReportError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why an experiment could not be carried out. A check that fails is no error.
 #[derive(Debug, thiserror::Error)]
@@ -23,7 +23,7 @@ pub enum ExperimentError {
     #[error(transparent)]
     Report(#[from] ReportError),
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(#[from] PathError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]
@@ -38,8 +38,6 @@ pub enum ExperimentError {
     Observe(#[from] ObserveError),
     #[error(transparent)]
     Theory(#[from] TheoryError),
-    #[error("{path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
     #[error("{path}: {problem}")]
     Output { path: PathBuf, problem: String },
     #[error("{what}: {problem} in what LAMMPS printed")]
@@ -97,9 +95,8 @@ pub enum ExperimentError {
 }
 
 impl ExperimentError {
-    /// For `map_err` of file operations on `path`.
-    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> ExperimentError {
-        let path = path.into();
-        move |source| ExperimentError::Io { path, source }
+    /// For `map_err` of what is done with the file or folder `path`.
+    pub fn at<E: ToString>(path: &Path) -> impl FnOnce(E) -> ExperimentError {
+        move |problem| ExperimentError::Output { path: path.to_owned(), problem: problem.to_string() }
     }
 }

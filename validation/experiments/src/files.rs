@@ -1,25 +1,18 @@
 //! Files and folders of experiments; errors name them.
 
 use crate::ExperimentError;
-use psidpd_formats::files::write_atomically;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Creates a folder, if it is missing, and returns its absolute path: LAMMPS runs in folders of its own, so that paths must
 /// not depend on ours.
 pub fn absolute_folder(path: &Path) -> Result<PathBuf, ExperimentError> {
-    std::fs::create_dir_all(path).map_err(ExperimentError::io(path))?;
-    path.canonicalize().map_err(ExperimentError::io(path))
-}
-
-pub fn write_json(path: &Path, results: &impl Serialize) -> Result<(), ExperimentError> {
-    let text = serde_json::to_string_pretty(results).map_err(|e| ExperimentError::io(path)(e.into()))?;
-    Ok(write_atomically(path, (text + "\n").as_bytes())?)
+    std::fs::create_dir_all(path).map_err(ExperimentError::at(path))?;
+    path.canonicalize().map_err(ExperimentError::at(path))
 }
 
 /// The rows of a table of numbers: without comments, and words that are no numbers.
 pub fn rows(path: &Path) -> Result<Vec<Vec<f64>>, ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(ExperimentError::io(path))?;
+    let text = std::fs::read_to_string(path).map_err(ExperimentError::at(path))?;
     let row = |line: &str| line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
     Ok(text.lines().filter(|l| !l.starts_with('#')).map(row).collect())
 }

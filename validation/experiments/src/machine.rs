@@ -18,7 +18,7 @@ pub fn machine() -> String {
 /// The most memory that this process ever had.
 pub fn peak_kilobytes() -> Result<u64, ExperimentError> {
     let status = Path::new("/proc/self/status");
-    let text = std::fs::read_to_string(status).map_err(ExperimentError::io(status))?;
+    let text = std::fs::read_to_string(status).map_err(ExperimentError::at(status))?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|rest| rest.split_whitespace().next()?.parse().ok())
         .ok_or_else(|| ExperimentError::Memory(format!("no VmHWM in {}", status.display())))

@@ -107,7 +107,7 @@ const STEPS: u64 = 300;
 
 /// A full cube of the fluid in equilibrium: made once, then from `folder`.
 pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, ExperimentError> {
-    std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
+    std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
     // The state depends on model, seed and length of the run.
     let key = crc32fast::hash(format!("{} {SEED} {STEPS}", subject.text).as_bytes());
     let file = |end: &str| folder.join(format!("{}-{size}-{key:08x}.{end}", subject.name));
@@ -121,8 +121,7 @@ pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, Expe
     text.write(&data)?;
     text.write_mdpd(&data_mdpd)?;
     // Written last: its presence shows that the others are complete.
-    let bytes = postcard::to_stdvec(&state)
-        .map_err(|e| ExperimentError::io(&kept)(std::io::Error::other(e.to_string())))?;
+    let bytes = postcard::to_stdvec(&state).map_err(ExperimentError::at(&kept))?;
     psidpd_formats::files::write_atomically(&kept, &bytes)?;
     Ok(Start { state, data, data_mdpd })
 }

@@ -1,7 +1,7 @@
 //! `about.json`: a description of a run, and of the columns of its series.
 
 use super::FormatError;
-use crate::files::{read_json_if_there, write_atomically};
+use crate::files::{read_json_if_there, write_json};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -102,11 +102,7 @@ pub const UNITS: &str = "reduced: length, energy and mass are those of the model
 
 impl About {
     pub fn write(&self, folder: &Path) -> Result<(), FormatError> {
-        let path = folder.join("about.json");
-        match serde_json::to_string_pretty(self) {
-            Ok(text) => Ok(write_atomically(path, (text + "\n").as_bytes())?),
-            Err(cause) => Err(FormatError::Json { path, cause }),
-        }
+        Ok(write_json(&folder.join("about.json"), self)?)
     }
 
     /// The first value that no run can have, for another program may have written the file.
@@ -138,7 +134,7 @@ impl About {
         let path = folder.join("about.json");
         let Some(about) = read_json_if_there::<About>(&path)? else { return Ok(None) };
         match about.fault() {
-            Some(message) => Err(FormatError::Content { path, message }),
+            Some(message) => Err(FormatError::content(&path)(message)),
             None => Ok(Some(about)),
         }
     }

@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use super::FormatError;
 use super::text::{Problem, TextError, finite, out_of_range, shown, whole};
+use super::{FormatError, PathError};
 
 /// This text precedes the periodic directions in a title.
 const BOUNDARY: &str = "; boundary ";
@@ -61,9 +61,8 @@ impl DataFile {
         let mut bytes = Vec::new();
         psidpd_core::document::open_regular(path)
             .and_then(|mut file| file.read_to_end(&mut bytes))
-            .map_err(FormatError::io("read", path))?;
-        DataFile::parse(&String::from_utf8_lossy(&bytes))
-            .map_err(|source| FormatError::Text { path: path.to_owned(), source })
+            .map_err(PathError::at("read", path))?;
+        DataFile::parse(&String::from_utf8_lossy(&bytes)).map_err(FormatError::content(path))
     }
 
     /// The line of an atom in a file, counted from 1, for messages.
@@ -98,9 +97,9 @@ impl DataFile {
     }
 
     fn save(&self, path: &Path, style: Style) -> Result<(), FormatError> {
-        let file = std::fs::File::create(path).map_err(FormatError::io("write", path))?;
+        let file = std::fs::File::create(path).map_err(PathError::at("write", path))?;
         let mut out = io::BufWriter::new(file);
-        self.print(&mut out, style).and_then(|()| out.flush()).map_err(FormatError::io("write", path))
+        Ok(self.print(&mut out, style).and_then(|()| out.flush()).map_err(PathError::at("write", path))?)
     }
 
     /// The periodic directions, if the title has them as [`DataFile::with_boundary`] writes them.

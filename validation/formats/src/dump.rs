@@ -3,8 +3,8 @@
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
-use super::FormatError;
 use super::text::{Problem, TextError, any_f64, finite, shown, whole};
+use super::{FormatError, PathError};
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
@@ -72,10 +72,8 @@ pub struct DumpReader<R> {
 }
 
 pub fn read(path: &Path) -> Result<Vec<Frame>, FormatError> {
-    let file = psidpd_core::document::open_regular(path).map_err(FormatError::io("read", path))?;
-    DumpReader::new(io::BufReader::new(file))
-        .collect::<Result<_, _>>()
-        .map_err(|source| FormatError::Text { path: path.to_owned(), source })
+    let file = psidpd_core::document::open_regular(path).map_err(PathError::at("read", path))?;
+    DumpReader::new(io::BufReader::new(file)).collect::<Result<_, _>>().map_err(FormatError::content(path))
 }
 
 impl<R: BufRead> DumpReader<R> {

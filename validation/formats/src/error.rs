@@ -1,55 +1,39 @@
-use crate::text::TextError;
 use std::path::{Path, PathBuf};
 
 /// Why a file cannot be read, written or made into a picture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io { action: &'static str, path: PathBuf, source: std::io::Error },
-    #[error("{}: {source}", path.display())]
-    Text { path: PathBuf, source: TextError },
     #[error("{}, line {line}: {message}", path.display())]
     Xyz { path: PathBuf, line: usize, message: String },
     #[error("{}: {message}", path.display())]
     Content { path: PathBuf, message: String },
-    #[error("{}: {cause}", path.display())]
-    Json {
-        path: PathBuf,
-        #[source]
-        cause: serde_json::Error,
-    },
-    #[error("{}: {message}", path.display())]
-    Picture { path: PathBuf, message: String },
     #[error("{0}")]
     Request(String),
     #[error(transparent)]
-    Write(#[from] WriteError),
+    File(#[from] PathError),
 }
 
 impl FormatError {
-    pub fn read(path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
-        FormatError::io("read", path)
-    }
-
-    /// Makes the error of `map_err` for a file operation.
-    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
-        let path = path.to_owned();
-        move |source| FormatError::Io { action, path, source }
+    /// Makes the error of `map_err` for the content of a file.
+    pub fn content<E: ToString>(path: &Path) -> impl FnOnce(E) -> FormatError {
+        move |fault| FormatError::Content { path: path.to_owned(), message: fault.to_string() }
     }
 }
 
+/// Why an operation on a file or folder failed.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {cause}", path.display())]
-pub struct WriteError {
+#[error("cannot {action} {}: {cause}", path.display())]
+pub struct PathError {
+    pub action: &'static str,
     pub path: PathBuf,
     #[source]
     pub cause: std::io::Error,
 }
 
-impl WriteError {
-    /// Makes the error of `map_err` for operations that write `path`.
-    pub fn at(path: &Path) -> impl FnOnce(std::io::Error) -> WriteError + '_ {
-        move |cause| WriteError { path: path.to_owned(), cause }
+impl PathError {
+    /// Makes the error of `map_err` for an operation on `path`.
+    pub fn at(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> PathError {
+        move |cause| PathError { action, path: path.to_owned(), cause }
     }
 }

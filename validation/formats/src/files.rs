@@ -1,8 +1,8 @@
 //! Writing files whole or not at all.
 
 use super::FormatError;
-pub use super::error::WriteError;
-use serde::de::DeserializeOwned;
+pub use super::error::PathError;
+use serde::{Serialize, de::DeserializeOwned};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
@@ -13,15 +13,21 @@ use std::path::{Path, PathBuf};
 /// The bytes go to a temporary file in the same folder, which is flushed to disk and then renamed over
 /// `path`. On failure nothing is left behind and an existing file keeps its content. If `path` is a symbolic
 /// link, its target is replaced. Pipes, devices and the program's own output are written to directly.
-pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), WriteError> {
+pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), PathError> {
     let path = path.as_ref();
-    write(path, bytes).map_err(WriteError::at(path))
+    write(path, bytes).map_err(PathError::at("write", path))
+}
+
+/// Replaces a file by a value as indented JSON, as [`write_atomically`] does.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PathError> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| PathError::at("write", path)(e.into()))?;
+    write_atomically(path, (text + "\n").as_bytes())
 }
 
 /// Replaces a file whole, through the file `new` in its folder, without waiting for the disk. A killed run leaves at most
 /// `new`.
-pub fn replace_through(new: &Path, path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    fs::write(new, bytes).and_then(|()| fs::rename(new, path)).map_err(WriteError::at(path))
+pub fn replace_through(new: &Path, path: &Path, bytes: &[u8]) -> Result<(), PathError> {
+    fs::write(new, bytes).and_then(|()| fs::rename(new, path)).map_err(PathError::at("write", path))
 }
 
 pub fn remove_if_there(path: &Path) -> io::Result<()> {
@@ -29,18 +35,18 @@ pub fn remove_if_there(path: &Path) -> io::Result<()> {
 }
 
 /// Removes those of some files in a folder that exist.
-pub fn remove_all(folder: &Path, names: &[&str]) -> Result<(), WriteError> {
+pub fn remove_all(folder: &Path, names: &[&str]) -> Result<(), PathError> {
     names
         .iter()
         .map(|name| folder.join(name))
-        .try_for_each(|path| remove_if_there(&path).map_err(WriteError::at(&path)))
+        .try_for_each(|path| remove_if_there(&path).map_err(PathError::at("write", &path)))
 }
 
 /// The text of a file; `None` if the file does not exist.
-pub fn read_if_there(path: &Path) -> Result<Option<String>, FormatError> {
+pub fn read_if_there(path: &Path) -> Result<Option<String>, PathError> {
     match fs::read_to_string(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-        read => read.map(Some).map_err(FormatError::read(path)),
+        read => read.map(Some).map_err(PathError::at("read", path)),
     }
 }
 
@@ -48,7 +54,7 @@ pub fn read_if_there(path: &Path) -> Result<Option<String>, FormatError> {
 pub fn read_json_if_there<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FormatError> {
     let parse = |text: String| serde_json::from_str(&text);
     let found = read_if_there(path)?.map(parse).transpose();
-    found.map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
+    found.map_err(FormatError::content(path))
 }
 
 /// Turns the error of a missing file into success.

@@ -1,7 +1,7 @@
 //! Reading a configuration from a file of any format.
 
 use super::configuration::dimensions_of;
-use super::{Configuration, FormatError, read_xyz};
+use super::{Configuration, FormatError, PathError, read_xyz};
 use crate::data::DataFile;
 use crate::dump::{self, DumpReader};
 use nalgebra::{Matrix3, Vector3};
@@ -25,7 +25,7 @@ impl Configuration {
                 message += &format!("; the first one is 0, the last one {low}");
             }
         }
-        Err(FormatError::Content { path: path.to_owned(), message })
+        Err(FormatError::content(path)(message))
     }
 
     /// The number of complete frames in a file.
@@ -40,18 +40,18 @@ impl Configuration {
 
     /// Finds a frame by its number, or the last frame; `None` if the file does not have it.
     fn find(path: &Path, number: Option<usize>) -> Result<Option<Configuration>, FormatError> {
-        let content = |message: &str| FormatError::Content { path: path.to_owned(), message: message.into() };
-        let mut file = BufReader::new(open_regular(path).map_err(FormatError::read(path))?);
+        let mut file = BufReader::new(open_regular(path).map_err(PathError::at("read", path))?);
         // Trajectories may be larger than memory, so their frames are read one by one.
-        let start = file.fill_buf().map_err(FormatError::read(path))?;
+        let start = file.fill_buf().map_err(PathError::at("read", path))?;
         let start = String::from_utf8_lossy(start);
         let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
         let found = if first.starts_with("ITEM:") {
-            last_or_nth(path, file, number)?.map(|f| from_dump(&f)).transpose().map_err(|m| content(&m))?
+            let found = last_or_nth(path, file, number)?.map(|f| from_dump(&f));
+            found.transpose().map_err(FormatError::content(path))?
         } else if first.parse::<usize>().is_ok() {
             read_xyz(path, file, number)?
         } else if number.is_none_or(|n| n == 0) {
-            Some(from_data(&DataFile::read(path)?).map_err(|m| content(&m))?)
+            Some(from_data(&DataFile::read(path)?).map_err(FormatError::content(path))?)
         } else {
             None
         };
@@ -88,7 +88,7 @@ fn last_or_nth(
             }
             Ok(_) => {}
             Err(_) if which.is_none() && found.is_some() => break,
-            Err(source) => return Err(FormatError::Text { path: path.to_owned(), source }),
+            Err(fault) => return Err(FormatError::content(path)(fault)),
         }
     }
     Ok(found)

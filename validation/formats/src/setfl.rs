@@ -6,7 +6,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::FormatError;
+use super::{FormatError, PathError};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
@@ -45,9 +45,8 @@ pub struct Setfl<'a> {
 impl Setfl<'_> {
     pub fn write(&self, path: &Path) -> Result<(), FormatError> {
         let mut text = Vec::new();
-        self.write_to(&mut text)
-            .and_then(|()| std::fs::write(path, text))
-            .map_err(FormatError::io("write", path))
+        let made = self.write_to(&mut text).and_then(|()| std::fs::write(path, text));
+        Ok(made.map_err(PathError::at("write", path))?)
     }
 
     /// Writes the table with 17 significant digits. Values that LAMMPS cannot use are an error of kind `InvalidInput`.

@@ -3,7 +3,7 @@
 //! The columns `species`, `pos`, `velo`, `id` have the names of libAtoms and OVITO. The column `Z` stands before `species`
 //! for readers such as ASE that take only chemical elements. It holds the number of the species, counted from 1.
 
-use super::{Configuration, FormatError, Frame};
+use super::{Configuration, FormatError, Frame, PathError};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
 use std::io::{self, BufRead, Write};
@@ -65,10 +65,16 @@ pub fn read_xyz(
     which: Option<usize>,
 ) -> Result<Option<Configuration>, FormatError> {
     let wrong = |line: usize, message: String| FormatError::Xyz { path: path.to_owned(), line, message };
+    // A frame is the number of its first line and the text of all others.
+    let parsed = |found: Option<(usize, Vec<String>)>| {
+        let Some((start, lines)) = found else { return Ok(None) };
+        let Some((comment, rows)) = lines.split_first() else { return Ok(None) };
+        parse_frame(comment, rows).map(Some).map_err(|(line, message)| wrong(start + 1 + line, message))
+    };
     let mut found = None;
     let mut lines = input.lines().enumerate();
     let mut next = || match lines.next() {
-        Some((k, line)) => line.map(|line| Some((k + 1, line))).map_err(FormatError::read(path)),
+        Some((k, line)) => line.map(|line| Some((k + 1, line))).map_err(PathError::at("read", path)),
         None => Ok(None),
     };
     let mut number = 0;
@@ -83,7 +89,7 @@ pub fn read_xyz(
             match next()? {
                 Some((_, line)) if wanted => frame.push(line),
                 Some(_) => {}
-                None if which.is_none() && found.is_some() => return parse_found(path, found),
+                None if which.is_none() && found.is_some() => return parsed(found),
                 None => {
                     return Err(wrong(start, format!("the file ends within a frame of {count} particles")));
                 }
@@ -94,21 +100,7 @@ pub fn read_xyz(
         }
         number += 1;
     }
-    parse_found(path, found)
-}
-
-/// Parses a frame from the number of its first line and the text of all its lines.
-fn parse_found(
-    path: &Path,
-    found: Option<(usize, Vec<String>)>,
-) -> Result<Option<Configuration>, FormatError> {
-    let Some((start, lines)) = found else { return Ok(None) };
-    let Some((comment, rows)) = lines.split_first() else { return Ok(None) };
-    parse_frame(comment, rows).map(Some).map_err(|(line, message)| FormatError::Xyz {
-        path: path.to_owned(),
-        line: start + 1 + line,
-        message,
-    })
+    parsed(found)
 }
 
 type Fault = (usize, String);

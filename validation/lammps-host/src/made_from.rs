@@ -1,6 +1,6 @@
 //! The digest of a plugin's sources: equal digests mean equal plugins.
 
-use super::error::LammpsError;
+use super::error::{LammpsError, PathError};
 use super::host::Host;
 use std::collections::BTreeSet;
 use std::fs;
@@ -45,7 +45,7 @@ pub(super) fn digest(
     }
     // Of a source tree only its own headers count, without those of packages in subfolders. Of MPI only
     // `mpi.h` counts, because its folder may hold headers of other software.
-    let entries = fs::read_dir(&host.include).map_err(LammpsError::io("read", &host.include))?;
+    let entries = fs::read_dir(&host.include).map_err(PathError::at("read", &host.include))?;
     let files = entries.filter_map(|e| Some(e.ok()?.path()));
     let headers: BTreeSet<PathBuf> = files.filter(|p| p.extension().is_some_and(|e| e == "h")).collect();
     for header in &headers {
@@ -58,7 +58,7 @@ pub(super) fn digest(
 /// Adds a file, or all files in a folder, by their contents and their names relative to `top`.
 fn add(top: &Path, path: &Path, hasher: &mut DefaultHasher) -> Result<(), LammpsError> {
     if path.is_dir() {
-        let entries = fs::read_dir(path).map_err(LammpsError::io("read", path))?;
+        let entries = fs::read_dir(path).map_err(PathError::at("read", path))?;
         let inside: BTreeSet<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
         return inside.iter().try_for_each(|path| add(top, path, hasher));
     }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::error::LammpsError;
+use super::error::{LammpsError, PathError};
 
 #[derive(Debug)]
 pub(super) struct Mpi {
@@ -54,7 +54,7 @@ impl Flavour {
 pub(super) fn library_of(lammps: &Path) -> Result<Option<PathBuf>, LammpsError> {
     let ldd = Path::new("ldd");
     let out =
-        Command::new(ldd).arg(lammps).stdin(Stdio::null()).output().map_err(LammpsError::io("run", ldd))?;
+        Command::new(ldd).arg(lammps).stdin(Stdio::null()).output().map_err(PathError::at("run", ldd))?;
     mpi_among(&String::from_utf8_lossy(&out.stdout)).map_err(|name| LammpsError::Load {
         path: lammps.to_owned(),
         reason: format!("it needs {name}, which is not installed: install that MPI"),

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{LammpsError, tail};
+use super::error::{LammpsError, PathError, tail};
 use super::host::{Host, HostKind, HostVersion};
 use super::install::{Lock, base_dir, checkout, venv_dir};
 use super::made_from;
@@ -151,7 +151,7 @@ fn build_with(
 
     let waiting = || progress("waiting for another process that is building the plugin");
     for folder in [base, builds] {
-        fs::create_dir_all(folder).map_err(LammpsError::io("create", folder))?;
+        fs::create_dir_all(folder).map_err(PathError::at("create", folder))?;
     }
     let _lock = Lock::new(&base.join("plugin.lock"), waiting)?;
     let (plugin, styles, launcher) = (base.join(FILE_NAME), base.join(STYLES), base.join(LAUNCHER));
@@ -184,7 +184,7 @@ fn build_with(
         .current_dir(root)
         .stdin(Stdio::null())
         .output()
-        .map_err(LammpsError::io("run", Path::new(cargo)))?;
+        .map_err(PathError::at("run", Path::new(cargo)))?;
     let said = String::from_utf8_lossy(&out.stderr);
     if !out.status.success() {
         return Err(LammpsError::Build { output: tail(&said, 30) });
@@ -200,22 +200,22 @@ fn build_with(
     // Renaming keeps a loaded plugin intact and shows only complete files to others. A plugin without its
     // note is refused, so an interruption cannot leave a plugin with a wrong note.
     let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
-    remove_if_there(&note).map_err(LammpsError::io("remove", &note))?;
+    remove_if_there(&note).map_err(PathError::at("remove", &note))?;
     for (from, to) in built {
-        fs::copy(&from, &temp).map_err(LammpsError::io("copy", &from))?;
-        fs::rename(&temp, to).map_err(LammpsError::io("write", to))?;
+        fs::copy(&from, &temp).map_err(PathError::at("copy", &from))?;
+        fs::rename(&temp, to).map_err(PathError::at("write", to))?;
     }
     drop(shared);
     built_for.sizes = sizes();
     let text =
-        serde_json::to_string_pretty(&built_for).map_err(|e| LammpsError::io("write", &note)(e.into()))?;
+        serde_json::to_string_pretty(&built_for).map_err(|e| PathError::at("write", &note)(e.into()))?;
     if version.plugins {
-        remove_if_there(&launcher).map_err(LammpsError::io("remove", &launcher))?;
+        remove_if_there(&launcher).map_err(PathError::at("remove", &launcher))?;
     } else {
         build_launcher(host, &compiler, root, &launcher)?;
     }
-    fs::write(&temp, text).map_err(LammpsError::io("write", &temp))?;
-    fs::rename(&temp, &note).map_err(LammpsError::io("write", &note))?;
+    fs::write(&temp, text).map_err(PathError::at("write", &temp))?;
+    fs::rename(&temp, &note).map_err(PathError::at("write", &note))?;
     progress("the plugin is built");
     Ok(plugin)
 }
@@ -298,12 +298,11 @@ fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path
         command.arg("-Xlinker").arg("-rpath").arg("-Xlinker").arg(folder);
     }
     command.args(&host.mpi_library).arg("-ldl");
-    let out =
-        command.stdin(Stdio::null()).output().map_err(LammpsError::io("run", Path::new(&compiler[0])))?;
+    let out = command.stdin(Stdio::null()).output().map_err(PathError::at("run", Path::new(&compiler[0])))?;
     if !out.status.success() {
         return Err(LammpsError::Build { output: tail(&String::from_utf8_lossy(&out.stderr), 30) });
     }
-    fs::rename(&temp, launcher).map_err(LammpsError::io("write", launcher))
+    Ok(fs::rename(&temp, launcher).map_err(PathError::at("write", launcher))?)
 }
 
 /// The shared library of a target in cargo's messages.

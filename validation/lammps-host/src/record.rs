@@ -1,6 +1,6 @@
 //! Checks the files of an installed wheel against pip's list of them.
 
-use super::error::LammpsError;
+use super::error::{LammpsError, PathError};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub(super) fn check(venv: &Path) -> Result<(), LammpsError> {
 }
 
 fn check_packages(packages: &Path) -> Result<(), LammpsError> {
-    let entries = fs::read_dir(packages).map_err(LammpsError::io("read", packages))?;
+    let entries = fs::read_dir(packages).map_err(PathError::at("read", packages))?;
     for entry in entries.filter_map(Result::ok) {
         let name = entry.file_name();
         let name = name.to_string_lossy();

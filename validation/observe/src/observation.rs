@@ -148,11 +148,6 @@ impl Observation {
     }
 }
 
-pub fn write_json(path: &Path, observations: &[Observation]) -> std::io::Result<()> {
-    let text = serde_json::to_string_pretty(observations)?;
-    std::fs::write(path, text + "\n")
-}
-
 /// Writes each observation as a CSV file into `folder`, which is created if it does not exist. The columns are the
 /// abscissa, then each column with its error. Unknown values are empty fields.
 pub fn write_csv(folder: &Path, observations: &[Observation]) -> std::io::Result<()> {
@@ -202,10 +197,7 @@ mod tests {
 
     #[test]
     fn json_has_the_promised_keys_and_comes_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("observables.json");
-        write_json(&path, &[example("a")]).unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
+        let text = serde_json::to_string_pretty(&[example("a")]).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(
             json[0],

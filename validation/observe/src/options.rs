@@ -3,7 +3,6 @@
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
-use std::fmt::Display;
 
 /// The names of the faces of a box: axis, and whether the face is the upper one.
 pub const FACES: [(&str, (usize, bool)); 6] = [
@@ -66,12 +65,12 @@ impl<'a> Options<'a> {
 
     pub fn number(&self, key: &str, low: f64, high: f64) -> Result<Option<f64>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        within(&value, value.number()?, low, high).map(Some)
+        value.within(value.number()?, low, high).map(Some)
     }
 
     pub fn count(&self, key: &str, low: u64, high: u64) -> Result<Option<usize>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        Ok(Some(within(&value, value.count()?, low, high)? as usize))
+        Ok(Some(value.within(value.count()?, low, high)? as usize))
     }
 
     pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
@@ -80,7 +79,7 @@ impl<'a> Options<'a> {
         let [a, b] = items.as_slice() else {
             return Err(value.error("expected two whole numbers"));
         };
-        let read = |item: &Value| Ok(within(item, item.count()?, low, high)? as usize);
+        let read = |item: &Value| Ok(item.within(item.count()?, low, high)? as usize);
         Ok(Some([read(a)?, read(b)?]))
     }
 
@@ -159,13 +158,5 @@ impl<'a> Options<'a> {
         let periodic = domain.periodic();
         let any = periodic[..d].contains(&true);
         (0..d).filter(|k| periodic[*k] || !any).map(|k| 0.5 * domain.height(k)).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// Refuses a number outside a range, with an error about its value.
-fn within<T: PartialOrd + Display>(value: &Value, number: T, low: T, high: T) -> Result<T, FileError> {
-    match (&low..=&high).contains(&&number) {
-        true => Ok(number),
-        false => Err(value.error(format!("must be from {low} to {high}, is {number}"))),
     }
 }

@@ -1,6 +1,6 @@
 use super::Image;
 use super::snapshot::{SNAPSHOTS, snapshots, step_of};
-use psidpd_formats::FormatError;
+use psidpd_formats::{FormatError, PathError};
 use std::path::Path;
 
 /// The largest number of frames of an animation. Longer series are thinned to every second, third, … frame.
@@ -17,9 +17,8 @@ pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
     let stride = all.len().div_ceil(MOST);
     let mut images = Vec::new();
     for path in all.iter().rev().step_by(stride) {
-        let bytes = std::fs::read(path).map_err(FormatError::read(path))?;
-        let picture = |message: String| FormatError::Picture { path: path.clone(), message };
-        let mut image = Image::from_png(&bytes).map_err(picture)?.reduced(2);
+        let bytes = std::fs::read(path).map_err(PathError::at("read", path))?;
+        let mut image = Image::from_png(&bytes).map_err(FormatError::content(path))?.reduced(2);
         if let Some(step) = step_of(path) {
             image.stamp(&format!("step {step}"));
         }
@@ -27,9 +26,7 @@ pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
     }
     images.reverse();
     let packed = Image::to_apng(&images, PER_SECOND);
-    packed
-        .map(Some)
-        .map_err(|e| FormatError::Picture { path: folder.join(SNAPSHOTS), message: e.to_string() })
+    packed.map(Some).map_err(FormatError::content(&folder.join(SNAPSHOTS)))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::FieldOptions;
 use psidpd_core::model::kernel::Kernel;
-use psidpd_formats::files::{WriteError, replace_through};
+use psidpd_formats::files::{PathError, replace_through};
 use psidpd_formats::{FormatError, Frame, Grid, write_vti, write_vtp};
 use std::path::Path;
 
@@ -83,15 +83,15 @@ pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
 /// created if it does not exist. A box with edges that are not along the axes gets no density.
 pub fn write_vtk(folder: &Path, frame: &Frame, kernel: Option<Kernel>) -> Result<(), FormatError> {
     let folder = folder.join(VTK);
-    std::fs::create_dir_all(&folder).map_err(WriteError::at(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(PathError::at("write", &folder))?;
     // The resumed run makes the same step.
     let new = folder.join("unfinished.new");
     let mut bytes = Vec::new();
-    write_vtp(frame, &mut bytes).map_err(FormatError::io("write", &folder))?;
+    write_vtp(frame, &mut bytes).map_err(PathError::at("write", &folder))?;
     replace_through(&new, &folder.join(format!("particles-{:010}.vtp", frame.step)), &bytes)?;
     if let Some(grid) = density_grid(frame, kernel) {
         bytes.clear();
-        write_vti(&grid, frame, &mut bytes).map_err(FormatError::io("write", &folder))?;
+        write_vti(&grid, frame, &mut bytes).map_err(PathError::at("write", &folder))?;
         replace_through(&new, &folder.join(format!("density-{:010}.vti", frame.step)), &bytes)?;
     }
     Ok(())
@@ -104,7 +104,7 @@ pub fn remove_vtk(folder: &Path) -> Result<(), FormatError> {
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
         let own = [("particles-", ".vtp"), ("density-", ".vti"), ("unfinished", ".new")];
         if own.iter().any(|(start, end)| name.starts_with(start) && name.ends_with(end)) {
-            std::fs::remove_file(&path).map_err(WriteError::at(&path))?;
+            std::fs::remove_file(&path).map_err(PathError::at("write", &path))?;
         }
     }
     Ok(())

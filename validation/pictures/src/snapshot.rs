@@ -1,5 +1,5 @@
 use super::{ParticleOptions, draw_particles};
-use psidpd_formats::files::{WriteError, replace_through};
+use psidpd_formats::files::{PathError, replace_through};
 use psidpd_formats::{FormatError, Frame};
 use std::path::{Path, PathBuf};
 
@@ -19,11 +19,10 @@ pub(super) fn step_of(path: &Path) -> Option<u64> {
 /// The folder is created if it does not exist.
 pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatError> {
     let snapshots = folder.join(SNAPSHOTS);
-    std::fs::create_dir_all(&snapshots).map_err(WriteError::at(&snapshots))?;
+    std::fs::create_dir_all(&snapshots).map_err(PathError::at("write", &snapshots))?;
     let path = snapshots.join(snapshot_name(frame.step));
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
-    let png =
-        image.to_png().map_err(|e| FormatError::Picture { path: path.clone(), message: e.to_string() })?;
+    let png = image.to_png().map_err(FormatError::content(&path))?;
     // The resumed run makes the same step.
     replace_through(&path.with_extension("png.new"), &path, &png)?;
     Ok(path)
@@ -32,7 +31,7 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatErr
 /// Removes the snapshots of an earlier run from the folder of a run.
 pub fn remove_snapshots(folder: &Path) -> Result<(), FormatError> {
     for path in snapshots(folder) {
-        std::fs::remove_file(&path).map_err(WriteError::at(&path))?;
+        std::fs::remove_file(&path).map_err(PathError::at("write", &path))?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-use psidpd_formats::files::WriteError;
+use psidpd_formats::files::PathError;
 use std::path::PathBuf;
 
 #[derive(Debug, thiserror::Error)]
@@ -8,7 +8,7 @@ pub enum ReportError {
     #[error("cannot convert results to or from JSON: {0}")]
     Json(#[from] serde_json::Error),
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(#[from] PathError),
     #[error("{} is not the folder of a run: it has none of the files {files}", folder.display())]
     NoRun { folder: PathBuf, files: String },
 }

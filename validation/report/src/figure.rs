@@ -3,10 +3,10 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::ReportError;
 use super::chart::{Area, BELOW, Chart, Fallible, GREY, LEFT, SMALL, axes, chart, font, note, pen, px, svg};
 use super::scale::Scale;
 use super::text::{fit, width};
+use super::{ReportError, extremes};
 use psidpd_formats::Frame;
 use psidpd_pictures::colour::{self, Rgb};
 use psidpd_pictures::{
@@ -146,7 +146,7 @@ pub(super) fn field_of_values(
     size: [usize; 2],
     values: &[f64],
 ) -> Figure {
-    let [low, high] = super::extent(values.iter().copied());
+    let [low, high] = extremes(values.iter().copied());
     let (low, high) = if high > low { (low, high) } else { (0.0, 1.0) };
     // The rows are given with the lowest first. The longer side gets about 500 pixels.
     let factor = (500 / size[0].max(size[1]).max(1)).max(1);

@@ -25,6 +25,12 @@ pub use results::{Check, Results};
 pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
 
+/// The lowest and the highest of the values that are finite; infinity and its negative if there are none.
+pub fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let finite = values.filter(|v| v.is_finite());
+    finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
 /// Each item once, in the order of their first occurrence.
 pub fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
@@ -34,10 +40,4 @@ pub fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
         }
     }
     found
-}
-
-/// The lowest and the highest of the values that are finite; infinity and its negative if there are none.
-pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    let wider = |[low, high]: [f64; 2], v: f64| [low.min(v), high.max(v)];
-    values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
 }

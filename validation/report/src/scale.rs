@@ -4,6 +4,7 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 use plotters::coord::types::RangedCoordf64;
 use std::ops::Range;
 
+use super::extremes;
 use super::text::superscript;
 
 /// The range of an axis. One type serves both kinds, because the kind is chosen at run time.
@@ -30,7 +31,7 @@ impl Scale {
 
     /// A scale with room for every value that can be shown.
     pub fn around(values: impl Iterator<Item = f64>, log: bool) -> Scale {
-        let [low, high] = super::extent(values.filter(|v| shows(*v, log)));
+        let [low, high] = extremes(values.filter(|v| shows(*v, log)));
         match (low <= high, log) {
             (false, true) => Scale { range: 1.0..10.0, log, power: 0 },
             (false, false) => Scale::exact(0.0, 1.0),

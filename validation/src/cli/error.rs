@@ -1,4 +1,4 @@
-use super::{PathBuf, WriteError};
+use super::{PathBuf, PathError};
 use psidpd_dynamics::run::StateError;
 
 /// The errors of verbs themselves.
@@ -13,7 +13,7 @@ pub enum CliError {
     UnknownCase(String),
     /// The results of a finished run cannot be written.
     #[error("the run in {} is finished, but {cause}", folder.display())]
-    Unwritten { folder: PathBuf, cause: WriteError },
+    Unwritten { folder: PathBuf, cause: PathError },
     /// The work is done, but its output is lost.
     #[error("standard output cannot be written, and a part of the output is lost: {0}")]
     Lost(std::io::Error),

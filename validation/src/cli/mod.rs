@@ -39,7 +39,7 @@ use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_experiments::ExperimentError;
-use psidpd_formats::files::{WriteError, write_atomically};
+use psidpd_formats::files::{PathError, write_atomically};
 use psidpd_report::{Progress, Table};
 use say::say;
 use serde::Serialize;
@@ -247,10 +247,8 @@ fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
 }
 
 /// Writes `value` to the file of `--json`, if the user named one.
-fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), WriteError> {
-    let Some(path) = json else { return Ok(()) };
-    let text = serde_json::to_string_pretty(value).map_err(|e| WriteError::at(path)(e.into()))? + "\n";
-    psidpd_formats::files::write_atomically(path, text.as_bytes())
+fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), PathError> {
+    json.map_or(Ok(()), |path| psidpd_formats::files::write_json(path, value))
 }
 
 /// Writes the results of a verb as [`write_json`] does, and ends it: well, or with a failed check.

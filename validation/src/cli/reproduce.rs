@@ -137,8 +137,7 @@ fn show(outcome: &Reproduction) {
 fn write_plots(outcome: &Reproduction, folder: &Path) -> Result<(), Failure> {
     for (name, plot) in &outcome.plots {
         let svg = plot.render()?;
-        let io = |source| Failure::from(ExperimentError::Io { path: folder.to_owned(), source });
-        std::fs::create_dir_all(folder).map_err(io)?;
+        std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
         write_atomically(folder.join(format!("{name}.svg")), svg.as_bytes())?;
     }
     Ok(())

@@ -29,7 +29,7 @@ pub fn completions(a: &Completions) -> Result<Verdict, Failure> {
 pub fn man(a: &Man, json: Option<&Path>) -> Result<Verdict, Failure> {
     std::fs::create_dir_all(&a.out)
         .and_then(|()| clap_mangen::generate_to(super::command(), &a.out))
-        .map_err(WriteError::at(&a.out))?;
+        .map_err(PathError::at("write", &a.out))?;
     say!("{}", a.out.join("psidpd.1").display());
     conclude(json, &json!({"folder": a.out}), true)
 }

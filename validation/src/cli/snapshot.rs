@@ -5,7 +5,7 @@ use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_formats::{Configuration, FormatError, Frame};
 use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
-use psidpd_report::{Figure, extent};
+use psidpd_report::{Figure, extremes};
 
 /// A picture of the particles, or of their density, in a data, dump or XYZ file; or a film of all its frames.
 #[derive(Debug, clap::Args)]
@@ -121,7 +121,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let chosen = (0..most).map(|k| (k * last) / (most - 1).max(1));
         let frames = chosen.map(|k| open(Some(k))).collect::<Result<Vec<_>, _>>()?;
         let values = frames.iter().map(|f| values(a, model.as_ref(), f)).collect::<Result<Vec<_>, _>>()?;
-        let ends = extent(values.iter().flatten().flatten().copied());
+        let ends = extremes(values.iter().flatten().flatten().copied());
         let images = frames
             .iter()
             .zip(&values)
@@ -141,7 +141,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     }
     let configuration = open(a.frame)?;
     let values = values(a, model.as_ref(), &configuration)?;
-    let ends = extent(values.iter().flatten().copied());
+    let ends = extremes(values.iter().flatten().copied());
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
     let bytes =
         if kind == "svg" { figure.render()?.into_bytes() } else { figure.with_scale_bar().to_png()? };

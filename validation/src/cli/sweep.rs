@@ -37,14 +37,12 @@ impl Arguments {
 }
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let jobs = a.jobs.or(NonZeroUsize::new(cores / a.threads.get())).unwrap_or(NonZeroUsize::MIN);
     let options = Options {
         scene: a.scene.clone(),
         edits: a.settings.edits.clone(),
         axes: a.over.clone(),
         out: a.out.clone(),
-        jobs,
+        jobs: a.jobs,
         threads: a.threads,
         overwrite: a.overwrite,
     };
@@ -55,8 +53,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let what = point.error.as_ref().map_or(String::new(), |e| format!(": {e}"));
         say!("{ended} of {total}: {}{what}", edits.join(", "));
     })?;
-    let title = a.scene.file_stem().map_or("sweep".into(), |n| n.to_string_lossy());
-    sweep::write(&options, &title, &points)?;
+    sweep::write(&options, &points)?;
     say!("");
     say::table(&sweep::table(&a.over, &points));
     say!("written to {}", a.out.join("sweep.csv").display());

@@ -1,6 +1,7 @@
 use super::node::{Content, Entry, Node, Table};
 use super::printable::is_control;
 use super::{FileError, FileErrorKind, Place};
+use std::fmt::Display;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -145,6 +146,14 @@ impl<'a> Value<'a> {
             Some(x) if f64::is_finite(x) => Ok(x),
             _ => Err(self.error("is not a finite number")),
         })
+    }
+
+    /// Passes on a number that this value gives, if it is from `low` to `high`.
+    pub fn within<T: PartialOrd + Display>(&self, number: T, low: T, high: T) -> Result<T, FileError> {
+        match (&low..=&high).contains(&&number) {
+            true => Ok(number),
+            false => Err(self.error(format!("must be from {low} to {high}, is {number}"))),
+        }
     }
 
     /// Reads a whole number from 0.

@@ -1,7 +1,7 @@
 //! The checkpoints in the folder of a run.
 
 use super::{Checkpoint, CheckpointError, NEWEST, format};
-use psidpd_formats::files::{WriteError, remove_all, remove_if_there};
+use psidpd_formats::files::{PathError, remove_all, remove_if_there};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -38,13 +38,13 @@ impl Store {
     }
 
     /// Writes a new checkpoint and keeps the newest as the previous one. If that fails, the present checkpoints stay.
-    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), WriteError> {
+    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), PathError> {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
         self.write_new(checkpoint, &new).map_err(|cause| {
             // A partial file only takes space, so failing to remove it is harmless.
             let _ = std::fs::remove_file(&new);
-            WriteError { path: newest, cause }
+            PathError { action: "write", path: newest, cause }
         })
     }
 
@@ -93,18 +93,18 @@ impl Store {
     }
 
     /// Makes the previous checkpoint the newest, so that the next write does not replace it.
-    pub fn fall_back(&self) -> Result<(), WriteError> {
+    pub fn fall_back(&self) -> Result<(), PathError> {
         let newest = self.path();
         std::fs::rename(self.folder.join(BEFORE), &newest)
             .and_then(|()| self.sync())
-            .map_err(WriteError::at(&newest))
+            .map_err(PathError::at("write", &newest))
     }
 
-    pub fn keep_newest(&self) -> Result<(), WriteError> {
+    pub fn keep_newest(&self) -> Result<(), PathError> {
         remove_all(&self.folder, &[UNFINISHED, BEFORE])
     }
 
-    pub fn clear(&self) -> Result<(), WriteError> {
+    pub fn clear(&self) -> Result<(), PathError> {
         remove_all(&self.folder, &Store::FILES)
     }
 

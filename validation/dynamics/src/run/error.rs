@@ -4,9 +4,9 @@ use crate::device::DeviceError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
 use psidpd_core::model::expression::TooLarge;
-use psidpd_formats::files::WriteError;
+use psidpd_formats::files::PathError;
 use psidpd_formats::memory::MemoryError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -91,19 +91,13 @@ pub enum RunError {
     Checkpoint(#[from] CheckpointError),
     #[error(transparent)]
     Format(#[from] psidpd_formats::FormatError),
-    #[error("{} cannot be written: {source}", path.display())]
-    Output { path: PathBuf, source: std::io::Error },
+    #[error("{} cannot be written: {}", .0.path.display(), .0.cause)]
+    Output(#[from] PathError),
 }
 
 impl From<StateError> for RunError {
     fn from(error: StateError) -> RunError {
         RunError::State(error.message)
-    }
-}
-
-impl From<WriteError> for RunError {
-    fn from(WriteError { path, cause }: WriteError) -> RunError {
-        RunError::Output { path, source: cause }
     }
 }
 
@@ -125,7 +119,7 @@ impl RunError {
 
     /// Whether writing a file failed, in contrast to the physics.
     pub(super) fn is_output(&self) -> bool {
-        matches!(self, RunError::Output { .. } | RunError::Format(_))
+        matches!(self, RunError::Output(_) | RunError::Format(_))
     }
 
     /// Advice that the message does not contain.
@@ -151,10 +145,6 @@ impl RunError {
             _ => return None,
         })
     }
-
-    pub(super) fn output(path: &Path) -> impl FnOnce(std::io::Error) -> RunError + '_ {
-        move |source| RunError::Output { path: path.to_owned(), source }
-    }
 }
 
 fn reached(step: &Option<u64>) -> String {
@@ -166,6 +156,7 @@ fn reached(step: &Option<u64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     /// Advice names the options of its caller and no others.
     #[test]

@@ -1,4 +1,5 @@
 use super::RunError;
+use psidpd_formats::PathError;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -11,8 +12,8 @@ pub(super) struct Folder {
 impl Folder {
     /// Creates the folder if it is missing, and locks it.
     pub fn open(path: &Path) -> Result<Folder, RunError> {
-        std::fs::create_dir_all(path).map_err(RunError::output(path))?;
-        let lock = File::open(path).map_err(RunError::output(path))?;
+        std::fs::create_dir_all(path).map_err(PathError::at("write", path))?;
+        let lock = File::open(path).map_err(PathError::at("write", path))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => Err(RunError::Busy { folder: path.to_owned() }),
             // Some file systems have no locks; a run there has none.

@@ -1,5 +1,5 @@
-use super::RunError;
 use crate::checkpoint::Written;
+use psidpd_formats::PathError;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -14,14 +14,14 @@ pub(super) struct GrowingFile {
 }
 
 impl GrowingFile {
-    pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, RunError> {
+    pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, PathError> {
         let path = folder.join(name);
-        let file = File::create(&path).map_err(RunError::output(&path))?;
+        let file = File::create(&path).map_err(PathError::at("write", &path))?;
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written: Written::default() })
     }
 
     /// Opens the file of a resumed run and truncates it to the bytes that were `written` at the checkpoint.
-    pub fn reopen(folder: &Path, name: &'static str, written: Written) -> Result<GrowingFile, RunError> {
+    pub fn reopen(folder: &Path, name: &'static str, written: Written) -> Result<GrowingFile, PathError> {
         let path = folder.join(name);
         let open = || {
             let mut file = File::options().write(true).open(&path)?;
@@ -29,21 +29,21 @@ impl GrowingFile {
             file.seek(SeekFrom::End(0))?;
             Ok(file)
         };
-        let file = open().map_err(RunError::output(&path))?;
+        let file = open().map_err(PathError::at("write", &path))?;
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written })
     }
 
     /// Calls `write`; an error names the file.
-    pub fn attempt(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> Result<(), RunError> {
-        write(self).map_err(|source| RunError::Output { path: self.path.clone(), source })
+    pub fn attempt(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> Result<(), PathError> {
+        write(self).map_err(PathError::at("write", &self.path))
     }
 
     /// Writes a line and flushes it, so that other programs can follow the file.
-    pub fn line(&mut self, text: &str) -> Result<(), RunError> {
+    pub fn line(&mut self, text: &str) -> Result<(), PathError> {
         self.attempt(|file| writeln!(file, "{text}").and_then(|()| file.flush()))
     }
 
-    pub fn sync(&mut self) -> Result<(), RunError> {
+    pub fn sync(&mut self) -> Result<(), PathError> {
         self.attempt(|file| {
             file.out.flush()?;
             file.out.get_ref().sync_data()

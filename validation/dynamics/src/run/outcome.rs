@@ -1,9 +1,7 @@
 //! Reports to the caller of a run: its progress, its outcome and its summary.
 
-use super::{Advice, Deviation, Means, RunError, Thermo, Timing};
+use super::{Advice, Deviation, Means, Thermo, Timing};
 use serde::Serialize;
-use std::io::Write;
-use std::path::Path;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
@@ -45,18 +43,6 @@ pub struct Summary {
     pub last: Thermo,
     /// Plain means over the thermo rows of the last stage, without error bars; `None` without rows.
     pub means: Option<Means>,
-}
-
-impl Summary {
-    pub(super) fn write(&self, path: &Path) -> Result<(), RunError> {
-        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
-        let write = |text: String| {
-            let mut file = std::fs::File::create(path)?;
-            file.write_all((text + "\n").as_bytes())?;
-            file.sync_all()
-        };
-        text.and_then(write).map_err(RunError::output(path))
-    }
 }
 
 impl std::fmt::Display for Summary {

@@ -6,13 +6,14 @@ use super::{RunError, Thermo};
 use crate::checkpoint::{Checkpoint, Store, Written};
 use crate::scene::{Scene, every};
 use psidpd_formats::dump::write_dump;
-use psidpd_formats::files::{remove_all, remove_if_there};
+use psidpd_formats::files::{PathError, remove_all, remove_if_there};
 use psidpd_formats::{Frame, GsdFile, write_xyz};
-use psidpd_observe::{Observation, write_csv, write_json};
+use psidpd_observe::{Observation, write_csv};
 use psidpd_pictures::{remove_snapshots, remove_vtk, write_snapshot, write_vtk};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 const THERMO: &str = "thermo.csv";
@@ -81,7 +82,7 @@ impl Output {
     }
 
     /// Writes a row of totals if one is due, and returns whether it was.
-    pub fn row(&mut self, thermo: &Thermo) -> Result<bool, RunError> {
+    pub fn row(&mut self, thermo: &Thermo) -> Result<bool, PathError> {
         let Some(file) = &mut self.thermo else { return Ok(false) };
         file.line(&thermo.line()).map(|()| true)
     }
@@ -96,7 +97,7 @@ impl Output {
             file.attempt(|file| write_xyz(frame, file))?;
         }
         if let Some((path, file)) = self.gsd.as_mut().filter(|_| every(intervals.gsd, step)) {
-            file.write(frame, &scene.mass).map_err(RunError::output(path))?;
+            file.write(frame, &scene.mass).map_err(PathError::at("write", path))?;
         }
         if every(intervals.vtk, step) {
             let kernel = scene.model.at(scene.kt)?.densities.first().map(|d| d.kernel);
@@ -113,9 +114,9 @@ impl Output {
         self.files().map(|file| (file.name.to_owned(), file.written)).collect()
     }
 
-    pub fn sync(&mut self) -> Result<(), RunError> {
+    pub fn sync(&mut self) -> Result<(), PathError> {
         if let Some((path, file)) = &self.gsd {
-            file.sync().map_err(RunError::output(path))?;
+            file.sync().map_err(PathError::at("write", path))?;
         }
         self.files().try_for_each(|file| file.sync())
     }
@@ -129,30 +130,39 @@ fn open_gsd(
     scene: &Scene,
     folder: &Path,
     open: impl FnOnce(&Path, u64) -> io::Result<GsdFile>,
-) -> Result<Option<(PathBuf, GsdFile)>, RunError> {
+) -> Result<Option<(PathBuf, GsdFile)>, PathError> {
     let every = scene.output.gsd;
     if every == 0 {
         return Ok(None);
     }
     let path = folder.join(GSD);
-    let file = open(&path, every).map_err(RunError::output(&path))?;
+    let file = open(&path, every).map_err(PathError::at("write", &path))?;
     Ok(Some((path, file)))
 }
 
 /// Writes `observables.json` and the tables in `observables/`, if there are any observations, and syncs them to the disk.
-pub(super) fn write_observations(folder: &Path, observations: &[Observation]) -> Result<(), RunError> {
+pub(super) fn write_observations(folder: &Path, observations: &[Observation]) -> Result<(), PathError> {
     if observations.is_empty() {
         return Ok(());
     }
-    let (json, tables) = (folder.join(OBSERVABLES), folder.join(TABLES));
-    write_csv(&tables, observations).map_err(RunError::output(&tables))?;
-    write_json(&json, observations)
-        .and_then(|()| File::open(&json)?.sync_all())
-        .map_err(RunError::output(&json))
+    let tables = folder.join(TABLES);
+    write_csv(&tables, observations).map_err(PathError::at("write", &tables))?;
+    write_json(&folder.join(OBSERVABLES), &observations)
+}
+
+/// Writes a value as indented JSON and syncs the file to the disk.
+pub(super) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PathError> {
+    let write = || -> io::Result<()> {
+        let text = serde_json::to_string_pretty(value)? + "\n";
+        let mut file = File::create(path)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    };
+    write().map_err(PathError::at("write", path))
 }
 
 /// Removes the tables that `observables.json` of an earlier run names, and their folder if it is then empty.
-fn remove_tables(folder: &Path) -> Result<(), RunError> {
+fn remove_tables(folder: &Path) -> Result<(), PathError> {
     let tables = folder.join(TABLES);
     let text = std::fs::read_to_string(folder.join(OBSERVABLES)).unwrap_or_default();
     let all: Vec<Observation> = serde_json::from_str(&text).unwrap_or_default();
@@ -168,7 +178,7 @@ fn remove_tables(folder: &Path) -> Result<(), RunError> {
     };
     match remove() {
         Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => {
-            Err(RunError::output(&tables)(error))
+            Err(PathError::at("write", &tables)(error))
         }
         _ => Ok(()),
     }

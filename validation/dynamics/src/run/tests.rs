@@ -383,7 +383,7 @@ fn folders_that_cannot_be_made_are_named() {
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
     let error = run_scene(&scene, &file.join("out"), &mut |_| ()).unwrap_err();
-    assert!(matches!(&error, RunError::Output { path, .. } if path.ends_with("file/out")), "{error}");
+    assert!(matches!(&error, RunError::Output(why) if why.path.ends_with("file/out")), "{error}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::RunError;
 use psidpd_core::engine::thermostat::Effort;
-use psidpd_formats::files::replace_through;
+use psidpd_formats::files::{PathError, replace_through};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -91,7 +91,7 @@ impl Timing {
 
     pub(super) fn write(&self, folder: &Path) -> Result<(), RunError> {
         let (path, new) = (folder.join(Self::NAME), folder.join("timing.json.new"));
-        let text = serde_json::to_string_pretty(self).map_err(|e| RunError::output(&path)(e.into()))? + "\n";
-        Ok(replace_through(&new, &path, text.as_bytes())?)
+        let text = serde_json::to_string_pretty(self).map_err(|e| PathError::at("write", &path)(e.into()))?;
+        Ok(replace_through(&new, &path, (text + "\n").as_bytes())?)
     }
 }

@@ -1,12 +1,12 @@
 //! The course of a run: its steps, its output and its end.
 
-use super::output::write_observations;
+use super::output::{write_json, write_observations};
 use super::watch::Watch;
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
 use crate::checkpoint::Position;
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
-use psidpd_formats::data::DataFile;
+use psidpd_formats::{DataFile, PathError};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -219,10 +219,10 @@ impl Runner<'_> {
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
         let path = self.write_good("final.data")?;
-        std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
+        std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(PathError::at("write", &path))?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
-        summary.write(&self.folder.path.join("summary.json"))?;
+        write_json(&self.folder.path.join("summary.json"), &summary)?;
         // From here on the run is finished, even if a later write fails.
         self.checkpoints.good.finished = true;
         self.store_good()?;

@@ -25,11 +25,7 @@ impl Composition {
         let section = value.section()?;
         for (name, value) in section.entries() {
             let index: usize = name.among("species", species.iter().zip(0..))?;
-            let fraction = value.number()?;
-            if !(0.0..=1.0).contains(&fraction) {
-                return Err(value.error(format!("must be from 0 to 1, is {fraction}")));
-            }
-            fractions[index] = fraction;
+            fractions[index] = value.within(value.number()?, 0.0, 1.0)?;
         }
         let sum: f64 = fractions.iter().sum();
         if (sum - 1.0).abs() > 1e-6 {

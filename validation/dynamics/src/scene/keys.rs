@@ -15,7 +15,6 @@ pub use scene::{BOX, MASSES, TOP};
 
 pub use psidpd_core::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
 use psidpd_core::document::keys::{form_key, key};
-use psidpd_observe::keys::PLAIN;
 
 /// All tables in the order of the documentation, except those of `[observe]`.
 pub const TABLES: &[Table] = &[TOP, BOX, MASSES, INITIAL, PART, BODY_FORCE, STAGE, OUTPUT];

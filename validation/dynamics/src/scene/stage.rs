@@ -179,10 +179,7 @@ fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError>
     let most = MOST_LEVELS.min(steps);
     let levels = match levels {
         None => DEFAULT_LEVELS.min(steps),
-        Some(value) => match value.count()? {
-            n if (1..=most).contains(&n) => n,
-            n => return Err(value.error(format!("must be from 1 to {most}, is {n}"))),
-        },
+        Some(value) => value.within(value.count()?, 1, most)?,
     };
     let level = |k: u64| Stage {
         level: Some([k, levels]),
@@ -209,18 +206,12 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     if let (Some(value), Some((lambda, [low, high]))) =
         (own("lambda", |other| other.settings().lambda.is_some())?, lambda)
     {
-        *lambda = value.number()?;
-        if !(low..=high).contains(lambda) {
-            return Err(value.error(format!("must be from {low} to {high}, is {lambda}")));
-        }
+        *lambda = value.within(value.number()?, low, high)?;
     }
     if let (Some(value), Some(gradient)) =
         (own("gradient", |other| other.settings().gradient.is_some())?, gradient)
     {
-        *gradient = value.number()?;
-        if !(0.0..=1.0).contains(gradient) {
-            return Err(value.error(format!("must be from 0 to 1, is {gradient}")));
-        }
+        *gradient = value.within(value.number()?, 0.0, 1.0)?;
     }
     let couples = |other: &mut Integrator| other.settings().coupling.is_some();
     if let (Some(value), Some(coupling)) = (own("thermostat_step", couples)?, &mut coupling) {

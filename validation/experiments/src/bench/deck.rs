@@ -77,9 +77,9 @@ fn files(place: &Place, subject: &Subject) -> [PathBuf; 2] {
 
 /// Writes what decks of a fluid refer to.
 pub fn prepare(place: &Place, subject: &Subject, with_tables: bool) -> Result<(), ExperimentError> {
-    std::fs::create_dir_all(&place.work).map_err(ExperimentError::io(&place.work))?;
+    std::fs::create_dir_all(&place.work).map_err(ExperimentError::at(&place.work))?;
     let [model, tables] = files(place, subject);
-    std::fs::write(&model, subject.text).map_err(ExperimentError::io(&model))?;
+    std::fs::write(&model, subject.text).map_err(ExperimentError::at(&model))?;
     if with_tables {
         eam::write(&subject.model()?.at(1.0)?, &[1.0], GRID, &tables)?;
     }

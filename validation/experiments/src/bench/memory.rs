@@ -49,7 +49,7 @@ fn in_child(program: &Path, particles: usize) -> Result<Child, ExperimentError> 
     let output = Command::new(program)
         .args(["bench", "--measure-memory", &particles.to_string()])
         .output()
-        .map_err(ExperimentError::io(program))?;
+        .map_err(ExperimentError::at(program))?;
     let said = String::from_utf8_lossy(&output.stdout);
     serde_json::from_str(&said).map_err(|_| {
         ExperimentError::Memory(format!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr)))

@@ -24,7 +24,7 @@ pub use spread::Spread;
 
 use crate::ExperimentError;
 use crate::code::{Code, Suffix};
-use crate::files;
+use crate::files::absolute_folder;
 use crate::fluids::{MDPD, SUBJECTS, Subject};
 use crate::lammps::host::PluginHost;
 use crate::lammps::log::Loop;
@@ -36,7 +36,7 @@ use length::{FEWEST, Length};
 pub use outcome::Asked;
 use outcome::{FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
-use psidpd_formats::files::write_atomically;
+use psidpd_formats::files::{write_atomically, write_json};
 use psidpd_report::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -102,7 +102,7 @@ struct Bench<'a> {
 /// started to measure memory.
 pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Benchmark, ExperimentError> {
     let load = load();
-    let out = files::absolute_folder(&options.out)?;
+    let out = absolute_folder(&options.out)?;
     let prepared = || PluginHost::prepared(options.lammps.as_deref(), &|line| progress.note(line));
     let (lammps, version) = progress.spinner("LAMMPS and the plugin", prepared)?;
     let place = Place { lammps, work: out.join("runs") };
@@ -141,7 +141,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
         memory,
         equal_bits,
     };
-    files::write_json(&out.join("bench.json"), &outcome)?;
+    write_json(&out.join("bench.json"), &outcome)?;
     write_atomically(out.join("report.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
 }

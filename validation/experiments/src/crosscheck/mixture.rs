@@ -34,7 +34,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let model = Model::parse("mixture", MODEL)?;
     let state = random_state()?;
     let folder = context.work.join("mixture");
-    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::at(&folder))?;
     let [data, tables] = ["start.data", "fluid.eam.alloy"].map(|name| folder.join(name));
     state.to_data("psidpd").write(&data)?;
     let grid = Grid { spacing: 1e-5, largest_density: 60.0, densities: 20_001 };

@@ -62,7 +62,7 @@ impl<'a> Setup<'a> {
         folder: &Path,
         absolute: bool,
     ) -> Result<String, ExperimentError> {
-        std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
+        std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
         let place = |name: &str| {
             if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
         };
@@ -79,7 +79,7 @@ impl<'a> Setup<'a> {
             Code::Psi => {
                 let path = folder.join("model.toml");
                 std::fs::write(&path, self.set.model(self.law, self.gamma)?.source().text())
-                    .map_err(ExperimentError::io(&path))?;
+                    .map_err(ExperimentError::at(&path))?;
             }
             Code::Eam => {
                 // ψ as embedding function, w as density and φ as pair potential: LAMMPS's own route to the same

@@ -43,7 +43,7 @@ fn deck(
     name: &str,
 ) -> Result<String, ExperimentError> {
     let folder = context.work.join(name);
-    std::fs::create_dir_all(&folder).map_err(ExperimentError::io(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(ExperimentError::at(&folder))?;
     let data = folder.join("start.data");
     state.to_data("psidpd").write(&data)?;
     let style = PairStyle::Dpd { a: strength, gamma, rc: 1.0 };

@@ -169,11 +169,8 @@ fn lammps(
     if length.frame > 0 {
         let path = folder.join("frames.txt");
         for frame in dump::read(&path)? {
-            let z = frame.get("z").ok_or_else(|| ExperimentError::Output {
-                path: path.clone(),
-                problem: "a frame has no column z".into(),
-            })?;
-            trace.frames.push(z);
+            let missing = || ExperimentError::at(&path)("a frame has no column z");
+            trace.frames.push(frame.get("z").ok_or_else(missing)?);
         }
     }
     Ok(trace)
@@ -193,19 +190,16 @@ fn last_step(path: &Path) -> Option<u64> {
 /// The file of `fix ave/time`: comments, then step and nine numbers.
 fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ExperimentError> {
     for numbers in files::rows(path)? {
-        let mut sample = <[f64; 10]>::try_from(numbers).map_err(|numbers| ExperimentError::Output {
-            path: path.into(),
-            problem: format!("a row has {} numbers, expected 10", numbers.len()),
-        })?;
+        let found = numbers.len();
+        let wrong = |_| ExperimentError::at(path)(format!("a row has {found} numbers, expected 10"));
+        let mut sample = <[f64; 10]>::try_from(numbers).map_err(wrong)?;
         sample[0] *= length.dt;
         trace.push(&sample);
     }
     let expected = (length.steps / length.sample) as usize + usize::from(!length.averaged);
     if trace.time.len() != expected {
-        return Err(ExperimentError::Output {
-            path: path.into(),
-            problem: format!("{} samples, expected {expected}", trace.time.len()),
-        });
+        let problem = format!("{} samples, expected {expected}", trace.time.len());
+        return Err(ExperimentError::at(path)(problem));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use crate::files;
 use crate::lammps::host::PluginHost;
 use crate::machine::machine;
 use psidpd_core::engine::Fault;
-use psidpd_formats::files::write_atomically;
+use psidpd_formats::files::{write_atomically, write_json};
 use psidpd_report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -103,7 +103,7 @@ pub fn check_table(results: &Results) -> Table {
 }
 
 fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<PathBuf, ExperimentError> {
-    write_atomically(out.join("results.json"), results.to_json()?.as_bytes())?;
+    write_json(&out.join("results.json"), results)?;
     sections.insert(0, conclusion::what_is_compared());
     sections.insert(0, conclusion::section(results));
     sections.push(Section::new("Checks", vec![Item::Table(check_table(results))]));

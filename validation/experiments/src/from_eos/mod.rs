@@ -103,7 +103,7 @@ pub fn from_eos(
     let mut attraction = -40.0;
     loop {
         let text = fluid::model(substance, &liquid, &units, options, attraction, command)?;
-        std::fs::write(&path, &text).map_err(ExperimentError::io(&path))?;
+        std::fs::write(&path, &text).map_err(ExperimentError::at(&path))?;
         let calibration = calibrate(
             &path,
             &Calibrate {
@@ -117,7 +117,7 @@ pub fn from_eos(
             command,
             &mut |_| {},
         )?;
-        std::fs::write(&path, &calibration.text).map_err(ExperimentError::io(&path))?;
+        std::fs::write(&path, &calibration.text).map_err(ExperimentError::at(&path))?;
         let [dense, tension] = slab(&path, options, folder.path())?;
         told(&format!(
             "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",

@@ -89,7 +89,7 @@ pub fn run(
     fault: Option<Fault>,
     progress: &Progress,
 ) -> Result<Vec<Verdict>, ExperimentError> {
-    let folder = tempfile::tempdir().map_err(ExperimentError::io(std::env::temp_dir()))?;
+    let folder = tempfile::tempdir().map_err(ExperimentError::at(&std::env::temp_dir()))?;
     let lammps = lammps.then(|| PluginHost::find(&|line| progress.note(line))).transpose()?;
     let mut cases = cases(extent);
     cases.retain(|case| only.is_none_or(|words| case.name.contains(words) || case.group.contains(words)));
@@ -113,7 +113,7 @@ pub fn run(
     }
     let bar = (progress, "hard cases");
     let verdicts = jobs::counted(bar, runs, |(case, lammps, integrator, precision, must, place)| {
-        std::fs::create_dir_all(&place).map_err(ExperimentError::io(&place))?;
+        std::fs::create_dir_all(&place).map_err(ExperimentError::at(&place))?;
         let (host, found) = match lammps {
             None => (Host::Native, native::carry_out(case, integrator, precision, &place, fault)?),
             Some(lammps) => (Host::Plugin, plugin::carry_out(lammps, case, precision, &place)?),

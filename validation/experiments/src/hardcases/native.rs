@@ -28,7 +28,7 @@ pub fn scene(
 ) -> Result<Result<Scene, FileError>, ExperimentError> {
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(ExperimentError::io(&path))
+        std::fs::write(&path, text).map_err(ExperimentError::at(&path))
     };
     write("model.toml", &run.model)?;
     if let Some(data) = &run.data {

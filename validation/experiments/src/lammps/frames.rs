@@ -19,8 +19,7 @@ pub fn show(
     (every, dt): (u64, f64),
     observers: &mut Observers,
 ) -> Result<(), ExperimentError> {
-    let missing =
-        || ExperimentError::Output { path: path.into(), problem: "it has no columns of positions".into() };
+    let missing = || ExperimentError::at(path)("it has no columns of positions");
     let pool = Pool::new(NonZeroUsize::MIN);
     for (k, frame) in dump::read(path)?.iter().enumerate() {
         let x = frame.vectors(["x", "y", "z"]).ok_or_else(missing)?;

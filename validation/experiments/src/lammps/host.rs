@@ -48,9 +48,9 @@ impl PluginHost {
         log: &str,
         limit: Duration,
     ) -> Result<String, ExperimentError> {
-        std::fs::create_dir_all(folder).map_err(ExperimentError::io(folder))?;
+        std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
         let path = folder.join(SCRIPT);
-        std::fs::write(&path, script).map_err(ExperimentError::io(&path))?;
+        std::fs::write(&path, script).map_err(ExperimentError::at(&path))?;
         let plugin = self.plugin.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
         let arguments = ["-log", log, "-var", "plugin", plugin.as_str()];
         Ok(self.host.run_script(ranks, folder, &path, &arguments, limit)?.stdout)

@@ -68,7 +68,7 @@ impl Context {
         let path = self.folder.join(format!("{name}.model.toml"));
         std::fs::create_dir_all(&self.folder)
             .and_then(|()| std::fs::write(&path, model))
-            .map_err(ExperimentError::io(&path))?;
+            .map_err(ExperimentError::at(&path))?;
         Ok(path)
     }
 
@@ -138,7 +138,7 @@ impl Context {
         outcome: &mut Reproduction,
     ) -> Result<(), ExperimentError> {
         let path = self.folder.join(run).join("thermo.csv");
-        let missing = || ExperimentError::Output { path: path.clone(), problem: "it is missing".into() };
+        let missing = || ExperimentError::at(&path)("it is missing");
         let table = SeriesTable::read(&path)?.ok_or_else(missing)?;
         let column = |name| table.get(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);
         for (file, axis, name, of) in [

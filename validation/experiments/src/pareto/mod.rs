@@ -27,7 +27,7 @@ pub use tolerance::Tolerance;
 
 use crate::ExperimentError;
 use crate::code::Host;
-use crate::files;
+use crate::files::absolute_folder;
 use crate::jobs;
 use crate::machine::machine;
 use lammps::LammpsRuns;
@@ -36,7 +36,7 @@ use own_style::is_another_law;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::scene::Scene;
-use psidpd_formats::files::write_atomically;
+use psidpd_formats::files::{write_atomically, write_json};
 use psidpd_report::Progress;
 use quantity::{Known, Quantities, deviations};
 use sample::{Made, Sampled};
@@ -76,7 +76,7 @@ const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 
 /// Holds the settings of a scene against each other, and writes `pareto.json` and `pareto.html`.
 pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comparison, ExperimentError> {
-    let out = files::absolute_folder(&options.out)?;
+    let out = absolute_folder(&options.out)?;
     let seconds = 60.0 * options.minutes;
     let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let limit = Duration::from_secs_f64(START * seconds);
@@ -153,7 +153,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
         recommended: None,
     };
     outcome.recommended = recommend(&origin, &outcome);
-    files::write_json(&out.join("pareto.json"), &outcome)?;
+    write_json(&out.join("pareto.json"), &outcome)?;
     write_atomically(out.join("pareto.html"), page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
 }

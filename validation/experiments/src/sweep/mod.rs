@@ -11,7 +11,7 @@ use crate::jobs;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
 use psidpd_dynamics::scene::{Edit, Scene};
-use psidpd_formats::files::{WriteError, write_atomically};
+use psidpd_formats::files::{PathError, write_atomically};
 use psidpd_report::{Headline, headline};
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -26,8 +26,8 @@ pub struct Options {
     pub axes: Vec<Axis>,
     /// Folder of the runs, `sweep.csv` and `report.html`.
     pub out: PathBuf,
-    /// How many runs go on side by side.
-    pub jobs: NonZeroUsize,
+    /// How many runs go on side by side; processors over threads if left out.
+    pub jobs: Option<NonZeroUsize>,
     pub threads: NonZeroUsize,
     /// Whether runs that are there are replaced; else they go on, and finished ones are taken as they are.
     pub overwrite: bool,
@@ -67,11 +67,12 @@ pub fn run(
     // What is wrong with the scene itself is said at once, and not once for each run.
     Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
     refuse_other_grid(options, &points)?;
-    std::fs::create_dir_all(&options.out).map_err(WriteError::at(&options.out))?;
+    std::fs::create_dir_all(&options.out).map_err(PathError::at("write", &options.out))?;
     let ended = AtomicUsize::new(0);
     let goes_on = |_: &_| stop.load(Ordering::Relaxed) == 0;
-    let threads = options.jobs.get().min(points.len());
-    Ok(jobs::on(threads, points.iter().enumerate().take_while(goes_on), |edits| {
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let at_once = options.jobs.map_or((cores / options.threads).max(1), NonZeroUsize::get);
+    Ok(jobs::on(at_once.min(points.len()), points.iter().enumerate().take_while(goes_on), |edits| {
         let point = run_point(options, edits, stop);
         if point.finished || point.error.is_some() {
             tell(&point, ended.fetch_add(1, Ordering::Relaxed) + 1);
@@ -150,10 +151,11 @@ fn attempt(options: &Options, edits: &[Edit], folder: &Path, stop: &AtomicUsize)
 }
 
 /// Writes `sweep.csv` and `report.html`.
-pub fn write(options: &Options, title: &str, points: &[Point]) -> Result<(), ExperimentError> {
+pub fn write(options: &Options, points: &[Point]) -> Result<(), ExperimentError> {
+    let title = options.scene.file_stem().map_or("sweep".into(), |name| name.to_string_lossy());
     let to = |name: &str, text: String| write_atomically(options.out.join(name), text.as_bytes());
     to(TABLE, page::csv(&options.axes, points))?;
-    Ok(to("report.html", page(title, &options.axes, points)?.render())?)
+    Ok(to("report.html", page(&title, &options.axes, points)?.render())?)
 }
 
 #[cfg(test)]
@@ -170,7 +172,7 @@ mod tests {
             edits: Vec::new(),
             axes: axes(&["kT=0.5,1", "density=5,6"]),
             out: folder.path().to_owned(),
-            jobs: NonZeroUsize::MIN,
+            jobs: None,
             threads: NonZeroUsize::MIN,
             overwrite: false,
         };
@@ -181,7 +183,7 @@ mod tests {
             ..Point::default()
         };
         let points: Vec<Point> = combinations(&options.axes).unwrap().iter().map(point).collect();
-        write(&options, "t", &points).unwrap();
+        write(&options, &points).unwrap();
         let try_over = |options: &mut Options, texts: &[&str]| {
             options.axes = axes(texts);
             refuse_other_grid(options, &combinations(&options.axes).unwrap()).map_err(|e| e.to_string())

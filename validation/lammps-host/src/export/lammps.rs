@@ -14,7 +14,7 @@ use psidpd_core::model::{Fluid, Model};
 use psidpd_dynamics::integrator::{Counterpart, Integrator};
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::scene::{Scene, Stage};
-use psidpd_formats::memory;
+use psidpd_formats::{PathError, memory};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
@@ -63,17 +63,17 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
 
 /// Writes what the script of a scene reads, with `state` as its start, and returns the names of the files.
 pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
-    std::fs::create_dir_all(out).map_err(LammpsError::io("write", out))?;
+    std::fs::create_dir_all(out).map_err(PathError::at("write", out))?;
     let mut files = vec![PathBuf::from(START), PathBuf::from(MODEL)];
     let (text, tables) = copy_of_model(scene)?;
     for (from, to) in tables {
         let path = out.join(&to);
         if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(LammpsError::io("write", parent))?;
+            std::fs::create_dir_all(parent).map_err(PathError::at("write", parent))?;
         }
         // Copying a file onto itself would empty it.
         if !path.canonicalize().is_ok_and(|there| from.canonicalize().is_ok_and(|here| here == there)) {
-            std::fs::copy(&from, &path).map_err(LammpsError::io("write", &path))?;
+            std::fs::copy(&from, &path).map_err(PathError::at("write", &path))?;
         }
         files.push(to);
     }
@@ -349,8 +349,8 @@ fn one_line(text: &str) -> String {
     text.chars().map(plain).collect()
 }
 
-fn save(path: &Path, text: &str) -> Result<(), LammpsError> {
-    std::fs::write(path, text).map_err(LammpsError::io("write", path))
+fn save(path: &Path, text: &str) -> Result<(), PathError> {
+    std::fs::write(path, text).map_err(PathError::at("write", path))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Totals against time, and their means.
 
 use super::super::text::typeset;
-use super::super::{Plot, Series, Style};
+use super::super::{Plot, Series, Style, extremes};
 use super::{About, FormatError, Item, Path, Section, with_error};
 use psidpd_formats::THERMO;
 use psidpd_formats::files::read_if_there;
@@ -244,8 +244,8 @@ impl<'a> Curves<'a> {
         let first = if self.stages.len() > 1 { rows.start } else { rows.start + rows.len() / 2 };
         let from = self.x.1[first];
         let late = |p: &&(f64, f64)| p.0 >= from && p.1.is_finite();
-        let points = plot.series.iter().flat_map(|s| s.points.iter().filter(late).map(|p| p.1));
-        let [low, high] = crate::extent(points.chain(plot.levels.iter().map(|l| l.0)));
+        let of_last = plot.series.iter().flat_map(|s| s.points.iter().filter(late).map(|p| p.1));
+        let [low, high] = extremes(of_last.chain(plot.levels.iter().map(|l| l.0)));
         let room = if high > low { high - low } else { high.abs().max(1.0) };
         let inside = |y: f64| y >= low - room && y <= high + room;
         let mut hidden = 0;

@@ -4,15 +4,13 @@ use super::scene::{
     GRADIENT, INTEGRATOR, LAMBDA, MAX_MOVE, NOISE, SWEEPS, THERMOSTAT_EVERY, THERMOSTAT_STEP,
 };
 use super::ValueKind::*;
-use super::{Key, OPTIONAL, PLAIN, REQUIRED, Table, key, names};
+use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
 
-pub const BODY_FORCE: Table = Table {
-    path: "body_force",
-    array: true,
-    about: "An external acceleration. A scene may have several, which add up. Potential energies and virials do \
-            not include it.",
-    keys: &[
+pub const BODY_FORCE: Table = Table::array("body_force",
+    "An external acceleration. A scene may have several, which add up. Potential energies and virials do \
+     not include it.",
+    &[
         key("acceleration", Point, REQUIRED,
             "The acceleration, for example gravity; the force is the mass times the acceleration.",
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]"),
@@ -28,20 +26,16 @@ pub const BODY_FORCE: Table = Table {
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\nparts = [\"drop\"]\n\
              [[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n\
              [[part]]\nshape = \"rest\"\ndensity = 0.1"),
-    ],
-    ..PLAIN
-};
+    ]);
 
 /// A key of the top level in a stage.
 const fn of_stage(of_top: Key, about: &'static str, example: &'static str) -> Key {
     Key { about, example, ..of_top }
 }
 
-pub const STAGE: Table = Table {
-    path: "stage",
-    array: true,
-    about: "The stages of a run, one after the other, each with its own conditions; they replace `steps`.",
-    keys: &[
+pub const STAGE: Table = Table::array("stage",
+    "The stages of a run, one after the other, each with its own conditions; they replace `steps`.",
+    &[
         key("name", Text, REQUIRED,
             "The name of the stage.", "[[stage]]\nname = \"equilibrate\"\nsteps = 500"),
         key("steps", Count, REQUIRED,
@@ -87,14 +81,11 @@ pub const STAGE: Table = Table {
         key("body_forces", Flag, OPTIONAL,
             "Whether body forces act; true if left out.",
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\n[[stage]]\nname = \"settle\"\nsteps = 1000\nbody_forces = false"),
-    ],
-    ..PLAIN
-};
+    ]);
 
-pub const OUTPUT: Table = Table {
-    path: "output",
-    about: "What a run writes in addition to its final state.",
-    keys: &[
+pub const OUTPUT: Table = Table::new("output",
+    "What a run writes in addition to its final state.",
+    &[
         key("thermo", Count, OPTIONAL,
             "Number of steps between rows of totals; 100 if left out, 0 for no rows.", "[output]\nthermo = 50"),
         key("dump", Count, OPTIONAL,
@@ -115,6 +106,4 @@ pub const OUTPUT: Table = Table {
             "Number of steps between checkpoints, from which an interrupted run continues; every ten minutes if \
              left out, 0 for a checkpoint only at the end.",
             "[output]\ncheckpoint = 10000"),
-    ],
-    ..PLAIN
-};
+    ]);

@@ -1,7 +1,7 @@
 //! Keys of the top level, the box and the masses.
 
 use super::ValueKind::*;
-use super::{Key, OPTIONAL, PLAIN, REQUIRED, Table, key, names};
+use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use crate::scene::domain::BOUNDARIES;
 use psidpd_core::engine::Precision;
@@ -50,11 +50,10 @@ pub(super) const MAX_MOVE: Key = key("max_move", Positive, OPTIONAL,
      is only one.",
     "integrator = \"monte-carlo\"\nmax_move = 0.1");
 
-pub const TOP: Table = Table {
-    path: "",
-    about: "The fluid, its temperature, the box and the length of the run. A scene needs a model, kT, a box, \
-            particles (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
-    keys: &[
+pub const TOP: Table = Table::new("",
+    "The fluid, its temperature, the box and the length of the run. A scene needs a model, kT, a box, \
+     particles (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
+    &[
         key("title", Text, OPTIONAL,
             "The name of the scene; the title of the model if left out.",
             "title = \"A drop of Warren's liquid\""),
@@ -96,14 +95,11 @@ pub const TOP: Table = Table {
         NOISE,
         SWEEPS,
         MAX_MOVE,
-    ],
-    ..PLAIN
-};
+    ]);
 
-pub const BOX: Table = Table {
-    path: "box",
-    about: "The box, if it needs more than lengths.",
-    keys: &[
+pub const BOX: Table = Table::new("box",
+    "The box, if it needs more than lengths.",
+    &[
         key("lengths", Lengths, OPTIONAL,
             "Lengths of its edges; required, except in a scene that starts from a file, where they are left \
              out.",
@@ -114,13 +110,8 @@ pub const BOX: Table = Table {
              outside and reverses its velocity across the face; no force acts through it. For a wall of \
              particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
-    ],
-    ..PLAIN
-};
+    ]);
 
-pub const MASSES: Table = Table {
-    path: "masses",
-    about: "Masses of the species; 1, or the mass in the data file, for species left out.",
-    keys: &[key("SPECIES", Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
-    ..PLAIN
-};
+pub const MASSES: Table = Table::new("masses",
+    "Masses of the species; 1, or the mass in the data file, for species left out.",
+    &[key("SPECIES", Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")]);
