@@ -90,7 +90,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
   std::string path = utils::get_potential_file_path(arg[2]);
   if (path.empty()) path = arg[2];
   set_names({arg + 3, arg + narg});
-  insist([&] {
+  attempt<true>([&] {
     const std::string read(read_model(path));
     style_from_text(path, read, update->unit_style, kt(), names, domain->dimension);
     source = path;

@@ -166,7 +166,7 @@ void PairPsi::refresh()
     stop("the temperature must be positive, found " + std::to_string(given.temperature));
   special.forget();
   exclusions.forget();
-  insist([&] {
+  attempt<true>([&] {
     if (!style || is_stale())
       style.emplace(make_style(kt()));
     else

@@ -93,8 +93,10 @@ class PairPsi : public LAMMPS_NS::Pair {
   void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   // Throws the text, for errors that make_style finds.
   [[noreturn]] static void complain(const std::string &text);
-  // Runs `work` on all ranks; stops them with the text of its error, after the stack of `work` has been unwound.
-  template <class Work> void insist(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
+  // Runs `work`; stops with the text of its error, after the stack of `work` has been unwound: all ranks if all do the work and
+  // fail alike, or this rank alone.
+  template <bool on_all_ranks = false, class Work>
+  auto attempt(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
   {
     std::string trouble;
     try {
@@ -102,7 +104,10 @@ class PairPsi : public LAMMPS_NS::Pair {
     } catch (const std::exception &e) {
       trouble = e.what();
     }
-    stop(trouble, file, line);
+    if constexpr (on_all_ranks)
+      stop(trouble, file, line);
+    else
+      stop_here(trouble, file, line);
   }
 
   const std::string name;
@@ -139,18 +144,6 @@ class PairPsi : public LAMMPS_NS::Pair {
   std::string search();
   [[noreturn]] void stop_here(const std::string &text, const char *file = __builtin_FILE(),
                               int line = __builtin_LINE());
-  // Runs `work`; stops with the text of its error, after the stack of `work` has been unwound.
-  template <class Work>
-  auto attempt(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
-  {
-    std::string trouble;
-    try {
-      return work();
-    } catch (const std::exception &e) {
-      trouble = e.what();
-    }
-    stop_here(trouble, file, line);
-  }
 
   // The arguments of pair_style.
   struct Given {

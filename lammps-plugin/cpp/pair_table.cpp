@@ -59,7 +59,7 @@ void PairTable::coeff(int narg, char **arg)
   utils::bounds(FLERR, arg[1], 1, types, jlo, jhi, error);
   Coefficients given{true, {}};
   for (int k = 0; k < count; k++) given.value[k] = utils::numeric(FLERR, arg[2 + k], false, lmp);
-  insist([&] { check(given); });
+  attempt<true>([&] { check(given); });
 
   int set = 0;
   for (int i = ilo; i <= ihi; i++)
