@@ -53,13 +53,13 @@ pub fn coefficients(input: &[u8]) {
         Err(error) => return assert!(!error.to_string().contains("internal error"), "{error}"),
     };
     assert!(!style.description("a fuzzer", false, true).is_empty());
-    assert!(style.engine.plan().cutoff >= 0.0);
+    assert!(style.engine.plan().cutoff() >= 0.0);
     if form < 3 {
         let text = style.model.source().text().to_owned();
         let names = style.model.species().to_vec();
         let again = Style::from_text("restart", &text, "lj", kt, &names, dimensions);
         let again = again.unwrap_or_else(|error| panic!("{error}\n{text}"));
-        assert_eq!(again.engine.plan().cutoff, style.engine.plan().cutoff);
+        assert_eq!(again.engine.plan().cutoff(), style.engine.plan().cutoff());
     }
     let _ = style.set_temperature(Bytes(input).number());
 }

@@ -328,9 +328,9 @@ impl Style {
     fn facts(&self) -> ffi::Facts {
         let (plan, scale) = (self.engine.plan(), &self.scale);
         ffi::Facts {
-            cutoff: scale.length * plan.cutoff,
+            cutoff: scale.length * plan.cutoff(),
             slope_width: plan.slope_width(),
-            variables: plan.densities().count() * plan.species.len(),
+            variables: plan.densities().count() * plan.species().len(),
             needs_velocities: plan.needs_velocities(),
             noise_range: scale.length * plan.noise_range().unwrap_or(0.0),
             energy_unit: scale.energy,

@@ -140,7 +140,7 @@ impl Style {
         for line in self.engine.plan().to_string().lines() {
             let _ = writeln!(text, "  {line}");
         }
-        if !self.engine.plan().conservative {
+        if !self.engine.plan().is_conservative() {
             text.push_str(
                 "  WARNING       this force law has no potential: it does work around closed loops and heats \
                  the fluid; the energy printed is not that of the forces\n",

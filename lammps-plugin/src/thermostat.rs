@@ -41,7 +41,7 @@ impl Style {
             let mass: &[f64] = &mass.iter().map(|m| m * unit).collect::<Vec<_>>();
             let particles = Particles { owned: mass.len(), ..request.particles };
             let pool = engine.pool();
-            let rank = Rank { around, particles, species_of_kind: &engine.plan().species_of_type, mass };
+            let rank = Rank { around, particles, species_of_kind: engine.plan().species_of_type(), mass };
             thermostat.find_pairs_of_rank(pool, &rank, heat.time / scale.time, heat.virial)?;
             let law = if heat.uniform { Law::Uniform } else { Law::Gaussian };
             thermostat.draw(pool, heat.seed, heat.step, Stream(0), law);

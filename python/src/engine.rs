@@ -58,7 +58,7 @@ impl Engine {
         Ok(Engine {
             species: model.model.species().to_vec(),
             dimensions: fluid.dimensions,
-            cutoff: engine.plan().cutoff,
+            cutoff: engine.plan().cutoff(),
             description: format!("{}\n{settings:?}", engine.plan()),
             engine: Mutex::new(engine),
             fluid,
@@ -69,8 +69,7 @@ impl Engine {
 
     /// Energy, virial, densities and conservative forces of particles in a box.
     ///
-    /// x : array (N, 3), in two dimensions also (N, 2): positions, wrapped or not. 64-bit numbers in the order of C are
-    ///     not copied.
+    /// x : array (N, 3), in two dimensions also (N, 2): positions, wrapped or not.
     /// box : a length, three lengths (two in two dimensions), or a matrix whose rows are the edge vectors.
     /// types : array (N,) of indices of species, from 0, or of their names; left out, all are of the first species.
     /// periodic : the periodic directions, all if left out.
@@ -94,24 +93,19 @@ impl Engine {
                 return Err(wrong(format!("x must have the shape (N, {}), has {shape}", self.dimensions)));
             }
         };
-        let flat: Vec<[f64; 3]>;
-        let points: &[[f64; 3]] = match width {
-            3 => positions.as_slice()?.as_chunks().0,
-            _ => {
-                flat = positions.as_slice()?.as_chunks().0.iter().map(|[x, y]| [*x, *y, 0.0]).collect();
-                &flat
-            }
+        // Without Python's lock another thread may write to the array, or resize it.
+        let points: Vec<[f64; 3]> = match width {
+            3 => positions.as_slice()?.as_chunks().0.to_vec(),
+            _ => positions.as_slice()?.as_chunks().0.iter().map(|[x, y]| [*x, *y, 0.0]).collect(),
         };
         let kinds = self.kinds(types, count)?;
         let periodic = directions(periodic, self.dimensions)?;
         let domain = self.domain(r#box, periodic)?;
         check_reach(&domain, self.dimensions, self.cutoff, count).map_err(exception)?;
         self.follow_fork()?;
-        // The arrays of numpy are borrowed, and no other borrow can write to them. A thread that writes without a borrow changes
-        // the result, as with numpy's own functions.
         let found = py.detach(|| {
             let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
-            engine.evaluate(points, &domain, &kinds)
+            engine.evaluate(&points, &domain, &kinds)
         });
         self.evaluation(py, found.map_err(exception)?, count, width)
     }

@@ -1,11 +1,12 @@
 //! The compiled part of the Python package `psidpd`. The rest of the package is written in Python.
 //!
-//! Contiguous arrays of 64-bit numbers are not copied. Long computations release Python's lock. Errors are those of
-//! `psidpd.errors`, with the messages of the command line.
+//! Long computations copy the arrays that they get, which other threads may change or free, and release Python's lock.
+//! Errors are those of `psidpd.errors`, with the messages of the command line.
 
 mod arrays;
 mod engine;
 mod errors;
+mod lent;
 mod live;
 mod model;
 mod phases;

@@ -2,8 +2,9 @@
 
 use crate::engine::thread_count;
 use crate::errors::{RunStoppedError, exception, wrong};
+use crate::lent::Lent;
 use crate::runs::{LOOK, read_scene};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2};
 use psidpd::run::{Live, Simulation};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -38,13 +39,8 @@ impl Steps {
     /// An array of numpy that is the same at every call.
     fn shown(&self, py: Python, part: usize) -> PyResult<Py<PyArray2<f64>>> {
         let vectors = self.with(py, |live| by_tag(live, PARTS[part]))?;
-        let made = self.arrays[part].get_or_init(|| {
-            let made = PyArray2::zeros(py, [vectors.len(), 3], false);
-            fill(&made, &vectors);
-            made.readwrite().make_nonwriteable();
-            made.unbind()
-        });
-        Ok(made.clone_ref(py))
+        let lent = Lent::array(py, &vectors)?.unbind();
+        Ok(self.arrays[part].get_or_init(|| lent).clone_ref(py))
     }
 }
 
@@ -56,14 +52,6 @@ fn by_tag<T: Copy + Default>(live: &Live, of: fn(&Simulation) -> &[T]) -> Vec<T>
         sorted[*tag as usize - 1] = *value;
     }
     sorted
-}
-
-fn fill(array: &Bound<PyArray2<f64>>, vectors: &[[f64; 3]]) {
-    // SAFETY: the array was made by `Steps::shown`, contiguous and with a row for each particle; the caller holds Python's
-    // lock, and users have the array as read-only.
-    if let Ok(numbers) = unsafe { array.as_slice_mut() } {
-        numbers.copy_from_slice(vectors.as_flattened());
-    }
 }
 
 #[pymethods]
@@ -104,7 +92,7 @@ impl Steps {
         })?;
         for (array, of) in self.arrays.iter().zip(PARTS) {
             if let Some(array) = array.get() {
-                fill(array.bind(py), &self.with(py, |live| by_tag(live, of))?);
+                Lent::renew(array.bind(py), &self.with(py, |live| by_tag(live, of))?)?;
             }
         }
         outcome.map_err(exception)?;

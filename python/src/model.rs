@@ -95,7 +95,7 @@ impl Model {
                 self.model.species().join(", ")
             )));
         }
-        let densities = rho.as_slice()?;
+        let densities = rho.as_slice()?.to_vec();
         if let Some(rho) = densities.iter().find(|rho| !(**rho >= 0.0 && rho.is_finite())) {
             return Err(wrong(format!(
                 "a density must be a finite number that is not negative, found {rho}"
@@ -124,7 +124,7 @@ impl Model {
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = kT.py();
         let temperatures = numbers(kT, "kT")?;
-        let temperatures = temperatures.as_slice()?;
+        let temperatures = temperatures.as_slice()?.to_vec();
         let rows =
             py.detach(|| temperatures.iter().map(|kt| phases::row(&self.model, *kt, density)).collect());
         let rows: Vec<phases::Row> = Result::from_iter::<Vec<Result<_, _>>>(rows)?;

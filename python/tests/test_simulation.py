@@ -57,6 +57,55 @@ def test_arrays_follow_the_run_and_cannot_be_written():
     assert simulation.kinetic_energy == pytest.approx(energy) and abs(v.sum(axis=0)).max() < 1e-9
 
 
+def test_lent_arrays_cannot_be_resized():
+    """Whatever a caller does with the arrays, the run writes to memory of its own, which lives as long as any array shows it."""
+    simulation = psidpd.Simulation(SCENE)
+    expected = psidpd.Simulation(SCENE)
+    for name in ("positions", "velocities", "forces"):
+        array = getattr(simulation, name)
+        count = len(array)
+        for shape in ((count, 3), (3, 3), (0, 3), (10 * count, 3)):
+            with pytest.raises(ValueError):
+                array.resize(shape, refcheck=False)
+        for again in (array, array.view(), array[:], array.T):
+            with pytest.raises(ValueError, match="WRITEABLE"):
+                again.setflags(write=True)
+        with pytest.raises((ValueError, BufferError)):
+            memoryview(array.base)[:] = 0
+        array.dtype = numpy.float32
+        with pytest.raises(ValueError):
+            array.resize((count, 3), refcheck=False)
+        array.shape = (-1,)
+    seen = [simulation.positions.view(numpy.float64).reshape(-1, 3), simulation.velocities[:0]]
+    for run in (simulation, expected):
+        run.run(3)
+    assert numpy.array_equal(seen[0], expected.positions)
+    # A view outlives the run and the array.
+    view = simulation.positions[:9]
+    kept = view.copy()
+    del simulation
+    other = [bytes(10_000) for _ in range(100)]
+    assert numpy.array_equal(view, kept) and len(other) == 100
+    # A caller may give the array other numbers; the run goes on.
+    simulation = psidpd.Simulation(SCENE)
+    array = simulation.positions
+    array.__setstate__((1, (2,), numpy.dtype(float), False, bytes(16)))
+    simulation.run(2)
+
+
+def test_forces_while_another_thread_resizes_the_positions():
+    engine = psidpd.Engine(psidpd.Model(MODELS / "warren2003-set6.toml"), kT=1.0)
+    x = 12.0 * numpy.random.default_rng(1).random((10_000, 3))
+    energy = engine.evaluate(x, 12.0).energy
+    worker = threading.Thread(target=lambda: [engine.evaluate(x, 12.0) for _ in range(20) if len(x)])
+    worker.start()
+    time.sleep(0.02)
+    x.resize((0, 3), refcheck=False)
+    worker.join()
+    x = 12.0 * numpy.random.default_rng(1).random((10_000, 3))
+    assert engine.evaluate(x, 12.0).energy == pytest.approx(energy)
+
+
 def test_forces_are_those_of_the_engine():
     """Two-stage steps keep drag and noise apart, so that what is left is the gradient of the energy."""
     simulation = psidpd.Simulation(SCENE | {"stage": [{"name": "run", "steps": 9, "dt": 0.02, "integrator": "two-stage"}]}, precision="double")

@@ -63,7 +63,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         let mut engine = Engine::new(&fluid, settings).map_err(|e| e.to_string())?;
         let mut cloud = Cloud::new(subject, &fluid, count);
         let mut thermostat =
-            PairThermostat::new(&sweep.plan, 1.0, &settings).ok_or("the fluid has no thermostat")?;
+            PairThermostat::new(sweep.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
         let (pool, dt) = (Pool::new(settings.threads), 6.0 * cloud.dt());
         for number in 0..evaluations {
             cloud.drift();
@@ -94,7 +94,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         }
         faces => {
             let mut rank = Rank::new(subject, &fluid, count, faces);
-            rank.find_ghosts(sweep.plan.cutoff);
+            rank.find_ghosts(sweep.plan().cutoff());
             for _ in 0..evaluations {
                 rank.drift();
                 rank.evaluate(&mut sweep, || ());
@@ -111,7 +111,7 @@ fn on_rank(mut rank: Rank, fluid: &Fluid, settings: Settings, evaluations: u32) 
     let mut engine = Engine::new(fluid, settings).map_err(|e| e.to_string())?;
     let mut thermostat =
         PairThermostat::new(engine.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
-    rank.find_ghosts(engine.plan().cutoff);
+    rank.find_ghosts(engine.plan().cutoff());
     let (pool, dt, owned) = (engine.pool().clone(), 6.0 * rank.cloud.dt(), rank.cloud.x.len());
     let (mass, kinds): (_, Vec<i32>) = (vec![1.0; owned], (0..fluid.species.len() as i32).collect());
     for number in 0..evaluations {

@@ -73,7 +73,7 @@ impl Any {
             }
             Any::Rank(rank) => {
                 let mut laps = vec![now()];
-                rank.find_ghosts(sweep.plan.cutoff);
+                rank.find_ghosts(sweep.plan().cutoff());
                 laps.push(now());
                 rank.evaluate(sweep, || laps.push(now()));
                 laps.push(now());
@@ -123,13 +123,13 @@ fn run(arguments: &[String]) -> Result<(), String> {
     }
     let mut best = [f64::INFINITY; 8];
     for _ in 0..ROUNDS {
-        let before = sweep.times;
+        let before = sweep.times();
         let began = Seconds::since(start);
         let around = (0..STEPS).fold(Seconds { wall: 0.0, processor: 0.0 }, |sum, _| {
             sum.plus(1.0, particles.step(&mut sweep, start))
         });
         let all = Seconds::since(start).plus(-1.0, began).plus(-1.0, around);
-        let after = sweep.times;
+        let after = sweep.times();
         let part = |of: fn(&Times) -> f64| of(&after) - of(&before);
         let parts = [
             all.wall,
@@ -152,7 +152,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         sweep.memory() / count
     );
     if let (Any::Cloud(mut cloud), Some(thermostat)) =
-        (particles, PairThermostat::new(&sweep.plan, 1.0, &settings))
+        (particles, PairThermostat::new(sweep.plan(), 1.0, &settings))
     {
         time_thermostat(&mut cloud, thermostat, &Pool::new(threads))?;
     }

@@ -283,10 +283,10 @@ fn run_sweep(
     let open = PeriodicBox::new(c.domain.origin(), edges, [false; 3]).unwrap();
     let around = psidpd_core::engine::Around { domain: &open, images: &[] };
     sweep.first(around, &Request { particles, v: &[], step: None, want: Want::TOTALS }, &mut forces).unwrap();
-    let width = sweep.plan.slope_width();
-    let mut slopes = sweep.slopes[..owned * width].to_vec();
+    let width = sweep.plan().slope_width();
+    let mut slopes = sweep.slopes_mut()[..owned * width].to_vec();
     images.forward(width, &mut slopes);
-    sweep.slopes.copy_from_slice(&slopes);
+    sweep.slopes_mut().copy_from_slice(&slopes);
     let tally = sweep.second(&particles, &mut forces).unwrap();
     (tally.energy(), forces, tally.virial)
 }

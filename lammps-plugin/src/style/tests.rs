@@ -101,7 +101,7 @@ fn types_without_coefficients_take_no_part() {
     for masses in [None, Some(&[7.0, 1.0, 2.0][..])] {
         let mut table = table.clone();
         let style = Style::from_coefficients(1.0, &table, 3, 3, masses).unwrap();
-        assert_eq!(style.engine.plan().species_of_type, [-1, -1, 0, -1]);
+        assert_eq!(style.engine.plan().species_of_type(), [-1, -1, 0, -1]);
         table[8] = Some(pair);
         let error = Style::from_coefficients(1.0, &table, 3, 3, masses).unwrap_err();
         assert!(error.to_string().contains("types 2 and 3"), "{error}");

@@ -221,10 +221,8 @@ impl Rank {
         force.fill([0.0; 3]);
         sweep.first(around, &Request { particles, v, step, want: Want::FORCES }, force).expect("densities");
         between();
-        let width = sweep.plan.slope_width();
-        let slopes = &mut sweep.slopes;
-        slopes.truncate(width * owned);
-        self.images.forward(width, slopes);
+        let width = sweep.plan().slope_width();
+        self.images.copy_to_ghosts(width, sweep.slopes_mut());
         between();
         sweep.second(&particles, &mut self.cloud.force).expect("forces");
     }

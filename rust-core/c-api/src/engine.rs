@@ -184,7 +184,7 @@ pub unsafe extern "C" fn psidpd_engine_describe(engine: *const Engine, facts: *m
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(facts, "facts")?) };
         let plan = engine.engine.plan();
         out.put(EngineFacts {
-            cutoff: plan.cutoff,
+            cutoff: plan.cutoff(),
             noise_range: plan.noise_range().unwrap_or(0.0),
             slope_width: plan.slope_width(),
             needs_velocities: plan.needs_velocities().into(),

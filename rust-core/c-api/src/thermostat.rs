@@ -58,7 +58,7 @@ pub unsafe extern "C" fn psidpd_thermostat_new(
         let (plan, settings) = (engine.engine.plan(), engine.engine.settings());
         let thermostat = PairThermostat::new(plan, engine.kt, &settings)
             .ok_or_else(|| Failure::new(Status::Model, "the model has no thermostat with drag"))?;
-        let (pool, species) = (Arc::clone(engine.engine.pool()), plan.species.len());
+        let (pool, species) = (Arc::clone(engine.engine.pool()), plan.species().len());
         out.put(Box::into_raw(Box::new(Thermostat { thermostat, pool, species })));
         Ok(())
     })

@@ -52,7 +52,7 @@ impl Shader {
         body += &writer.many_body();
         body += &writer.excess()?;
         let add_weights = writer.add_weights();
-        let densities = plan.passes.iter().map(|d| &fluid.densities[*d]);
+        let densities = plan.passes().iter().map(|d| &fluid.densities[*d]);
         let of_density = densities.map(|d| d.kernel.range()).fold(0.0, f64::max);
         let of_drag = plan.noise_range().unwrap_or(0.0);
         let ranges = [("RANGE2", fluid.cutoff()), ("DENSITY_RANGE2", of_density), ("DRAG_RANGE2", of_drag)];
@@ -233,7 +233,7 @@ impl Writer<'_> {
         let of = |this: &mut Self, a: usize, b: usize| {
             let (count, plan, fluid) = (this.count(), this.plan, this.fluid);
             let mut text = String::new();
-            for (k, term) in plan.linear.iter().enumerate() {
+            for (k, term) in plan.linear().iter().enumerate() {
                 let c = term.coefficients[a * count + b] + term.coefficients[b * count + a];
                 if c != 0.0 {
                     let c = this.number(c);
@@ -307,7 +307,7 @@ impl Writer<'_> {
             text += "let of_other = species_of(vel[j]);\n";
         }
         let other = if count > 1 { "of_other" } else { "0u" };
-        for (p, d) in self.plan.passes.iter().enumerate() {
+        for (p, d) in self.plan.passes().iter().enumerate() {
             let weight = self.weight(&self.fluid.densities[*d].kernel.clone(), "value");
             let _ = writeln!(text, "            n[{}u + {other}] += {weight};", p * count);
         }
@@ -319,7 +319,7 @@ impl Writer<'_> {
         let count = self.count();
         let mut text =
             "fn many_body(i: u32, j: u32, a: u32, b: u32, r: f32) -> f32 {\n    var sum = 0.0;\n".to_owned();
-        for (p, d) in self.plan.passes.iter().enumerate() {
+        for (p, d) in self.plan.passes().iter().enumerate() {
             let kernel = self.fluid.densities[*d].force_kernel;
             let (slope, range, first) =
                 (self.weight(&kernel, "slope"), self.number(kernel.range()), p * count);
@@ -355,7 +355,7 @@ impl Writer<'_> {
     fn excess_of(&mut self, alpha: usize) -> Result<String, Unsupported> {
         let (count, fluid, plan) = (self.count(), self.fluid, self.plan);
         let variables: Vec<usize> =
-            plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
+            plan.passes().iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
         let mut text = String::new();
         for (k, v) in variables.iter().enumerate() {
             let density = &fluid.densities[v / count];

@@ -12,7 +12,7 @@ pub struct PeriodicBox {
 /// The error of an invalid box.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DomainError {
-    /// An edge or the origin is not finite, or the edges span no volume.
+    /// An edge, the origin or the volume is not finite, or the edges span no volume.
     #[error("the box has edges that span no volume, or are not finite")]
     Degenerate,
 }
@@ -29,7 +29,7 @@ impl PeriodicBox {
     /// Builds a box at `origin` with the columns of `edges` as edge vectors.
     ///
     /// # Errors
-    /// Fails for edges that are not finite, or span no positive volume.
+    /// Fails for edges that are not finite, or span no positive and finite volume.
     pub fn new(
         origin: [f64; 3],
         edges: Matrix3<f64>,
@@ -39,7 +39,7 @@ impl PeriodicBox {
         let finite = origin.iter().chain(edges.iter()).all(|x| x.is_finite());
         let inverse = edges.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()));
         match inverse {
-            Some(inverse) if finite && edges.determinant() > 0.0 => {
+            Some(inverse) if finite && edges.determinant() > 0.0 && edges.determinant().is_finite() => {
                 Ok(PeriodicBox { origin, edges, inverse, periodic })
             }
             _ => Err(DomainError::Degenerate),

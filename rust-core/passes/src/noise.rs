@@ -87,9 +87,10 @@ impl PairNoise {
         PairNoise { key: threefry2x32::<20>(split(step), split(seed)) }
     }
 
-    /// One of several independent noises of a step: `stream` 0 is that of [`PairNoise::new`]. Steps are below 2⁵⁶.
-    pub fn of_stream(seed: u64, step: u64, stream: u8) -> PairNoise {
-        PairNoise::new(seed, step | u64::from(stream) << 56)
+    /// One of several independent noises of a step: `stream` 0 is that of [`PairNoise::new`]. Steps are below 2⁴⁸.
+    pub fn of_stream(seed: u64, step: u64, stream: u16) -> PairNoise {
+        let [low, high] = stream.to_le_bytes().map(u64::from);
+        PairNoise::new(seed, step | low << 56 | high << 48)
     }
 
     /// The key of the pairs of this step.

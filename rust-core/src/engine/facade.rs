@@ -9,8 +9,8 @@ use super::particles::Particles;
 use super::path::{Path, Reason};
 use super::plan::Plan;
 use super::request::{Evaluated, Request, Results};
-use super::surroundings::{Around, SpecialPair, Surroundings};
-use super::sweep::{Pool, Sweep, Times};
+use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
+use super::sweep::{Pool, Sweep, Times, UNFIT};
 use super::sweep_path::SweepPath;
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -150,12 +150,12 @@ impl Engine {
 
     /// The settings of the sweep, with the instruction set in use.
     pub fn settings(&self) -> Settings {
-        self.sweep.sweep.settings
+        self.sweep.sweep.settings()
     }
 
     /// The pool of threads.
     pub fn pool(&self) -> &Arc<Pool> {
-        &self.sweep.sweep.pool
+        self.sweep.sweep.pool()
     }
 
     /// Times and counts of the engine's work since it was made.
@@ -164,7 +164,7 @@ impl Engine {
         let (a, b) = (sums.excess_pass.out_of_bounds, sweep.out_of_bounds());
         let c = self.device.as_ref().map_or([0; 2], |device| device.out_of_bounds());
         Statistics {
-            times: sweep.times,
+            times: sweep.times(),
             counts: sums.counts + sweep.counts(),
             out_of_bounds: [a[0] + b[0] + c[0], a[1] + b[1] + c[1]],
         }
@@ -289,7 +289,20 @@ impl Engine {
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
-        self.begin(Surroundings::Box(domain), request.want)?.whole(domain, request, force, add)
+        let path = self.begin(Surroundings::Box(domain), request.want)?;
+        match path.whole(domain, request, force, add) {
+            Err(UNFIT) if self.path == Some(Path::Sweep) => {
+                self.take_pair_sums().whole(domain, request, force, add)
+            }
+            done => done,
+        }
+    }
+
+    /// Sums over pairs, for particles that are too far apart for a sweep, which has not begun then.
+    fn take_pair_sums(&mut self) -> &mut dyn Evaluate {
+        self.path = Some(Path::PairSums(Reason::FarApart));
+        self.tell_pair_sums();
+        &mut self.pair_sums
     }
 
     /// The first half of an evaluation, which needs no slopes of ghosts. The second half, [`Pending::finish`], has the
@@ -305,8 +318,20 @@ impl Engine {
         request: &Request,
         force: &mut [[f64; 3]],
     ) -> Result<Pending, EngineError> {
-        let path = self.begin(surroundings, request.want)?;
-        path.first(surroundings, request, force)?;
+        let mut path = self.begin(surroundings, request.want)?;
+        match path.first(surroundings, request, force) {
+            Err(UNFIT) if self.path == Some(Path::Sweep) => {
+                // Other ranks may sweep: these leave ghosts without forces too.
+                let surroundings = match surroundings {
+                    Surroundings::Ghosts(around, _) => Surroundings::Ghosts(around, Newton::Off),
+                    others => others,
+                };
+                path = self.take_pair_sums();
+                path.first(surroundings, request, force)?;
+            }
+            done => done?,
+        }
+        let path = self.last_mut();
         Ok(Pending { slopes: std::mem::take(path.slopes_mut()), number: self.number })
     }
 

@@ -62,6 +62,11 @@ impl Images {
     /// particles and grows by the ghosts.
     pub fn forward<T: Copy + Default>(&self, width: usize, values: &mut Vec<T>) {
         values.resize((self.owned + self.owner.len()) * width, T::default());
+        self.copy_to_ghosts(width, values);
+    }
+
+    /// Copies `width` numbers per particle from owners to their ghosts, which follow them in `values`.
+    pub fn copy_to_ghosts<T: Copy>(&self, width: usize, values: &mut [T]) {
         let (own, ghosts) = values.split_at_mut(self.owned * width);
         if width == 0 {
             return;

@@ -25,6 +25,8 @@ pub enum Reason {
     Densities,
     /// The box is narrower than twice the cut-off, or its edges have another orientation than those of LAMMPS.
     Box,
+    /// The particles are so far apart that the sweep would lose pairs, or count them twice.
+    FarApart,
     /// The host has disabled the sweep.
     Asked,
 }
@@ -58,6 +60,7 @@ impl fmt::Display for Reason {
             Reason::ParticleValues => "energies or virials of single particles are needed",
             Reason::Densities => "a density is requested that no force needs",
             Reason::Box => "the box is narrower than twice the cut-off, or its edges are turned",
+            Reason::FarApart => "some particles are too far away from the others",
             Reason::Asked => "it was asked for",
         })
     }

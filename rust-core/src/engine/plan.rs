@@ -21,16 +21,16 @@ use std::fmt;
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
     /// The names of the species.
-    pub species: Vec<String>,
+    pub(super) species: Vec<String>,
     /// Number of dimensions, 2 or 3.
-    pub dimensions: usize,
+    pub(super) dimensions: usize,
     /// Longest range of all forces; particles further apart do not interact.
-    pub cutoff: f64,
+    pub(super) cutoff: f64,
     pub(super) densities: Vec<WeightedDensity>,
     /// Indices of the densities in which some ψ is not linear; their order is that of the variables of `excess`.
-    pub passes: Vec<usize>,
+    pub(super) passes: Vec<usize>,
     /// The densities that act as pair potentials.
-    pub linear: Vec<LinearTerm>,
+    pub(super) linear: Vec<LinearTerm>,
     pub(super) excess: Vec<ExcessPlan>,
     pub(super) pairs: Vec<PairTerm>,
     pub(super) thermostat: Option<ThermostatPlan>,
@@ -39,9 +39,9 @@ pub struct Plan {
     title: String,
     /// The species of each of the host's types, negative for particles that do not interact; at first types are species
     /// indices.
-    pub species_of_type: Vec<i32>,
+    pub(super) species_of_type: Vec<i32>,
     /// Whether the forces have a potential.
-    pub conservative: bool,
+    conservative: bool,
 }
 
 /// A density that acts as a pair potential.
@@ -58,7 +58,7 @@ pub struct LinearTerm {
 }
 
 /// Coefficients of dissipative and random forces, row-major in species.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ThermostatPlan {
     pub gamma: Vec<f64>,
     /// Noise amplitude `√(2γkT)`.
@@ -109,7 +109,13 @@ impl Plan {
         self
     }
 
+    /// # Panics
+    /// Panics for a fluid whose lists have been made shorter or longer: the passes read tables by species without checks.
     fn of_passes(fluid: &Fluid, passes: Vec<usize>, linear: Vec<LinearTerm>) -> Result<Plan, TooLarge> {
+        let count = fluid.species.len();
+        assert!(matches!(fluid.dimensions, 2 | 3), "a fluid has two or three dimensions");
+        assert!(fluid.thermostats.len() == count * count && fluid.excess.len() == count, "a list by species");
+        assert!(fluid.pairs.iter().flat_map(|p| p.between).all(|s| s < count), "a pair of species");
         let psi = |alpha| plan_excess(fluid, alpha, &passes);
         let excess = (0..fluid.species.len()).map(psi).collect::<Result<Vec<_>, _>>()?;
         Ok(Plan {
@@ -127,6 +133,41 @@ impl Plan {
             species_of_type: (0..fluid.species.len() as i32).collect(),
             conservative: fluid.is_conservative(),
         })
+    }
+
+    /// The names of the species.
+    pub fn species(&self) -> &[String] {
+        &self.species
+    }
+
+    /// Number of dimensions, 2 or 3.
+    pub fn dimensions(&self) -> usize {
+        self.dimensions
+    }
+
+    /// Longest range of all forces; particles further apart do not interact.
+    pub fn cutoff(&self) -> f64 {
+        self.cutoff
+    }
+
+    /// Indices of the densities in which some ψ is not linear; their order is that of the variables of ψ.
+    pub fn passes(&self) -> &[usize] {
+        &self.passes
+    }
+
+    /// The densities that act as pair potentials.
+    pub fn linear(&self) -> &[LinearTerm] {
+        &self.linear
+    }
+
+    /// The species of each of the host's types, negative for particles that do not interact.
+    pub fn species_of_type(&self) -> &[i32] {
+        &self.species_of_type
+    }
+
+    /// Whether the forces have a potential.
+    pub fn is_conservative(&self) -> bool {
+        self.conservative
     }
 
     /// The names of the local densities.

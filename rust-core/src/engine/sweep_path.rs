@@ -77,6 +77,8 @@ impl SweepPath {
 
     /// Computes the contributions of special pairs, and adds those to the densities.
     fn begin(&mut self, around: Around, request: &Request) -> Result<(), EngineError> {
+        request.particles.check(26)?;
+        request.particles.check_images(around.images)?;
         let SweepPath { sweep, special, corrections, excludes_special, .. } = self;
         let Sweep { plan, exclusions, added_densities, .. } = sweep;
         exclusions.check(request.particles.x.len())?;

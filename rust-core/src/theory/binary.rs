@@ -121,6 +121,11 @@ impl Line for CompositionLine<'_> {
         (x / (1.0 - x)).ln()
     }
 
+    fn u_below(&self, end: f64, below: f64) -> f64 {
+        let rest = fractions(end)[1] + below;
+        ((1.0 - rest) / rest).ln()
+    }
+
     fn curvature(&self, u: f64) -> f64 {
         let [a, b] = self.densities(u);
         let f = self.theory.excess_second_derivatives(&[a, b]);

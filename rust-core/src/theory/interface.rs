@@ -126,17 +126,22 @@ fn planar(
             return Err(TheoryError::GradientNotPositive { at, coefficient });
         }
     }
+    let u_of = |theta: f64| match theta < 0.5 * PI {
+        true => line.u(place(theta)),
+        false => line.u_below(u2, distance(theta)[1]),
+    };
     // W is the height above the double tangent, or the double integral of f″ where that is a difference of large numbers.
     let height = |theta: f64| {
         let x = place(theta);
-        let u = line.u(x);
+        let u = u_of(theta);
         let (own_slope, own_intercept) = (line.slope(u), line.intercept(u));
         let below = x * (own_slope - slope) - (own_intercept - intercept);
         if below > 1e-6 * ((x * own_slope).abs() + own_intercept.abs()) {
             return below;
         }
         let near = usize::from(theta > 0.5 * PI);
-        energy * twice_integrated(line, [u1, u2][near], u, distance(theta)[near], &rule).max(0.0)
+        let integral = energy * twice_integrated(line, [u1, u2][near], u, distance(theta)[near], &rule);
+        if integral < 0.0 { 0.0 } else { integral }
     };
     // dx/dz = √(2W/κ), and dz/dθ = half sin θ / (dx/dz).
     let steepness = |theta: f64| (2.0 * height(theta) / kappa(place(theta))).sqrt();
@@ -175,6 +180,9 @@ fn planar(
 fn twice_integrated(line: &dyn Line, end: f64, u: f64, away: f64, rule: &[(f64, f64)]) -> f64 {
     let start = line.x(end);
     let sign = (u - end).signum();
+    if !u.is_finite() {
+        return f64::NAN;
+    }
     let (mut from, mut width, mut total) = (u, 0.25, 0.0);
     while from != end {
         let mut to = from - sign * width;

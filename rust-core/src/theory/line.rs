@@ -10,6 +10,10 @@ pub trait Line {
     fn x(&self, u: f64) -> f64;
     /// The parameter `u(x)`.
     fn u(&self, x: f64) -> f64;
+    /// The parameter where `x` is `below` less than at `end`. There `x` itself may round to its highest value.
+    fn u_below(&self, end: f64, below: f64) -> f64 {
+        self.u(self.x(end) - below)
+    }
     /// The curvature `g″(x)`, times a positive factor that makes it 1 for an ideal gas or an ideal mixture.
     fn curvature(&self, u: f64) -> f64;
     /// The slope `g′(x)`, which is equal in two coexisting phases.

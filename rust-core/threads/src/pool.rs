@@ -5,13 +5,16 @@
 //! starts the workers. Each worker does its part and marks itself as done. The caller does its own part
 //! and returns when no worker is busy: then no thread uses the borrowed work.
 
+mod balance;
 mod meeting;
 mod sync;
 
 use crate::shared_slice::SharedSlice;
+use balance::Balance;
 use meeting::Meeting;
 use std::cell::RefCell;
 use std::num::NonZeroUsize;
+use std::time::{Duration, Instant};
 use sync::{
     Arc, AtomicBool, AtomicUsize, Builder, Condvar, JoinHandle, Mutex, Ordering, spin_loop, thread_local,
 };
@@ -21,7 +24,8 @@ use sync::{
 /// once, so that threads with work get the processors.
 ///
 /// Pieces of work never overlap: a second thread that calls [`Pool::run`] waits until the first is
-/// done. If work calls [`Pool::run`] of its own pool, the calling thread does all parts of the inner
+/// done. Where threads hold each other, because other programs use their processors, the calling thread does all parts for a
+/// while if that is faster. If work calls [`Pool::run`] of its own pool, the calling thread does all parts of the inner
 /// piece. The same holds in a process that was forked from the one with the pool: it has no workers.
 pub struct Pool {
     shared: Arc<Shared>,
@@ -29,7 +33,7 @@ pub struct Pool {
     /// Identifier of the process that made the pool.
     process: u32,
     /// Locked while a piece of work runs.
-    turn: Mutex<()>,
+    turn: Mutex<Balance>,
 }
 
 /// The error of a number of threads that no pool can have.
@@ -115,7 +119,7 @@ impl Pool {
         };
         // If the system creates fewer threads, these do all the work.
         let workers = (1..threads.get().min(Pool::MOST)).map_while(|number| spawn(number).ok()).collect();
-        Pool { shared, workers, process: std::process::id(), turn: Mutex::new(()) }
+        Pool { shared, workers, process: std::process::id(), turn: Mutex::new(Balance::new(Instant::now())) }
     }
 
     /// Whether this process was forked from the one that made the pool.
@@ -144,8 +148,28 @@ impl Pool {
             return (0..self.threads()).for_each(work);
         }
         // Locals are dropped in the opposite order: the turn ends when no worker is busy.
-        let _turn = self.turn.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut turn = self.turn.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let _within = Within::enter(&self.shared);
+        if self.prefers_alone(&mut turn) {
+            return (0..self.threads()).for_each(work);
+        }
+        turn.add_wait(self.share(work));
+    }
+
+    /// Whether the calling thread, whose turn it is, does all parts of the next piece of work.
+    fn prefers_alone(&self, turn: &mut Balance) -> bool {
+        // The tests that go through all orders of the threads, or interpret them, know no time.
+        !cfg!(any(loom, miri)) && turn.begin(Instant::now(), self.threads())
+    }
+
+    /// The sum of the times in which one thread has worked for all, because others would have held it.
+    pub fn time_alone(&self) -> Duration {
+        self.turn.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).time_alone()
+    }
+
+    /// Calls `work` with each number of a thread on that thread; returns how long the caller has waited for the others. It is
+    /// the caller's turn.
+    fn share(&self, work: &(dyn Fn(usize) + Sync)) -> Duration {
         // SAFETY: only the lifetime is removed from the type. Workers use the pointer only between
         // `call` and marking themselves as done, and `Wait` keeps this function from returning or
         // unwinding before all have; the turn keeps other callers from starting workers meanwhile.
@@ -155,8 +179,9 @@ impl Pool {
         self.shared.call(Some(Work(pointer)));
         let wait = Wait(&self.shared);
         work(0);
-        drop(wait);
+        let waited = time_of(|| drop(wait));
         assert!(!self.shared.failed.load(Ordering::Relaxed), "a worker thread panicked");
+        waited
     }
 
     /// Calls `work` once with each of `things`, which are divided among the threads: as many things as
@@ -196,10 +221,15 @@ impl Pool {
         if self.is_alone() || things.len() == 1 {
             return stages.iter().for_each(|stage| things.iter_mut().for_each(stage));
         }
+        let mut turn = self.turn.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let _within = Within::enter(&self.shared);
+        if self.prefers_alone(&mut turn) {
+            return stages.iter().for_each(|stage| things.iter_mut().for_each(stage));
+        }
         let (threads, things) = (self.threads(), SharedSlice::new(things));
         let meeting = Meeting::new(threads, self.shared.spins);
-        self.run(&|t| {
-            // SAFETY: `run` calls this once for each number of a thread, and `part` makes
+        let waited = self.share(&|t| {
+            // SAFETY: `share` calls this once for each number of a thread, and `part` makes
             // ranges of different numbers disjoint.
             let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
             let mut panic = None;
@@ -220,6 +250,7 @@ impl Pool {
                 std::panic::resume_unwind(what);
             }
         });
+        turn.add_wait(waited + meeting.waited());
     }
 }
 
@@ -261,6 +292,17 @@ impl Drop for Within {
 
 fn address(shared: &Arc<Shared>) -> usize {
     std::ptr::from_ref::<Shared>(shared).addr()
+}
+
+/// The time that `wait` takes.
+fn time_of(wait: impl FnOnce()) -> Duration {
+    if cfg!(any(loom, miri)) {
+        wait();
+        return Duration::ZERO;
+    }
+    let since = Instant::now();
+    wait();
+    since.elapsed()
 }
 
 /// Waits for the workers when it is dropped.

@@ -164,9 +164,9 @@ mod tests {
     fn fluids_are_what_their_names_say() {
         let plan = |s: &Subject| Plan::new(&s.model().unwrap().at(1.0).unwrap()).unwrap();
         assert_eq!(SUBJECTS.map(|s| plan(&s).slope_width()), [1, 0, 4]);
-        assert_eq!(SUBJECTS.map(|s| plan(&s).cutoff), [1.0; 3]);
+        assert_eq!(SUBJECTS.map(|s| plan(&s).cutoff()), [1.0; 3]);
         for subject in &SUBJECTS {
-            assert_eq!(plan(subject).species, subject.species);
+            assert_eq!(plan(subject).species(), subject.species);
         }
         assert_eq!(MDPD.particles(48_400), 48_400);
         assert_eq!(DPD.particles(6_050), 3_000);

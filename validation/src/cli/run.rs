@@ -145,6 +145,14 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                     session.particle_steps_per_second
                 ));
             }
+            if let Some(session) =
+                timing.sessions.last().filter(|s| s.one_thread_seconds > 0.1 * s.wall_seconds)
+            {
+                say(&format!(
+                    "note: for {:.1} s of {:.1} one thread did the work of all, as other programs used the processors:                      with fewer threads the run is as fast",
+                    session.one_thread_seconds, session.wall_seconds
+                ));
+            }
             if let Some(iterations) = timing.sessions.last().and_then(|session| session.thermostat) {
                 let most = iterations.most.map_or(String::new(), |most| format!(", {most} at most"));
                 say(&format!("the thermostat took {:.1} iterations on average{most}", iterations.mean));

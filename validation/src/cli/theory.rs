@@ -93,13 +93,16 @@ fn without_numbers(densities: &[f64]) -> Option<String> {
     })
 }
 
-/// A named answer, or the reason why there is none. The absence of coexistence is an answer too.
+/// Shows a named answer, or the reason why there is none. The absence of coexistence is an answer too.
 fn answer<T>(
     name: &'static str,
     found: Result<T, TheoryError>,
     show: impl FnOnce(T) -> Value,
 ) -> (&'static str, Value) {
-    (name, found.map_or_else(|why| json!({ "none": why.to_string() }), show))
+    let value = found.map_or_else(|why| json!({ "none": why.to_string() }), show);
+    // Each answer is shown when it is there: some take seconds.
+    say!("{name}: {}", shown(&value));
+    (name, value)
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -224,9 +227,6 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         ],
         _ => Vec::new(),
     };
-    for (name, value) in &answers {
-        say!("{name}: {}", shown(value));
-    }
     if species == 2 {
         say!("composition and spinodal: the fraction of {}", model.species()[0]);
         for (of, rests_on) in ASSUMPTIONS {

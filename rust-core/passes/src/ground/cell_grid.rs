@@ -42,6 +42,12 @@ pub struct CellGrid {
 /// Coordinates are in single precision, relative to the box: the search distance grows by this fraction of cutoff and box.
 const ROUNDING: f64 = 1e-6;
 
+/// Cutoffs whose squares, and those of boxes of [`MOST_CUTOFFS`], are far from the ends of single precision.
+const CUTOFFS: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+/// Longest edge of a box, in cutoffs.
+const MOST_CUTOFFS: f64 = 1e12;
+
 impl CellGrid {
     /// The largest cutoff that fits into a box of this height, whose longest edge is `longest`.
     pub fn cutoff_within(height: f64, longest: f64) -> f64 {
@@ -49,17 +55,23 @@ impl CellGrid {
     }
 
     /// The grid for `count` particles; `None` if the box is so narrow along a period that a
-    /// particle is near two images of another.
+    /// particle is near two images of another, or so long that single precision ends.
     pub fn new(geometry: &BoxGeometry, cutoff: f64, count: usize) -> Option<CellGrid> {
+        CellGrid::with_cells(geometry, cutoff, count, 4 * count + 64)
+    }
+
+    /// As [`CellGrid::new`], with up to `most` cells.
+    pub fn with_cells(geometry: &BoxGeometry, cutoff: f64, count: usize, most: usize) -> Option<CellGrid> {
         let (column_axis, plane_axis) = if geometry.dimensions == 3 { (1, 2) } else { (2, 1) };
         let longest = geometry.length[..geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b));
         let search_cutoff = cutoff + ROUNDING * (cutoff + longest);
-        for k in 0..geometry.dimensions {
-            if geometry.periodic[k] && geometry.height(k) < 2.0 * search_cutoff {
-                return None;
-            }
+        // Comparisons with NaN are false.
+        let is_wide = |k: usize| !geometry.periodic[k] || geometry.height(k) >= 2.0 * search_cutoff;
+        let fits = CUTOFFS.contains(&cutoff) && longest <= MOST_CUTOFFS * cutoff;
+        if !(fits && (0..geometry.dimensions).all(is_wide)) {
+            return None;
         }
-        let most = (4 * count + 64) as f64;
+        let most = most as f64;
         // The width is that of the cutoff minus rounding: pairs in the last 10⁻⁹ of the cutoff may be missed.
         let mut width = cutoff * (1.0 - 1e-9);
         loop {

@@ -31,7 +31,13 @@ impl FixedPoint16 {
         let per_length = 32_000.0 / furthest;
         // Two positions and a shift are rounded: a coordinate difference has an error of up to 1.5 units.
         let limit = grid.search_cutoff * per_length + 1.5 * 3f64.sqrt();
-        FixedPoint16 { per_length, limit: (limit * limit / 65_536.0) as i16 + 1 }
+        FixedPoint16 { per_length, limit: ((limit * limit / 65_536.0) as i16).saturating_add(1) }
+    }
+
+    /// No pair that passes the filter is further apart than this along an axis. With wide cells, a unit is so large that
+    /// this is much more than the cutoff.
+    pub fn reach(&self) -> f64 {
+        (256.0 * f64::from(self.limit).sqrt() + 2.0) / self.per_length
     }
 
     /// The lengths of the edges in units, if the edges are along the axes and the lengths fit into 31 bits. A
@@ -48,13 +54,8 @@ impl FixedPoint16 {
     }
 
     /// Converts a coordinate.
-    ///
-    /// # Safety
-    /// The coordinate is finite and within 2⁴⁰ cutoffs.
     #[inline(always)]
-    pub unsafe fn coordinate(&self, x: f64) -> u16 {
-        // SAFETY: a unit is at least 2⁻¹⁴ cutoffs; the caller promises `x` within 2⁴⁰ cutoffs, so
-        // the number of units fits 64 bits.
-        unsafe { (x * self.per_length).to_int_unchecked::<i64>() as u16 }
+    pub fn coordinate(&self, x: f64) -> u16 {
+        (x * self.per_length) as i64 as u16
     }
 }

@@ -65,7 +65,9 @@ impl SweepPairs {
         tags.iter_mut().zip(1..).for_each(|(tag, k)| *tag = k);
         let particles = Particles { x, tag: tags, kind: species, owned: x.len() };
         let around = Around { domain, images: &[] };
-        if lists.find(pool, around, &particles, kinds, terms, [*range, MARGIN], planes).is_err() {
+        // In a long region the search would need a margin of its own.
+        let terms = |_| terms.clone();
+        if lists.find(pool, around, &particles, kinds, terms, [*range, MARGIN], planes) != Ok(false) {
             return false;
         }
         let places = Places::new(*dimensions, domain, x, lists.order());

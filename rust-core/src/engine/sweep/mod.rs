@@ -40,6 +40,7 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::ListTerms;
 use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::Tally;
+pub(super) use region::UNFIT;
 use region::{can_stretch, is_open, region};
 use std::sync::Arc;
 use std::time::Instant;
@@ -48,38 +49,53 @@ use workspace::{ForceSink, Input, Workspace};
 
 /// The forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. With ghosts a host
 /// calls [`Sweep::first`], copies slopes from owners to ghosts, and calls [`Sweep::second`].
+///
+/// The passes read tables and arrays without checks of bounds: plan, pool and arrays belong together, and none can be
+/// replaced by itself.
 pub struct Sweep {
-    /// The plan of the fluid's passes.
-    pub plan: Plan,
+    pub(super) plan: Plan,
     /// The settings, with the instruction set in use.
-    pub settings: Settings,
+    settings: Settings,
     set: InstructionSet,
-    /// The pool of threads.
-    pub pool: Arc<Pool>,
+    pool: Arc<Pool>,
     workspace: EitherPrecision,
+    /// The workspace in the other precision: pairs in mixed precision are computed in double precision in a region that is
+    /// too long.
+    other: Option<EitherPrecision>,
+    is_exchanged: bool,
     /// Additions to the densities of owned particles in the next evaluation: a row of
     /// [`Plan::slope_width`] for each, or an empty list.
     pub(super) added_densities: Vec<f64>,
     /// Pairs that do not interact.
     pub(super) exclusions: Exclusions,
-    /// Slopes `∂ψ/∂n` of owned particles, [`Plan::slope_width`] each, followed by those of ghosts, which the host writes after
-    /// [`Sweep::first`]; empty after [`Sweep::evaluate`].
-    pub slopes: Vec<f64>,
+    /// See [`Sweep::slopes_mut`].
+    pub(super) slopes: Vec<f64>,
     owned: usize,
     all: usize,
-    /// Times of the parts of evaluations.
-    pub times: Times,
+    times: Times,
+    /// Whether the arrays are those of a whole evaluation: not before the first, nor after one that failed or panicked.
+    is_complete: bool,
+    /// Whether [`Sweep::second`] may follow.
     ready: bool,
-    /// The pairs that the next evaluation is asked to list.
-    asked: Option<ListTerms>,
-    /// Whether the last evaluation has listed pairs, which nobody has taken.
-    has_listed: bool,
+    /// The pairs that the next evaluation is asked to list, and the number of the thermostat that asks.
+    asked: Option<(ListTerms, u64)>,
+    /// The number of the thermostat for which the last evaluation has listed pairs that it has not taken.
+    has_listed: Option<u64>,
 }
 
 /// A workspace in mixed or in double precision.
 enum EitherPrecision {
     Mixed(Box<Workspace<Mixed>>),
     Double(Box<Workspace<Double>>),
+}
+
+impl EitherPrecision {
+    fn new(precision: Precision, plan: &Plan, set: InstructionSet, threads: usize) -> EitherPrecision {
+        match precision {
+            Precision::Mixed => EitherPrecision::Mixed(Box::new(Workspace::new(plan, set, threads))),
+            Precision::Double => EitherPrecision::Double(Box::new(Workspace::new(plan, set, threads))),
+        }
+    }
 }
 
 /// Runs the same expression with the workspace of either precision.
@@ -108,54 +124,85 @@ impl Sweep {
     }
 
     /// Creates the sweep of a given plan, with a thread pool that others may use too.
-    pub fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
+    pub(super) fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
         let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
         settings.instructions = set.instructions();
         let threads = pool.threads();
-        let workspace = match settings.precision {
-            Precision::Mixed => EitherPrecision::Mixed(Box::new(Workspace::new(&plan, set, threads))),
-            Precision::Double => EitherPrecision::Double(Box::new(Workspace::new(&plan, set, threads))),
-        };
+        let workspace = EitherPrecision::new(settings.precision, &plan, set, threads);
         Sweep {
             plan,
             settings,
             set,
             pool,
             workspace,
+            other: None,
+            is_exchanged: false,
             added_densities: Vec::new(),
             exclusions: Exclusions::default(),
             slopes: Vec::new(),
             owned: 0,
             all: 0,
             times: Times::default(),
+            is_complete: false,
             ready: false,
             asked: None,
-            has_listed: false,
+            has_listed: None,
         }
+    }
+
+    /// The plan of the fluid's passes.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The settings, with the instruction set in use.
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// The pool of threads.
+    pub fn pool(&self) -> &Arc<Pool> {
+        &self.pool
+    }
+
+    /// Times of the parts of evaluations.
+    pub fn times(&self) -> Times {
+        self.times
+    }
+
+    /// Slopes `∂ψ/∂n` of owned particles, [`Plan::slope_width`] each, followed by those of ghosts, which the host writes
+    /// after [`Sweep::first`]; none after [`Sweep::evaluate`].
+    pub fn slopes_mut(&mut self) -> &mut [f64] {
+        &mut self.slopes
     }
 
     /// Counts of the passes since the sweep was created: search groups, batches of pairs (for each
     /// density, with noise, with energies and virials), blocks of particles with a ψ that depends on a
     /// density, and planes with forces. A pass that has never run has a count of zero.
     pub fn counts(&self) -> PassCounts {
-        with!(&self.workspace, m => m.counts())
+        let counts = |of: &EitherPrecision| with!(of, m => m.counts());
+        self.other.iter().map(counts).fold(counts(&self.workspace), |all, counts| all + counts)
     }
 
     /// Numbers of evaluations out of bounds, as
     /// [`Statistics::out_of_bounds`](super::Statistics::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
-        with!(&self.workspace, m => m.out_of_bounds())
+        let numbers = |of: &EitherPrecision| with!(of, m => m.out_of_bounds());
+        let [low, high] = self.other.as_ref().map_or([0; 2], numbers);
+        let [a, b] = numbers(&self.workspace);
+        [a + low, b + high]
     }
 
     /// Whether particles in `domain` are near at most one image of each other, as a sweep without
     /// ghosts requires: periods are at least twice the cut-off, and edges are oriented as in LAMMPS,
-    /// along the axes if some directions are open.
+    /// along the axes if some directions are open. Along these the edges do not matter. An evaluation may still find that
+    /// particles are too far apart.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
-        let geometry = BoxGeometry::of_box(domain, self.plan.dimensions);
+        let (geometry, cutoff) = (BoxGeometry::of_box(domain, self.plan.dimensions), cutoff(&self.plan));
         is_open(domain, self.plan.dimensions)
-            || geometry
-                .filter(can_stretch)
-                .is_some_and(|f| CellGrid::new(&f, cutoff(&self.plan), 1).is_some())
+            || geometry.filter(can_stretch).is_some_and(|geometry| {
+                CellGrid::new(&geometry.stretched([0.0; 3], [0.0; 3], cutoff), cutoff, 1).is_some()
+            })
     }
 
     /// Computes all forces on particles in a box, writes them to `force` or adds them to it, and
@@ -209,7 +256,7 @@ impl Sweep {
         add: bool,
     ) -> Result<(), EngineError> {
         let Request { particles, v, step, want } = *request;
-        self.ready = false;
+        (self.ready, self.is_complete) = (false, false);
         // Thirty-two times an index must fit into a word; copies of a plane have indices too.
         particles.check(26)?;
         (self.owned, self.all) = (particles.owned, particles.x.len());
@@ -229,27 +276,35 @@ impl Sweep {
             totals: want.energy || want.virial,
         };
         let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
-        let listed = self.asked.take().filter(|_| can_list);
-        self.has_listed = false;
+        let (listed, asker) = self.asked.take().filter(|_| can_list).unzip();
+        self.has_listed = None;
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
+        let mut since = Instant::now();
+        let region = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
+        let (geometry, grid) = region.cells(cutoff(plan), particles.x.len())?;
+        let exchanges = self.settings.precision == Precision::Mixed && region.is_long(cutoff(plan));
+        if exchanges != self.is_exchanged {
+            let other = || EitherPrecision::new(Precision::Double, plan, set, pool.threads());
+            std::mem::swap(&mut self.workspace, self.other.get_or_insert_with(other));
+            self.is_exchanged = exchanges;
+        }
         let out = ForceSink::new(force, add, particles.tag);
         with!(&mut self.workspace, m => {
             m.listed = listed;
-            let mut since = Instant::now();
-            let (geometry, grid) = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.run_all(pool, plan, &input, out, times)?;
-            self.has_listed = m.listed.is_some();
+            self.has_listed = asker;
         });
+        self.is_complete = true;
         Ok(())
     }
 
     /// Asks the next evaluation to list pairs for a thermostat, with the geometry that it computes anyway. It lists them
     /// without excluded pairs, and if drag and noise are not among the forces.
-    pub(super) fn ask_for_pairs(&mut self, terms: Option<ListTerms>) {
-        (self.asked, self.has_listed) = (terms, false);
+    pub(super) fn ask_for_pairs(&mut self, terms: Option<(ListTerms, u64)>) {
+        (self.asked, self.has_listed) = (terms, None);
     }
 
     /// Takes lists that nobody needs, for the memory of the pairs that the next evaluation lists.
@@ -258,10 +313,15 @@ impl Sweep {
         with!(&mut self.workspace, m => m.lend_lists(lists));
     }
 
-    /// Moves the pairs that the last evaluation has listed, once; returns whether it has listed any. Particles of a cell
-    /// are in the order of the host.
-    pub(super) fn take_pairs(&mut self, lists: &mut PairLists, planes: &mut Vec<PlanePairs>) -> bool {
-        let has_listed = std::mem::take(&mut self.has_listed);
+    /// Moves the pairs that the last evaluation has listed for a thermostat, once; returns whether it has listed any.
+    /// Particles of a cell are in the order of the host.
+    pub(super) fn take_pairs(
+        &mut self,
+        asker: u64,
+        lists: &mut PairLists,
+        planes: &mut Vec<PlanePairs>,
+    ) -> bool {
+        let has_listed = self.has_listed.take() == Some(asker) && self.is_complete;
         if has_listed {
             with!(&mut self.workspace, m => {
                 let cells = &m.order;
@@ -275,9 +335,12 @@ impl Sweep {
     }
 
     /// Copies the slopes of owned particles after [`Sweep::evaluate`], with room for `all`, for the
-    /// energies and forces of single pairs.
+    /// energies and forces of single pairs. Without an evaluation they are zero.
     pub fn fetch_slopes(&mut self, all: usize) {
-        with!(&self.workspace, m => m.slopes_to_host(&self.pool, &mut self.slopes));
+        self.slopes.clear();
+        if self.is_complete {
+            with!(&self.workspace, m => m.slopes_to_host(&self.pool, &mut self.slopes));
+        }
         self.slopes.resize(self.plan.slope_width() * all, 0.0);
     }
 
@@ -290,7 +353,7 @@ impl Sweep {
     /// # Errors
     /// Fails for a force that is not finite, and for arrays of other lengths than in [`Sweep::first`].
     pub fn second(&mut self, particles: &Particles, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
-        if !std::mem::take(&mut self.ready) {
+        if !(std::mem::take(&mut self.ready) && self.is_complete) {
             return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
         }
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
@@ -307,22 +370,31 @@ impl Sweep {
     }
 
     /// ψ and local densities of owned particles in the host's order, as [`Engine::excess`](super::Engine::excess) and
-    /// [`Results::densities`](super::Results::densities); densities that forces do not need are zero.
+    /// [`Results::densities`](super::Results::densities); densities that forces do not need are zero. Without an evaluation
+    /// there are none.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
+        if !self.is_complete {
+            return [excess, densities].into_iter().for_each(Vec::clear);
+        }
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));
     }
 
     /// The host's numbers of its particles in the order of cells; a host that keeps its particles in
-    /// this order makes sorting cheap.
+    /// this order makes sorting cheap. Empty without an evaluation.
     pub fn order(&self) -> &[u32] {
+        if !self.is_complete {
+            return &[];
+        }
         with!(&self.workspace, m => &m.order.order)
     }
 
     /// Size in bytes of the arrays over particles and pairs.
     pub fn memory(&self) -> usize {
         let numbers = self.slopes.capacity() + self.added_densities.capacity();
-        numbers * size_of::<f64>() + self.exclusions.bytes() + with!(&self.workspace, m => m.memory())
+        let memory = |of: &EitherPrecision| with!(of, m => m.memory());
+        let workspaces = memory(&self.workspace) + self.other.as_ref().map_or(0, memory);
+        numbers * size_of::<f64>() + self.exclusions.bytes() + workspaces
     }
 }
 

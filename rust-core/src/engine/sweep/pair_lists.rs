@@ -21,6 +21,19 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
 use psidpd_threads::{Pool, part, take};
 
+/// Margin of the search in a long region, in units of its coordinates: both positions are rounded along three axes.
+const UNITS_OF_MARGIN: f64 = 4.0 / 4_294_967_296.0;
+
+/// The largest margin.
+const MOST_MARGIN: f64 = 1e-2;
+
+/// The largest fraction by which the range may be shortened in a box hardly twice as wide.
+const MOST_LOSS: f64 = 1e-3;
+
+const FAR_APART: EngineError = EngineError::Host(
+    "particles are so far apart, or the box is so long, that the pairs of the thermostat cannot be found",
+);
+
 /// Sorted particles, and scratch arrays.
 #[derive(Debug, Default)]
 pub struct PairLists {
@@ -45,11 +58,14 @@ impl PairLists {
 
     /// Finds the pairs of `particles` within `range`, extended by the fraction `margin` where the box
     /// is wide enough, for each plane of cells; two ghosts form no pair. Particles of a type with a
-    /// negative species are left out.
+    /// negative species are left out. `terms` are the pairs that are listed with a margin.
+    ///
+    /// Positions are fractions of the region of the particles, in units of 2⁻³². Where that is so long that pairs have to be
+    /// measured in double precision the margin is larger, and the result is true.
     ///
     /// # Errors
-    /// Fails for a position that is not finite, and for a box narrower than twice the range
-    /// or skew along an open direction.
+    /// Fails for a position that is not finite, for arrays of different lengths, for a box narrower than twice the range
+    /// or skew along an open direction, and if particles are too far apart.
     #[allow(clippy::too_many_arguments)]
     pub fn find(
         &mut self,
@@ -57,15 +73,24 @@ impl PairLists {
         Around { domain, images }: Around,
         particles: &Particles,
         species_of_kind: &[i32],
-        terms: &ListTerms,
+        terms: impl FnOnce(f64) -> ListTerms,
         [range, margin]: [f64; 2],
         planes: &mut Vec<PlanePairs>,
-    ) -> Result<(), EngineError> {
+    ) -> Result<bool, EngineError> {
+        particles.check(26)?;
+        particles.check_images(images)?;
         let input =
             Input { particles: *particles, images, species_of_type: species_of_kind, ..Input::default() };
         let set = self.set;
-        let range = self.range_within(domain, range, margin)?;
-        let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
+        let region = region(set, pool, (self.dimensions, range * (1.0 + margin)), domain, &input)?;
+        let is_long = region.is_long(range);
+        let margin = if is_long { margin.max(region.longest() / range * UNITS_OF_MARGIN) } else { margin };
+        if margin > MOST_MARGIN {
+            return Err(FAR_APART);
+        }
+        let range = self.range_within(domain, region.longest(), range, margin)?;
+        let (geometry, mut grid) = region.cells(range, particles.x.len())?;
+        let terms = &terms(margin);
         // Updates of single pairs need an even number of planes, so that planes updated at
         // once have no neighbour in common.
         if geometry.periodic[grid.plane_axis] {
@@ -106,7 +131,7 @@ impl PairLists {
                 unsafe { list_pairs(set, inputs, number, buffers, &mut plane.lists) };
             }
         });
-        Ok(())
+        Ok(is_long)
     }
 
     /// Takes over the order of a sweep.
@@ -115,18 +140,28 @@ impl PairLists {
         cells.find_places(&mut self.place);
     }
 
-    /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag
-    /// and noise at the range are almost zero there.
-    fn range_within(&self, domain: &PeriodicBox, range: f64, margin: f64) -> Result<f64, EngineError> {
-        let edges = (0..self.dimensions).flat_map(|k| domain.edge(k));
-        let longest = edges.map(f64::abs).fold(4.0 * range, f64::max);
+    /// The range of the search in a region whose longest edge is `longest`; slightly less than `range` in a box that is
+    /// exactly twice as wide: drag and noise at the range are almost zero there.
+    fn range_within(
+        &self,
+        domain: &PeriodicBox,
+        longest: f64,
+        range: f64,
+        margin: f64,
+    ) -> Result<f64, EngineError> {
         let periodic = domain.periodic();
+        // The length of an edge along an open direction does not matter.
+        let edges = (0..self.dimensions).filter(|k| periodic[*k]).flat_map(|k| domain.edge(k));
+        let longest = edges.map(f64::abs).fold(longest.max(4.0 * range), f64::max);
         let heights = (0..self.dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
         if height < 2.0 * range * (1.0 - 1e-12) {
             return Err(EngineError::Host("the box is narrower than twice the range of the thermostat"));
         }
-        Ok((range * (1.0 + margin)).min(CellGrid::cutoff_within(height, longest)))
+        let within = CellGrid::cutoff_within(height, longest);
+        // The comparison is false for NaN.
+        let is_wide = within >= range * (1.0 - MOST_LOSS);
+        if is_wide { Ok(within.min(range * (1.0 + margin))) } else { Err(FAR_APART) }
     }
 
     /// Sorts the particles of each cell by their tags.

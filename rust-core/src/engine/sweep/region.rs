@@ -5,6 +5,7 @@ use crate::engine::error::EngineError;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
+use psidpd_passes::ground::fixed_point::FixedPoint16;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_threads::Pool;
 
@@ -47,7 +48,78 @@ fn interior(geometry: &BoxGeometry, grid: &CellGrid, owned: [f64; 2]) -> [usize;
     [from, ((last - 0.5) as usize).clamp(from, all)]
 }
 
-/// The region in which a sweep searches pairs within `cutoff`, and its cells: all of the box along periodic
+/// The error of a box that a sweep cannot do.
+pub const UNFIT: EngineError =
+    EngineError::Host("the box is too narrow, too long or too skew for a sweep without ghost images");
+
+/// The place of a sweep, before it has cells.
+#[derive(Debug, Clone, Copy)]
+pub struct Region {
+    pub geometry: BoxGeometry,
+    /// The extent of the owned particles, if some direction is open.
+    owned: [[f64; 3]; 2],
+}
+
+/// Positions of pairs are fractions of the region in units of 2⁻³²: in a region of this many cutoffs they are as exact as
+/// single precision is within a cutoff.
+const LONG: f64 = 8192.0;
+
+impl Region {
+    /// The longest edge.
+    pub fn longest(&self) -> f64 {
+        self.geometry.length[..self.geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b))
+    }
+
+    /// Whether the region is so long that pairs within `cutoff` have to be computed in double precision.
+    pub fn is_long(&self, cutoff: f64) -> bool {
+        self.longest() > LONG * cutoff
+    }
+
+    /// The cells for pairs within `cutoff`; directions that are open are stretched as they need.
+    ///
+    /// # Errors
+    /// Fails for a region that is too narrow or too long.
+    pub fn cells(self, cutoff: f64, count: usize) -> Result<(BoxGeometry, CellGrid), EngineError> {
+        let Region { mut geometry, owned } = self;
+        let mut grid = grid_of(&mut geometry, cutoff, count).ok_or(UNFIT)?;
+        grid.interior = interior(&geometry, &grid, owned.map(|ends| ends[0]));
+        Ok((geometry, grid))
+    }
+}
+
+/// A pair that the distance filter passes at more than this many cutoffs may be near another image too.
+const CLOSE: f64 = 1.05;
+
+/// Most cells, 64 MiB of numbers for each thread, where more than usual are needed.
+const MOST_CELLS: usize = 1 << 24;
+
+/// The grid of a region. Where cells are wide, as a few particles are far away, the distance filter passes pairs that are much
+/// further apart than the cutoff. The difference of their fractions would wrap in an open direction of half that width, which
+/// is stretched; along a period such a pair would be found with another image too, unless cells are narrower.
+fn grid_of(geometry: &mut BoxGeometry, cutoff: f64, count: usize) -> Option<CellGrid> {
+    let mut most = 4 * count + 64;
+    loop {
+        let grid = CellGrid::with_cells(geometry, cutoff, count, most)?;
+        let reach = FixedPoint16::new(geometry, &grid).reach();
+        let axes = 0..geometry.dimensions;
+        let (closed, open): (Vec<usize>, Vec<usize>) = axes.partition(|k| geometry.periodic[*k]);
+        let narrow = closed.into_iter().any(|k| reach > (CLOSE * cutoff).max(geometry.height(k) - cutoff));
+        if narrow {
+            most = 4 * most;
+            if most > MOST_CELLS {
+                return None;
+            }
+            continue;
+        }
+        let short: Vec<usize> = open.into_iter().filter(|k| geometry.length[*k] < 2.0 * reach).collect();
+        if short.is_empty() {
+            return Some(grid);
+        }
+        short.into_iter().for_each(|k| geometry.length[k] = 2.5 * reach);
+    }
+}
+
+/// The region in which a sweep searches pairs within `cutoff`: all of the box along periodic
 /// directions, and along the others the extent of the particles, with room for ghosts within reach.
 pub fn region(
     set: InstructionSet,
@@ -55,7 +127,7 @@ pub fn region(
     (dimensions, cutoff): (usize, f64),
     domain: &PeriodicBox,
     input: &Input,
-) -> Result<(BoxGeometry, CellGrid), EngineError> {
+) -> Result<Region, EngineError> {
     let mut geometry = BoxGeometry::of_box(domain, dimensions);
     let mut owned = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
     if geometry.is_none_or(|geometry| !geometry.is_fully_periodic()) {
@@ -66,12 +138,5 @@ pub fn region(
             false => geometry.filter(can_stretch).map(|geometry| geometry.stretched(low, high, cutoff)),
         };
     }
-    let count = input.particles.x.len();
-    let grid =
-        geometry.and_then(|geometry| CellGrid::new(&geometry, cutoff, count).map(|grid| (geometry, grid)));
-    let grid = grid.map(|(geometry, mut grid)| {
-        grid.interior = interior(&geometry, &grid, owned.map(|ends| ends[0]));
-        (geometry, grid)
-    });
-    grid.ok_or(EngineError::Host("the box is too narrow or too skew for a sweep without ghost images"))
+    Ok(Region { geometry: geometry.ok_or(UNFIT)?, owned })
 }

@@ -15,6 +15,7 @@ impl PairThermostat {
         noise: bool,
         force: &mut [[f64; 3]],
     ) -> [f64; 6] {
+        self.assert_pairs();
         let PairThermostat { planes, lists, set, sums, kt, dt, .. } = self;
         let factor = 2.0 / *dt;
         let noise = if noise { kt.sqrt() } else { 0.0 };

@@ -1,5 +1,7 @@
 //! What an evaluation of forces was asked to list.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 /// The pairs of an evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct Listed {
@@ -18,12 +20,21 @@ impl Listed {
 }
 
 /// The pairs of the forces.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct FromForces {
+    /// A number that no other thermostat has.
+    pub asker: u64,
     /// Those that an engine has listed, for a search that follows.
     pub listed: Option<Listed>,
     /// Whether the present pairs are of the forces.
     pub are_present: bool,
+}
+
+impl Default for FromForces {
+    fn default() -> FromForces {
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        FromForces { asker: NUMBER.fetch_add(1, Ordering::Relaxed), listed: None, are_present: false }
+    }
 }
 
 impl FromForces {

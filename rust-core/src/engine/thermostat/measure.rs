@@ -31,11 +31,12 @@ impl PairThermostat {
         domain: &PeriodicBox,
         particles: &Particles,
         species_of_kind: &[i32],
+        is_exact: bool,
     ) {
-        let PairThermostat { plan, dimensions, dt, set, lists, planes, is_exact, wants_virial, .. } = self;
-        let laws = Laws { weights: weights(plan, *dt), least: if *is_exact { 0.0 } else { MARGIN } };
+        let PairThermostat { plan, dimensions, dt, set, lists, planes, wants_virial, .. } = self;
+        let laws = Laws { weights: weights(plan, *dt), least: if is_exact { 0.0 } else { MARGIN } };
         let places = Places::new(*dimensions, domain, particles.x, lists.order());
-        let (set, is_exact, with_stretch) = (*set, *is_exact, *wants_virial);
+        let (set, with_stretch) = (*set, *wants_virial);
         let law = |i: usize, j: usize| match laws.weights.species {
             1 => 0,
             count => {

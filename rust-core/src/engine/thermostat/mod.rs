@@ -86,6 +86,8 @@ pub struct PairThermostat {
     set: InstructionSet,
     lists: PairLists,
     planes: Vec<PlanePairs>,
+    /// Whether these are the pairs of a whole search: not while one is under way, nor after one that failed or panicked.
+    has_pairs: bool,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
     masses: Masses,
@@ -123,6 +125,7 @@ impl PairThermostat {
             set,
             lists: PairLists::new(set, plan.dimensions),
             planes: Vec::new(),
+            has_pairs: true,
             is_exact: settings.precision == Precision::Double,
             masses: Masses::default(),
             sums: Sums::default(),
@@ -140,7 +143,8 @@ impl PairThermostat {
     /// distances, from which [`PairThermostat::act`] computes its virial.
     ///
     /// # Errors
-    /// Fails for a position that is not finite, and for a box narrower than twice the range.
+    /// Fails for a position that is not finite, for arrays of different lengths, a species or tag out of range, and for a
+    /// box narrower than twice the range. Without pairs the thermostat can do nothing but search again.
     pub fn find_pairs(
         &mut self,
         pool: &Pool,
@@ -151,6 +155,11 @@ impl PairThermostat {
         let Bodies { domain, x, tag, species, mass, frozen } = *bodies;
         let particles = Particles { x, tag, kind: species, owned: x.len() };
         let kinds: Vec<i32> = (0..self.plan.gamma.len().isqrt() as i32).collect();
+        if mass.len() < kinds.len() || !(frozen.is_empty() || frozen.len() == x.len()) {
+            return Err(EngineError::Host(
+                "`mass` has one entry per species, `frozen` one per particle or none",
+            ));
+        }
         self.find(pool, Around { domain, images: &[] }, &particles, &kinds, dt, virial, |k| {
             let rests = frozen.get(k).is_some_and(|frozen| *frozen);
             if rests { f64::INFINITY } else { mass[species[k] as usize] }
@@ -169,21 +178,31 @@ impl PairThermostat {
         virial: bool,
         mass: impl Fn(usize) -> f64 + Sync,
     ) -> Result<(), EngineError> {
+        self.has_pairs = false;
+        particles.check(26)?;
+        particles.check_images(around.images)?;
         (self.dt, self.wants_virial, self.exchange) = (dt, virial, Exchange::default());
+        let mut is_long = false;
         if !self.from_forces.serve(Listed { dt, virial, particles: particles.x.len() }) {
-            let terms = self.terms(dt, virial);
             let range = [self.plan.longest, self.margin()];
-            let PairThermostat { lists, planes, .. } = self;
-            lists.find(pool, around, particles, species_of_kind, &terms, range, planes)?;
+            let PairThermostat { plan, lists, planes, .. } = self;
+            let terms = |margin| ListTerms::new(weights::weights(plan, dt), margin, virial);
+            is_long = lists.find(pool, around, particles, species_of_kind, terms, range, planes)?;
         }
-        self.measure(pool, around.domain, particles, species_of_kind);
+        self.measure(pool, around.domain, particles, species_of_kind, self.is_exact || is_long);
         let order = self.lists.order();
         fill(pool, &mut self.masses.inverse, order, |k| mass(k).recip());
         fill(pool, &mut self.masses.inertia, order, |k| {
             let m = mass(k);
             if m.is_finite() { m } else { 0.0 }
         });
+        self.has_pairs = true;
         Ok(())
+    }
+
+    /// Stops a host that goes on after a search that has failed: some arrays may be those of other particles.
+    fn assert_pairs(&self) {
+        assert!(self.has_pairs, "the thermostat has no pairs, as the last search for them has failed");
     }
 
     /// Fraction by which the range of the search is extended.
@@ -197,8 +216,12 @@ impl PairThermostat {
     }
 
     /// Draws the noise of the pairs of the last search.
+    ///
+    /// # Panics
+    /// Panics if the last search has failed, as all that follow here.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
-        let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
+        self.assert_pairs();
+        let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * u16::from(stream.0) + k));
         self.noise = noise;
         pool.each(&mut self.planes, |plane| {
             plane.lists.own.draw(noise[0], law);
@@ -209,6 +232,7 @@ impl PairThermostat {
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
     /// virial of the impulses over Δt, if distances were stored.
     pub fn act(&mut self, pool: &Pool, update: Update, v: &mut [[f64; 3]]) -> [f64; 6] {
+        self.assert_pairs();
         match update {
             Update::Midpoint => self.implicit(pool, v, true),
             Update::ImplicitDrag => self.implicit(pool, v, false),
@@ -221,6 +245,7 @@ impl PairThermostat {
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
     /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
+        self.assert_pairs();
         let moving = self.masses.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);

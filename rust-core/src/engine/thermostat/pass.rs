@@ -35,6 +35,8 @@ impl Sums {
     }
 
     pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[PlanePairs], noise: f64) {
+        let particles = planes.last().map_or(0, |last| last.own.end);
+        assert!(self.p.len() >= particles, "a vector for each particle of the pairs");
         self.close(planes);
         let Sums { p, of_plane } = self;
         of_plane.resize_with(planes.len(), Vec::new);
@@ -43,7 +45,8 @@ impl Sums {
         pool.each(&mut work, |(plane, sums)| {
             let PlanePairs { own, next, lists } = plane;
             sums.resize(own.len() + next.len(), Wide::ZERO);
-            // SAFETY: the pairs of a plane are those of its own particles with each other, with the next and with ghosts.
+            // SAFETY: the pairs of a plane are those of its own particles with each other, with the next and with ghosts,
+            // as a search that has not failed has listed them; `p` has a vector for each, as asserted.
             unsafe { add_pairs(set, lists, noise, p, own.start, sums) };
         });
     }

@@ -36,6 +36,7 @@ impl PairThermostat {
     /// Computes pulls from `strength`, the factor of `g`, which takes the two sorted particles, the
     /// plane, the pair in it, and `g`.
     fn pulls_by(&self, strength: impl Fn(usize, usize, usize, usize, [f64; 3]) -> f64) -> Vec<Pull> {
+        self.assert_pairs();
         let mut pulls = Vec::new();
         let order = self.lists.order();
         for (number, plane) in self.planes.iter().enumerate() {

@@ -181,3 +181,27 @@ fn huggins_fluid() {
     let (c, rho) = (symmetric.composition[0], symmetric.density[0]);
     assert!(mu[0][0] < mf.chemical_potentials(&[c * rho, (1.0 - c) * rho])[0]);
 }
+
+/// Far below the critical point the phases are pure to all digits. With `W = 2ρ²(λ − λ_A) c(1 − c) + ρkT Σ c ln c` between them
+/// the tension is `∫ √(2κW) dc`.
+#[test]
+fn interface_of_pure_phases() {
+    let (lambda, lambda_a, rho) = (1.0, 0.2, 10.0);
+    for kt in [0.2, 0.1, 0.03] {
+        let mf = theory(&mixture(2, lambda, lambda_a, lambda_a), kt);
+        let kappa = mf.gradient_coefficients(&[0.5 * rho; 2]);
+        let kappa = rho * rho * (kappa[0] - kappa[1] - kappa[2] + kappa[3]);
+        let height = |c: f64| {
+            let ideal = c * c.ln() + (1.0 - c) * (1.0 - c).ln();
+            2.0 * rho * rho * (lambda - lambda_a) * c * (1.0 - c) + rho * kt * ideal
+        };
+        let steps = 100_000;
+        let tension: f64 = (0..steps)
+            .map(|k| (k as f64 + 0.5) / steps as f64)
+            .map(|c| (2.0 * kappa * height(c).max(0.0)).sqrt() / steps as f64)
+            .sum();
+        let found = mf.composition_interface(rho, 201).unwrap();
+        assert!((found.tension / tension - 1.0).abs() < 1e-5, "{kt}: {} {tension}", found.tension);
+        assert!(found.width > 0.0 && found.profile.iter().flatten().all(|x| x.is_finite()), "{kt}");
+    }
+}

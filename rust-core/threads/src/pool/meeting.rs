@@ -1,6 +1,9 @@
 //! Where the threads of a piece of work wait for each other between its stages.
 
+use std::time::Duration;
+
 use super::sync::{AtomicBool, AtomicUsize, Condvar, Mutex, Ordering, spin_loop};
+use super::time_of;
 
 pub struct Meeting {
     threads: usize,
@@ -8,6 +11,8 @@ pub struct Meeting {
     spins: usize,
     /// Number of arrivals at all stages.
     arrived: AtomicUsize,
+    /// Sum of the times that threads have waited, in nanoseconds.
+    waited: AtomicUsize,
     /// Whether a thread panicked: later stages are left out.
     failed: AtomicBool,
     /// Number of sleeping threads; changes only with `lock` locked.
@@ -22,6 +27,7 @@ impl Meeting {
             threads,
             spins,
             arrived: AtomicUsize::new(0),
+            waited: AtomicUsize::new(0),
             failed: AtomicBool::new(false),
             asleep: AtomicUsize::new(0),
             lock: Mutex::new(()),
@@ -35,6 +41,11 @@ impl Meeting {
 
     pub fn has_failed(&self) -> bool {
         self.failed.load(Ordering::Relaxed)
+    }
+
+    /// Sum of the times that threads have waited here.
+    pub fn waited(&self) -> Duration {
+        Duration::from_nanos(self.waited.load(Ordering::Relaxed) as u64)
     }
 
     /// Waits until all threads have called this for the stage of this number.
@@ -51,6 +62,11 @@ impl Meeting {
             return;
         }
         let are_missing = || self.arrived.load(Ordering::Acquire) < all;
+        let waited = time_of(|| self.wait_for(are_missing));
+        self.waited.fetch_add(waited.as_nanos() as usize, Ordering::Relaxed);
+    }
+
+    fn wait_for(&self, are_missing: impl Fn() -> bool) {
         let mut spins = 0;
         while are_missing() && spins < self.spins {
             spins += 1;

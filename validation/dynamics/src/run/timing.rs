@@ -5,7 +5,7 @@ use psidpd_core::engine::thermostat::Effort;
 use psidpd_formats::files::{PathError, replace_through};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The contents of `timing.json`: one session for the start and each resumption of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -28,6 +28,14 @@ pub struct Session {
     /// Iterations of an implicit thermostat; left out without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thermostat: Option<Iterations>,
+    /// Time in which one thread did the work of all, as other programs used the processors of the others; left out if there
+    /// was none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub one_thread_seconds: f64,
+}
+
+fn is_zero(seconds: &f64) -> bool {
+    *seconds == 0.0
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -63,7 +71,14 @@ impl Clock {
     }
 
     /// All sessions, this one up to `step`.
-    pub fn until(&self, step: u64, particles: usize, effort: Effort, device: Option<String>) -> Timing {
+    pub fn until(
+        &self,
+        step: u64,
+        particles: usize,
+        effort: Effort,
+        device: Option<String>,
+        alone: Duration,
+    ) -> Timing {
         let wall_seconds = self.since.elapsed().as_secs_f64();
         let made = step.saturating_sub(self.from_step) as f64 * particles as f64;
         let mut timing = self.earlier.clone();
@@ -75,6 +90,7 @@ impl Clock {
             particle_steps_per_second: made / wall_seconds.max(1e-9),
             device,
             thermostat: Iterations::of(effort),
+            one_thread_seconds: alone.as_secs_f64(),
         });
         timing
     }

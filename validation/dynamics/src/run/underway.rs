@@ -189,7 +189,8 @@ impl Runner<'_> {
     }
 
     fn timing_until(&self, step: u64) -> Timing {
-        self.clock.until(step, self.simulation.len(), self.simulation.effort(), self.simulation.device_name())
+        let (run, clock) = (&self.simulation, &self.clock);
+        clock.until(step, run.len(), run.effort(), run.device_name(), run.time_of_one_thread())
     }
 
     /// Saves the last good state of a failed run.

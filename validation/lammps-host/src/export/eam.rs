@@ -44,7 +44,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
         return Err(LammpsError::Grid);
     }
     let plan = Plan::new(fluid)?;
-    let pass = match &plan.passes[..] {
+    let pass = match plan.passes() {
         [] => None,
         [d] => Some(*d),
         [a, b, ..] => {

@@ -62,7 +62,7 @@ impl Forces {
     pub fn check_width(&self, domain: &PeriodicBox) -> Result<(), RunError> {
         let Some(range) = self.engine.plan().noise_range() else { return Ok(()) };
         let periodic = domain.periodic();
-        let heights = (0..self.engine.plan().dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
+        let heights = (0..self.engine.plan().dimensions()).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
         // Heights are computed from an inverse matrix; the limit leaves room for its rounding.
         if height < 2.0 * range * (1.0 - 1e-12) {
@@ -140,7 +140,7 @@ impl Simulation {
     }
 
     pub fn dimensions(&self) -> usize {
-        self.forces.engine.plan().dimensions
+        self.forces.engine.plan().dimensions()
     }
 
     /// Number of evaluations of ψ at a density below and above its bounds.

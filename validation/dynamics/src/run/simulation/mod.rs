@@ -218,6 +218,11 @@ impl Simulation {
         Ok(())
     }
 
+    /// The time in which one thread did the work of all.
+    pub fn time_of_one_thread(&self) -> std::time::Duration {
+        self.forces.engine.pool().time_alone()
+    }
+
     /// Sorts all particle arrays into the order of the last sweep, if there was one.
     fn reorder(&mut self) {
         let Some(order) = self.forces.engine.results().order else { return };

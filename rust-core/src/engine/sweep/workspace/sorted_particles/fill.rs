@@ -183,8 +183,7 @@ impl<'a> Coordinates<'a> {
                     let point = geometry.point(&[0, 1, 2].map(|c| u[c][lane] as f64 / TWO_TO_32));
                     for c in 0..3 {
                         x[c][lane] = point[c] as f32;
-                        // SAFETY: the point is in the box, whose fractions `Fractions` has computed from finite positions.
-                        fixed16[c][lane] = unsafe { fixed16_scale.coordinate(point[c]) };
+                        fixed16[c][lane] = fixed16_scale.coordinate(point[c]);
                     }
                 }
             }
