@@ -2,6 +2,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 
 import numpy
 import psidpd
@@ -64,18 +65,19 @@ def test_lent_arrays_cannot_be_resized():
     for name in ("positions", "velocities", "forces"):
         array = getattr(simulation, name)
         count = len(array)
-        for shape in ((count, 3), (3, 3), (0, 3), (10 * count, 3)):
+        for shape in ((3, 3), (0, 3), (10 * count, 3)):
             with pytest.raises(ValueError):
                 array.resize(shape, refcheck=False)
         for again in (array, array.view(), array[:], array.T):
             with pytest.raises(ValueError, match="WRITEABLE"):
                 again.setflags(write=True)
-        with pytest.raises((ValueError, BufferError)):
-            memoryview(array.base)[:] = 0
-        array.dtype = numpy.float32
+        with pytest.raises(TypeError):
+            memoryview(array.base)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            array.dtype = numpy.float32
         with pytest.raises(ValueError):
             array.resize((count, 3), refcheck=False)
-        array.shape = (-1,)
     seen = [simulation.positions.view(numpy.float64).reshape(-1, 3), simulation.velocities[:0]]
     for run in (simulation, expected):
         run.run(3)
@@ -94,7 +96,7 @@ def test_lent_arrays_cannot_be_resized():
 
 
 def test_forces_while_another_thread_resizes_the_positions():
-    engine = psidpd.Engine(psidpd.Model(MODELS / "warren2003-set6.toml"), kT=1.0)
+    engine = psidpd.Engine(psidpd.Model.from_file(MODELS / "warren2003-set6.toml"), kT=1.0)
     x = 12.0 * numpy.random.default_rng(1).random((10_000, 3))
     energy = engine.evaluate(x, 12.0).energy
     worker = threading.Thread(target=lambda: [engine.evaluate(x, 12.0) for _ in range(20) if len(x)])
