@@ -17,6 +17,7 @@ use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 use sync::{
     Arc, AtomicBool, AtomicUsize, Builder, Condvar, JoinHandle, Mutex, Ordering, spin_loop, thread_local,
+    time_of,
 };
 
 /// Threads that share work many times a millisecond: they wait for the next piece, and for each other,
@@ -292,17 +293,6 @@ impl Drop for Within {
 
 fn address(shared: &Arc<Shared>) -> usize {
     std::ptr::from_ref::<Shared>(shared).addr()
-}
-
-/// The time that `wait` takes.
-fn time_of(wait: impl FnOnce()) -> Duration {
-    if cfg!(any(loom, miri)) {
-        wait();
-        return Duration::ZERO;
-    }
-    let since = Instant::now();
-    wait();
-    since.elapsed()
 }
 
 /// Waits for the workers when it is dropped.

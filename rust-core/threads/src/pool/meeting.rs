@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use super::sync::{AtomicBool, AtomicUsize, Condvar, Mutex, Ordering, spin_loop};
-use super::time_of;
+use super::sync::{AtomicBool, AtomicUsize, Condvar, Mutex, Ordering, spin_loop, time_of};
 
 pub struct Meeting {
     threads: usize,

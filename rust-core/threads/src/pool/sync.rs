@@ -5,8 +5,21 @@ use loom as threads;
 #[cfg(not(loom))]
 use std as threads;
 
+use std::time::{Duration, Instant};
+
 pub use threads::hint::spin_loop;
 pub use threads::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub use threads::sync::{Arc, Condvar, Mutex};
 pub use threads::thread::{Builder, JoinHandle};
 pub use threads::thread_local;
+
+/// The time that `wait` takes.
+pub fn time_of(wait: impl FnOnce()) -> Duration {
+    if cfg!(any(loom, miri)) {
+        wait();
+        return Duration::ZERO;
+    }
+    let since = Instant::now();
+    wait();
+    since.elapsed()
+}
