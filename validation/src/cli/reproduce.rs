@@ -1,6 +1,6 @@
 use super::run::threads_at_once;
 use super::*;
-use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, cases};
+use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, Source, cases};
 use serde_json::Value;
 
 /// Figures and tables of the papers: measured, and compared with what is published.
@@ -114,23 +114,29 @@ fn show(outcome: &Reproduction) {
             Rule::AtLeast => "≥ ",
             Rule::AtMost => "≤ ",
         };
-        let own = if v.own { " (own)" } else { "" };
+        let source = match v.source {
+            Source::Printed => "",
+            Source::Read => " (read)",
+            Source::Own => " (own)",
+        };
         table.push([
             v.name.clone(),
             format!("{:.5} ± {:.5}", v.measured.value, v.measured.error),
-            format!("{sign}{:.5} ± {:.5}{own}", v.published.value, v.published.error),
+            format!("{sign}{:.5} ± {:.5}{source}", v.published.value, v.published.error),
             format!("{:+.2}", v.deviation()),
-            match (v.passes(), v.is_vague()) {
-                (true, _) => "pass",
-                (false, true) => "fail: too vague",
-                (false, false) => "fail",
+            match (v.passes(), v.at_full_size.is_some() && v.agrees(), v.is_vague()) {
+                (true, ..) => "pass",
+                (false, true, _) => "fail: at full size",
+                (false, false, true) => "fail: too vague",
+                (false, false, false) => "fail",
             }
             .to_owned(),
         ]);
     }
     say::table(&table);
-    for (name, (size, why)) in outcome.values.iter().filter_map(|v| Some((&v.name, v.allowance?))) {
-        say!("  {name}: {size} allowed, {why}");
+    for (name, full) in outcome.values.iter().filter_map(|v| Some((&v.name, v.at_full_size?))) {
+        let [value, error] = full.measured;
+        say!("  {name}: {value} ± {error} at full size; {}", full.why);
     }
 }
 

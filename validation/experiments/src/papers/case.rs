@@ -18,6 +18,24 @@ pub enum Rule {
     AtMost,
 }
 
+/// Where the value that a measured one is compared with comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The paper prints it, with its error or with digits.
+    Printed,
+    /// The paper has it as a curve, a formula or words; how near is near enough is our choice.
+    Read,
+    /// It is not published: another run of this program, or its mean field.
+    Own,
+}
+
+/// What a run of full size found of a value that agrees at quick size because that is too short to tell.
+#[derive(Debug, Clone, Copy)]
+pub struct AtFullSize {
+    pub measured: [f64; 2],
+    pub why: &'static str,
+}
+
 #[derive(Debug, Clone)]
 pub struct Compared {
     pub name: String,
@@ -25,17 +43,15 @@ pub struct Compared {
     /// What is published, or follows from it; or is our own.
     pub published: Measured,
     pub rule: Rule,
-    /// Whether what it is compared with is not published: another run of this program, or its mean field.
-    pub own: bool,
-    /// A known difference, one standard deviation of it, and its reason.
-    pub allowance: Option<(f64, &'static str)>,
+    pub source: Source,
+    /// That it disagrees at full size, where this is the quick one.
+    pub at_full_size: Option<AtFullSize>,
 }
 
 impl Compared {
     /// The difference in units of the combined error.
     pub fn deviation(&self) -> f64 {
-        let allowance = self.allowance.map_or(0.0, |(size, _)| size);
-        let error = (self.measured.error.powi(2) + self.published.error.powi(2) + allowance.powi(2)).sqrt();
+        let error = self.measured.error.hypot(self.published.error);
         let difference = self.measured.value - self.published.value;
         // Without errors only equal numbers agree.
         let right = match self.rule {
@@ -46,8 +62,13 @@ impl Compared {
         if error == 0.0 && right { 0.0 } else { difference / error }
     }
 
-    /// Whether it agrees. NaN does not, nor what is too vague to disagree.
+    /// Whether it agrees. NaN does not, nor what is too vague to disagree, nor what disagrees in a longer run.
     pub fn passes(&self) -> bool {
+        self.agrees() && self.at_full_size.is_none()
+    }
+
+    /// Whether it agrees by its own numbers.
+    pub fn agrees(&self) -> bool {
         let deviation = self.deviation();
         match self.rule {
             Rule::Equal => !self.is_vague() && deviation.abs() <= LIMIT,
@@ -67,8 +88,9 @@ impl Compared {
             "measured": self.measured,
             "published": self.published,
             "rule": self.rule,
-            "own": self.own,
-            "allowance": self.allowance.map(|(size, why)| json!({ "size": size, "why": why })),
+            "own": self.source == Source::Own,
+            "error_is_printed": self.source == Source::Printed,
+            "at_full_size": self.at_full_size.map(|full| json!({ "measured": Measured::from(full.measured), "why": full.why })),
             "deviation": self.deviation(),
             "pass": self.passes(),
         })
@@ -98,7 +120,17 @@ impl Reproduction {
 
     /// Adds a value that is to equal another of this program: that of a run, or of its mean field.
     pub fn own(&mut self, name: impl Into<String>, measured: Measured, own: impl Into<Measured>) {
-        self.add(name, measured, Rule::Equal, own).own = true;
+        self.add(name, measured, Rule::Equal, own).source = Source::Own;
+    }
+
+    /// Adds a value that is to equal a curve, a formula or words of the paper as nearly as we chose beforehand.
+    pub fn read(
+        &mut self,
+        name: impl Into<String>,
+        measured: impl Into<Measured>,
+        read: impl Into<Measured>,
+    ) {
+        self.add(name, measured, Rule::Equal, read).source = Source::Read;
     }
 
     pub fn at_least(&mut self, name: impl Into<String>, measured: impl Into<Measured>, value: f64) {
@@ -117,7 +149,14 @@ impl Reproduction {
         published: impl Into<Measured>,
     ) -> &mut Compared {
         let (name, measured, published) = (name.into(), measured.into(), published.into());
-        self.values.push_mut(Compared { name, measured, published, rule, own: false, allowance: None })
+        self.values.push_mut(Compared {
+            name,
+            measured,
+            published,
+            rule,
+            source: Source::Printed,
+            at_full_size: None,
+        })
     }
 
     pub fn plot(&mut self, file: impl Into<String>, title: &str, axes: [&str; 2], series: Vec<Series>) {
@@ -171,7 +210,7 @@ mod tests {
     fn compared(rule: Rule, value: f64) -> Compared {
         let measured = Measured { value, error: 0.3 };
         let published = Measured { value: 10.0, error: 0.4 };
-        Compared { name: "x".into(), measured, published, rule, own: false, allowance: None }
+        Compared { name: "x".into(), measured, published, rule, source: Source::Printed, at_full_size: None }
     }
 
     /// Three errors of more than a tenth would let a value pass that is 30 % off. Where the published error is larger than
@@ -209,9 +248,25 @@ mod tests {
         let mut outcome = Reproduction::default();
         outcome.equal("x", 1.0, [1.0, 0.1]);
         outcome.own("y", 1.0.into(), [2.0, 0.1]);
-        let own: Vec<Value> = outcome.values.iter().map(|v| v.to_json()["own"].clone()).collect();
-        assert_eq!(own, [false, true]);
-        assert!(outcome.values[0].passes() && !outcome.values[1].passes());
+        outcome.read("z", 1.0, [1.1, 0.1]);
+        let flags =
+            |key: &str| -> Vec<bool> { outcome.values.iter().map(|v| v.to_json()[key] == true).collect() };
+        assert_eq!(
+            (flags("own"), flags("error_is_printed")),
+            (vec![false, true, false], vec![true, false, false])
+        );
+        assert!(outcome.values[0].passes() && !outcome.values[1].passes() && outcome.values[2].passes());
+    }
+
+    #[test]
+    fn what_fails_at_full_size_fails() {
+        let why = "the radius";
+        let short = Compared {
+            at_full_size: Some(AtFullSize { measured: [13.0, 0.1], why }),
+            ..compared(Rule::Equal, 10.0)
+        };
+        assert!(short.agrees() && !short.passes());
+        assert_eq!(short.to_json()["at_full_size"]["why"], why);
     }
 
     #[test]

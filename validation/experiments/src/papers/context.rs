@@ -153,7 +153,7 @@ impl Context {
 }
 
 /// A scene or model with other values of its keys, as `--set` has them.
-fn edited(text: &str, changes: &[impl AsRef<str>]) -> Result<String, ExperimentError> {
+pub fn edited(text: &str, changes: &[impl AsRef<str>]) -> Result<String, ExperimentError> {
     let edits: Result<Vec<Edit>, String> = changes.iter().map(|change| change.as_ref().parse()).collect();
     Ok(edit_model(text, &edits.map_err(ExperimentError::Conditions)?)?)
 }

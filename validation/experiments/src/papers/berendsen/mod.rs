@@ -17,7 +17,11 @@ pub const PAPER: Paper = (
         ("water", "standard DPD: a rho = 75 kT has the compressibility of water, 1/kappa = 16", water),
         ("lowe-andersen", "Lowe and Andersen's thermostat: temperature and pressure", lowe_andersen),
         ("tension", "like 14.5, unlike 41.5, density 10: tension 28", tension),
-        ("fig11.1", "two drops that meet at a Weber number of 4 become one", merge),
+        (
+            "fig11.1",
+            "two drops that start at the printed Weber number, 4: whether they become one, and at 16",
+            merge,
+        ),
         ("size", "3.75 million particles (quick: a hundredth): memory of a few steps", size),
     ],
 );

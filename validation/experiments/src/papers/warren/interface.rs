@@ -118,7 +118,7 @@ pub fn fig4(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
             let excess = Measured { value: highest / liquid.value - 1.0, error: noise / liquid.value };
             let what = format!("height of the layers of {set}, {name}");
             match state.0 < 0.75 {
-                true => outcome.equal(what, excess, [0.10, 0.01]),
+                true => outcome.equal(what, excess, [0.10, 0.005]),
                 false => outcome.at_most(what, excess, 0.02),
             }
             lines.push(curve(name, bare(&density)));
