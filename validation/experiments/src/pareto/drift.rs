@@ -16,6 +16,8 @@ pub struct EnergyDrift {
     pub integrator: String,
     pub dt: f64,
     pub precision: String,
+    /// Simulated time up to the last energy.
+    pub time: f64,
     /// Of the energy per particle in kT, for a unit of time; nothing where the run stopped.
     pub slope: Option<f64>,
     /// One standard deviation of that.
@@ -79,6 +81,7 @@ pub fn drift(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Energ
         integrator: physics.integrator.name().to_owned(),
         dt,
         precision: physics.precision.to_string(),
+        time: times.last().copied().unwrap_or(0.0),
         slope: found.map(|d| d.slope),
         slope_error: found.map(|d| d.slope_error),
         largest: found.map(|d| d.largest),

@@ -6,8 +6,8 @@ use super::tolerance::{Tolerance, worst};
 use crate::code::Host;
 use psidpd_report::distinct;
 
-/// Bound of every quantity where none is given.
-const USUAL: f64 = 0.01;
+/// Bounds of quantities where none is given: the first that can be told from nothing.
+const USUAL: [f64; 3] = [0.01, 0.02, 0.05];
 
 /// Notes at each point its worst error, and whether nothing is cheaper with a smaller one. Points of LAMMPS's own law are not
 /// on the front: they are another fluid, with another reference.
@@ -44,15 +44,19 @@ pub fn unmeasured<'a>(points: &[Point], tolerances: &'a [Tolerance]) -> Option<&
     tolerances.iter().find(|t| !measured(t))
 }
 
-/// One percent for every quantity that most points resolve so well, and the names of the others.
-pub fn usual(points: &[Point]) -> (Vec<Tolerance>, Vec<String>) {
+/// For every quantity the smallest usual bound that is twice what most points will be bound by if they have no error at all, and
+/// the names of quantities that are too vague for any. Errors fall to `forecast` of what they are.
+pub fn usual(points: &[Point], forecast: f64) -> (Vec<Tolerance>, Vec<String>) {
     let native = || points.iter().filter(|p| p.code == Host::Native && p.stable);
-    let names = distinct(native().flat_map(|p| &p.errors).map(|d| &d.name));
-    let mostly = |name: &&String| {
-        let of: Vec<&Deviation> = native().flat_map(|p| &p.errors).filter(|d| d.name == **name).collect();
-        2 * of.iter().filter(|d| d.resolves(USUAL)).count() > of.len()
-    };
-    let (good, others): (Vec<&String>, Vec<&String>) = names.into_iter().partition(mostly);
-    let tolerance = |name: &String| Tolerance { name: name.clone(), bound: USUAL };
-    (good.into_iter().map(tolerance).collect(), others.into_iter().cloned().collect())
+    let (mut good, mut others) = (Vec::new(), Vec::new());
+    for name in distinct(native().flat_map(|p| &p.errors).map(|d| &d.name)) {
+        let of: Vec<&Deviation> = native().flat_map(|p| &p.errors).filter(|d| d.name == *name).collect();
+        let mostly =
+            |bound: &f64| 2 * of.iter().filter(|d| d.resolves(0.5 * bound / forecast)).count() > of.len();
+        match USUAL.into_iter().find(mostly) {
+            Some(bound) => good.push(Tolerance { name: name.clone(), bound }),
+            None => others.push(name.clone()),
+        }
+    }
+    (good, others)
 }

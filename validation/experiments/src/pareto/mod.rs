@@ -1,7 +1,8 @@
 //! Speed against error: what a unit of simulated time costs with each setting, and how far off its results are.
 //!
 //! [`setting`] says what is tried, [`origin`] where all begin, [`sample`] runs a setting for its errors and [`time`] all of them
-//! in turn for their cost; [`quantity`] holds results against the reference, [`front`] and `recommend` choose.
+//! in turn for their cost; [`quantity`] holds results against the reference, [`race`] spends the time where it decides, [`front`]
+//! and `recommend` choose.
 
 mod drift;
 mod front;
@@ -11,6 +12,7 @@ mod outcome;
 mod own_style;
 pub mod page;
 mod quantity;
+mod race;
 mod recommend;
 mod sample;
 mod setting;
@@ -39,11 +41,12 @@ use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::{write_atomically, write_json};
 use psidpd_report::Progress;
 use quantity::{Known, Quantities, deviations};
-use sample::{Made, Sampled};
+use race::{Rule, contenders, race};
+use sample::{Made, Sampled, Sampler};
 use setting::{Physics, Setting};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[derive(Debug, Clone)]
 pub struct Options {
@@ -70,6 +73,14 @@ const WORKERS: f64 = 2.0;
 /// How much more of the reference is sampled than of others.
 const REFERENCE: f64 = 5.0;
 const ROUNDS: usize = 5;
+/// Shares of the sampling: settling and a first look at all settings, as if what follows were shared out evenly. The rest is a race.
+const SETTLING: f64 = 0.5;
+const FIRST: f64 = 0.3;
+const LATER: f64 = 1.0 - sample::SETTLE * SETTLING - (1.0 - sample::SETTLE) * FIRST;
+/// Rounds of the race.
+const LOOKS: usize = 5;
+/// Errors of contenders at the end of a race, in those of the first look: about eight of forty settings are left in it.
+const FORECAST: f64 = 0.4;
 
 /// The runs of LAMMPS's own style, in units of the scene's Δt; the first is its reference.
 const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
@@ -89,19 +100,21 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
 
     let share = if lammps.is_some() { SAMPLING } else { SAMPLING + LAMMPS };
     let physics = setting::physics(options.choice);
-    let weights = physics.len() as f64 + REFERENCE;
-    let effort = options.fixed.map_or(Effort::Seconds(WORKERS * share * seconds / weights), |fixed| fixed.0);
-    let (references, sampled) = sample_all(&origin, &physics, effort, progress)?;
-    let reference_quantities = references.quantities(&origin)?;
+    let budget = share * seconds;
+    let even = WORKERS * budget / (physics.len() as f64 + REFERENCE);
+    let efforts = options
+        .fixed
+        .map_or([SETTLING, FIRST].map(|part| Effort::Seconds(part * even)), |(effort, _)| [effort, effort]);
+    let mut field = Field::begun(&origin, &physics, efforts, progress)?;
     let drifts = drifts(&origin, known, options, DRIFTS * WORKERS * seconds, progress)?;
 
-    let mut points = native_points(&origin, options, &physics, &sampled, |made| {
-        deviations(&made.quantities, &reference_quantities, known)
-    });
+    let looked = field.look(known)?;
+    let mut points = native_points(&origin, options, &physics, &field.sampled(), &looked);
     let mut lammps_reference = None;
     if let Some(lammps) = &lammps {
         plugin_points(&origin, &mut points);
-        match own_points(&origin, lammps, LAMMPS * seconds, options, known, &reference_quantities, progress) {
+        let native = field.references.quantities(&origin)?;
+        match own_points(&origin, lammps, LAMMPS * seconds, options, known, &native, progress) {
             Ok(Some((reference, own))) => {
                 lammps_reference = reference;
                 points.extend(own);
@@ -120,14 +133,43 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
     for (k, cost) in stable.into_iter().zip(costs) {
         points[k].cost = Cost::of(&cost);
     }
+    let forecast = if options.fixed.is_some() { 1.0 } else { FORECAST };
     let (tolerances, unresolved) = match &options.tolerances[..] {
-        [] => front::usual(&points),
+        [] => front::usual(&points, forecast),
         asked => (asked.to_vec(), Vec::new()),
     };
     if let Some(tolerance) = front::unmeasured(&points, &tolerances) {
         return Err(ExperimentError::Unmeasured(tolerance.name.clone()));
     }
+    let costs: Vec<Option<f64>> = physics.iter().map(|physics| cheapest_of(&points, physics)).collect();
+    let quantities = looked.iter().flatten().map(|errors| judged(errors, &tolerances)).max().unwrap_or(0);
+    let rule = Rule::new(&tolerances, physics.len(), quantities, LOOKS + 1);
+    let (begin, whole) = (Instant::now(), Duration::from_secs_f64(LATER * budget));
+    let rounds = if options.fixed.is_some() { 0 } else { LOOKS };
+    let standings = race(
+        &mut field,
+        &rule,
+        &costs,
+        rounds,
+        // A reference that was good before its race is good after it.
+        |field| field.look(known).unwrap_or_else(|_| vec![None; physics.len()]),
+        |field, open, round| {
+            let left = whole.saturating_sub(begin.elapsed()).as_secs_f64();
+            let core_seconds = WORKERS * left / (rounds - round) as f64;
+            field.sample_on(open, core_seconds, judges_dynamics(&tolerances), progress);
+            Ok::<bool, ExperimentError>(left > 0.0)
+        },
+    )?;
+    let (looked, sampled) = (field.look(known)?, field.sampled());
+    renew(&mut points, &physics, &sampled, &looked);
     front::mark(&mut points, &tolerances);
+    let references = &field.references;
+    let open = contenders(&costs, &standings);
+    let undecided = (0..points.len())
+        .filter(|k| points[*k].code == Host::Native && points[*k].stable)
+        .filter(|k| open.iter().any(|of| physics[*of] == points[*k].setting.physics))
+        .collect();
+    let margin = rule.margin();
     let (reference, reference_of_dynamics) = references.tell(&origin, known);
     if let Err(why) = &references.configurations {
         left_out.push(format!("This scene cannot run Monte Carlo, so small steps are the reference: {why}."));
@@ -150,6 +192,8 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
         drifts,
         tolerances,
         unresolved,
+        margin,
+        undecided,
         recommended: None,
     };
     outcome.recommended = recommend(&origin, &outcome);
@@ -179,53 +223,127 @@ fn known(origin: &Origin) -> Result<Known, ExperimentError> {
     })
 }
 
-struct References {
+struct References<'a> {
     /// Monte Carlo, or why there is none.
-    configurations: Result<Sampled, String>,
-    small_steps: Sampled,
+    configurations: Result<Sampler<'a>, String>,
+    small_steps: Sampler<'a>,
 }
 
-impl References {
+impl References<'_> {
     /// Their quantities: those of configurations from Monte Carlo, if there is one.
     fn quantities(&self, origin: &Origin) -> Result<Quantities, ExperimentError> {
-        let made = |sampled: &Sampled, physics: &Physics| match sampled {
-            Ok(made) => Ok(made.quantities.clone()),
-            Err(why) => Err(ExperimentError::Reference { what: what(origin, physics), why: why.clone() }),
+        let made = |sampled: Sampled, physics: &Physics| match sampled {
+            Ok(made) => Ok(made.quantities),
+            Err(why) => Err(ExperimentError::Reference { what: what(origin, physics), why }),
         };
-        let small = made(&self.small_steps, &Physics::small_steps());
+        let small = made(self.small_steps.sampled(), &Physics::small_steps());
         match &self.configurations {
-            Ok(sampled) => Ok(made(sampled, &Physics::reference())?.with_dynamics_of(small.ok().as_ref())),
+            Ok(run) => Ok(made(run.sampled(), &Physics::reference())?.with_dynamics_of(small.ok().as_ref())),
             Err(_) => small,
         }
     }
 
     /// The reference, and that of diffusion and viscosities if it is another.
     fn tell(&self, origin: &Origin, known: Known) -> (Reference, Option<Reference>) {
-        let small = reference_of(origin, &Physics::small_steps(), &self.small_steps, known);
+        let small = reference_of(origin, &Physics::small_steps(), &self.small_steps.sampled(), known);
         match &self.configurations {
-            Ok(sampled) => (reference_of(origin, &Physics::reference(), sampled, known), Some(small)),
+            Ok(run) => (reference_of(origin, &Physics::reference(), &run.sampled(), known), Some(small)),
             Err(_) => (small, None),
         }
     }
 }
 
-/// The references, and every setting's run; two at once.
-fn sample_all(
-    origin: &Origin,
-    physics: &[Physics],
-    effort: Effort,
-    progress: &Progress,
-) -> Result<(References, Vec<Sampled>), ExperimentError> {
-    let references = [Physics::reference(), Physics::small_steps()];
-    let longer = references.iter().map(|physics| (physics, effort.times(REFERENCE)));
-    let runs = longer.chain(physics.iter().map(|physics| (physics, effort))).collect();
-    let sample = |(physics, effort)| sample::sample(origin, physics, effort);
-    let mut found = jobs::counted((progress, "errors"), runs, sample).into_iter();
-    // A model without energy, or a flow, has no Monte Carlo.
-    let configurations = found.next().map_or(Err(String::new()), |found| found.map_err(|e| e.to_string()));
-    let mut rest: Vec<Sampled> = found.collect::<Result<_, _>>()?;
-    let sampled = rest.split_off(1);
-    Ok((References { configurations, small_steps: rest.swap_remove(0) }, sampled))
+/// All runs: of the references and of every setting.
+struct Field<'a> {
+    origin: &'a Origin<'a>,
+    references: References<'a>,
+    runs: Vec<Sampler<'a>>,
+}
+
+impl<'a> Field<'a> {
+    /// Settles all of them and looks at them for the first time, the references for longer; two at once.
+    fn begun(
+        origin: &'a Origin<'a>,
+        physics: &[Physics],
+        [settle, first]: [Effort; 2],
+        progress: &Progress,
+    ) -> Result<Field<'a>, ExperimentError> {
+        let references = [Physics::reference(), Physics::small_steps()];
+        let longer = references.into_iter().map(|physics| (physics, REFERENCE));
+        let runs = longer.chain(physics.iter().map(|physics| (*physics, 1.0))).collect();
+        let begin = |(physics, factor)| {
+            Ok(Sampler::settled(origin, physics, settle.times(factor))?.more(first.times(factor)))
+        };
+        let mut found = jobs::counted((progress, "errors"), runs, begin).into_iter();
+        // A model without energy, or a flow, has no Monte Carlo.
+        let none = || Err(String::new());
+        let configurations = found
+            .next()
+            .map_or_else(none, |found: Result<_, ExperimentError>| found.map_err(|e| e.to_string()));
+        let mut rest: Vec<Sampler> = found.collect::<Result<_, _>>()?;
+        let runs = rest.split_off(1);
+        Ok(Field {
+            origin,
+            references: References { configurations, small_steps: rest.swap_remove(0) },
+            runs,
+        })
+    }
+
+    fn sampled(&self) -> Vec<Sampled> {
+        self.runs.iter().map(Sampler::sampled).collect()
+    }
+
+    /// The errors of every setting, none of those that stopped.
+    fn look(&self, known: Known) -> Result<Vec<Option<Vec<Deviation>>>, ExperimentError> {
+        let reference = self.references.quantities(self.origin)?;
+        let errors = |run: &Sampler| Some(deviations(&run.sampled().ok()?.quantities, &reference, known));
+        Ok(self.runs.iter().map(errors).collect())
+    }
+
+    /// Samples the open settings and the references on, for so many seconds of a core.
+    fn sample_on(&mut self, open: &[usize], core_seconds: f64, dynamics: bool, progress: &Progress) {
+        let [each, of_references] = race::shares(open.len()).map(|share| share * core_seconds);
+        let [configurations, small] = match (&self.references.configurations, dynamics) {
+            (Ok(_), false) => [of_references, 0.0],
+            (Ok(_), true) => [0.5 * of_references; 2],
+            (Err(_), _) => [0.0, of_references],
+        };
+        let References { configurations: timeless, small_steps } = &mut self.references;
+        let mut chosen: Vec<(&mut Sampler, f64)> = vec![(small_steps, small)];
+        chosen.extend(timeless.as_mut().ok().map(|run| (run, configurations)));
+        let of_open = self.runs.iter_mut().enumerate().filter(|(k, _)| open.contains(k));
+        chosen.extend(of_open.map(|(_, run)| (run, each)));
+        chosen.retain(|(_, seconds)| *seconds > 0.0);
+        jobs::counted((progress, "contenders"), chosen, |(run, seconds)| {
+            run.sample(Effort::Seconds(seconds / (1.0 - sample::SETTLE)));
+        });
+    }
+}
+
+/// How many errors are bound by tolerances.
+fn judged(errors: &[Deviation], tolerances: &[Tolerance]) -> usize {
+    errors.iter().filter(|d| tolerances.iter().any(|t| t.applies(d))).count()
+}
+
+/// Whether a tolerance is for what a reference without time does not have.
+fn judges_dynamics(tolerances: &[Tolerance]) -> bool {
+    tolerances.iter().any(|t| ["D", "eta"].iter().any(|kind| t.name.starts_with(kind)))
+}
+
+/// The least cost of a setting's steps natively, on any number of threads.
+fn cheapest_of(points: &[Point], physics: &Physics) -> Option<f64> {
+    let own = points.iter().filter(|p| p.code == Host::Native && p.setting.physics == *physics);
+    own.filter_map(|p| Some(p.cost?.value)).min_by(f64::total_cmp)
+}
+
+/// Gives points of the native steps, those of the plugin among them, what the longer runs found.
+fn renew(points: &mut [Point], physics: &[Physics], sampled: &[Sampled], looked: &[Option<Vec<Deviation>>]) {
+    for p in points.iter_mut().filter(|p| p.code != Host::Lammps) {
+        let Some(k) = physics.iter().position(|known| *known == p.setting.physics) else { continue };
+        p.errors = looked[k].clone().unwrap_or_default();
+        (p.samples, p.time) = sampled[k].as_ref().map_or((0, 0.0), |made| (made.samples, made.time));
+        (p.stable, p.unstable) = (sampled[k].is_ok(), sampled[k].as_ref().err().cloned());
+    }
 }
 
 /// Energy without thermostat, where there is one that is conserved.
@@ -271,11 +389,11 @@ fn native_points(
     options: &Options,
     physics: &[Physics],
     sampled: &[Sampled],
-    errors: impl Fn(&Made) -> Vec<Deviation>,
+    looked: &[Option<Vec<Deviation>>],
 ) -> Vec<Point> {
     let mut points = Vec::new();
-    for (physics, sampled) in physics.iter().zip(sampled) {
-        let errors = sampled.as_ref().map_or_else(|_| Vec::new(), &errors);
+    for ((physics, sampled), errors) in physics.iter().zip(sampled).zip(looked) {
+        let errors = errors.clone().unwrap_or_default();
         let fewest = options.threads.iter().min().copied().unwrap_or(NonZeroUsize::MIN);
         let usual = match physics.integrator {
             Integrator::VelocityVerlet => physics.multiple == 1.0,
@@ -333,12 +451,9 @@ fn own_points(
     let sample = |k: usize| lammps.sample(origin, &physics[k], effort, step, &format!("own-{k}"));
     let sampled = jobs::counted(bar, (0..OWN.len()).collect(), sample);
     let sampled: Vec<Sampled> = sampled.into_iter().collect::<Result<_, _>>()?;
-    let mut known = known;
+    let known = if is_another_law(own) { known.of_another_law() } else { known };
     let (reference, first) = match (&sampled[0], is_another_law(own)) {
-        (Ok(made), true) => {
-            known.temperature = false;
-            (made.quantities.clone(), 1)
-        }
+        (Ok(made), true) => (made.quantities.clone(), 1),
         (Err(_), true) => return Ok(Some((None, Vec::new()))),
         (_, false) => (native.clone(), 0),
     };

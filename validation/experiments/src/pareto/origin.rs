@@ -1,7 +1,8 @@
 //! The state that every run starts from, and its conditions.
 
-use super::setting::{INTERVAL, Physics};
+use super::setting::{self, INTERVAL, Physics};
 use crate::ExperimentError;
+use crate::check::estimates;
 use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::run::{RunError, Simulation};
@@ -16,6 +17,21 @@ pub struct Origin<'a> {
     pub stage: &'a Stage,
     /// Particles that have been through the stages before, and a little of this.
     pub state: State,
+    /// What steps are multiples of: the scene's Δt, or less where that is too long for this fluid.
+    pub unit: f64,
+}
+
+/// The multiple at which the longest steps that are tried begin.
+const LONGEST_BEGIN: f64 = 4.0;
+
+/// The scene's Δt, but so short that the steps of `force-gradient`, the longest that are tried, begin no higher than where the estimate
+/// gives them an error of 1 %.
+fn unit(scene: &Scene, stage: &Stage) -> Result<f64, ExperimentError> {
+    let mut asked = scene.clone();
+    let stages = [stage.clone()].into_iter().map(|stage| Stage { integrator: setting::longest(), ..stage });
+    asked.stages = stages.collect();
+    let one_percent = estimates(&asked)?.first().map_or(f64::INFINITY, |estimate| estimate.one_percent);
+    Ok(stage.dt.min(one_percent / LONGEST_BEGIN))
 }
 
 /// Intervals between samples that the stage is settled for.
@@ -54,12 +70,12 @@ impl<'a> Origin<'a> {
                 steps -= batch;
             }
         }
-        Ok(Origin { scene, stage, state: run.state().clone() })
+        Ok(Origin { scene, stage, state: run.state().clone(), unit: unit(scene, stage)? })
     }
 
     /// Δt of a setting, without the digits that the rounding of the product leaves.
     pub fn dt(&self, physics: &Physics) -> f64 {
-        let dt = self.stage.dt * physics.multiple;
+        let dt = self.unit * physics.multiple;
         format!("{dt:.12e}").parse().unwrap_or(dt)
     }
 

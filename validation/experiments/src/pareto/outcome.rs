@@ -31,11 +31,15 @@ pub struct Comparison {
     pub left_out: Vec<String>,
     pub points: Vec<Point>,
     pub drifts: Vec<EnergyDrift>,
-    /// What was asked for; one percent of all that was resolved so well if nothing was.
+    /// What was asked for; if nothing was, 1, 2 or 5 % of each quantity, as well as the time resolves it.
     #[serde(rename = "tolerance", serialize_with = "tolerance::by_name")]
     pub tolerances: Vec<Tolerance>,
-    /// Quantities that are not judged, as most points do not resolve one percent of them.
+    /// Quantities that are not judged, as most points do not resolve the largest of these.
     pub unresolved: Vec<String>,
+    /// Standard deviations by which errors are widened before a setting counts as within or beyond, for all looks at all settings.
+    pub margin: f64,
+    /// Points that may be within and would be cheaper than the cheapest that is; none if the recommendation is decided.
+    pub undecided: Vec<usize>,
     pub recommended: Option<Recommended>,
 }
 

@@ -137,27 +137,44 @@ fn plot_of(outcome: &Comparison, class: Class) -> Option<Plot> {
     (!series.is_empty()).then(|| plot(&title, format!("error of {}, %", class.name()), series, levels))
 }
 
+/// How sure the recommendation is.
+fn decision(outcome: &Comparison) -> String {
+    let margin = outcome.margin;
+    if outcome.undecided.is_empty() {
+        return format!(
+            "This is decided: by {margin:.1} standard deviations, for all looks at all settings."
+        );
+    }
+    let cost = |k: &usize| outcome.points[*k].cost.map_or(f64::INFINITY, |c| c.value);
+    let cheapest = outcome.undecided.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+    let cheapest = cheapest.map(|k| &outcome.points[*k]);
+    let name = cheapest.map_or_else(String::new, |p| format!("{}, dt = {}", p.name(), p.dt));
+    format!(
+        "Each error counts with two of its standard deviations. By the {margin:.1} that all looks at all settings ask for, {} \
+         settings are not decided, the cheapest of them {name}; longer runs (--minutes) decide more.",
+        outcome.undecided.len()
+    )
+}
+
 pub fn recommendation(outcome: &Comparison) -> String {
     let within: Vec<String> = outcome.tolerances.iter().map(ToString::to_string).collect();
     let within = within.join(", ");
     let mut text = match &outcome.unresolved[..] {
         [] => String::new(),
-        names => format!("Not judged, as most runs do not resolve 1 % of it: {}.\n\n", names.join(", ")),
+        names => format!("Not judged, as most runs do not resolve 5 % of it: {}.\n\n", names.join(", ")),
     };
     let Some(best) = &outcome.recommended else {
-        text += &format!(
-            "No setting has {within}, with twice the error of its error. Where errors in the table are not resolved, \
-             longer runs (--minutes) may show one."
-        );
+        text += &format!("No setting has {within}. {}", decision(outcome));
         return text;
     };
     let point = &outcome.points[best.point];
     text += &format!(
-        "The cheapest setting with {within}: {}, dt = {}, {} precision, {:.4} s per unit of simulated time.\n\n{}",
+        "The cheapest setting with {within}: {}, dt = {}, {} precision, {:.4} s per unit of simulated time. {}\n\n{}",
         point.name(),
         point.dt,
         point.precision,
         point.cost.as_ref().map_or(f64::NAN, |c| c.value),
+        decision(outcome),
         best.scene
     );
     if let Some(refusal) = &best.lammps_refusal {

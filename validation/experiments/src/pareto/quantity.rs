@@ -154,6 +154,13 @@ pub struct Known {
     pub ideal_pressure: f64,
 }
 
+impl Known {
+    /// The same for a code with another force law, whose temperature is what its own small steps have.
+    pub fn of_another_law(self) -> Known {
+        Known { temperature: false, ..self }
+    }
+}
+
 /// The error of a quantity, in the unit of its class, with an error of its own.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Deviation {
@@ -174,7 +181,7 @@ pub struct Deviation {
 const MARGIN: f64 = 2.0;
 
 impl Deviation {
-    fn new(class: Class, name: &str, measured: Measured, value: f64, error: f64) -> Deviation {
+    pub fn new(class: Class, name: &str, measured: Measured, value: f64, error: f64) -> Deviation {
         Deviation { class, name: name.into(), measured, value, error, resolved: value.abs() > MARGIN * error }
     }
 
@@ -275,6 +282,9 @@ mod tests {
         assert!(found[0].resolved && (found[0].bound() - 0.06).abs() < 1e-12);
         assert_eq!(found[0].shown(), found[0].value.abs());
         assert!(found[0].resolves(0.0101) && !found[0].resolves(0.0099));
+        // Of another law both are uncertain, and kT is not what it has to have.
+        let found = deviations(&run(2.1, 0.3), &run(2.0, 0.4), known.of_another_law());
+        assert!((found[0].value - 0.05).abs() < 1e-12 && (found[0].error - 0.25).abs() < 1e-12);
         // Against a reference both are uncertain.
         let found = deviations(&run(2.1, 0.3), &run(2.0, 0.4), Known { temperature: false, ..known });
         assert!((found[0].error - 0.25).abs() < 1e-12 && !found[0].resolved);
@@ -316,9 +326,14 @@ mod tests {
         let b = of(vec![1.0; n], 0.01);
         let [d, error] = distance(&a, &b);
         assert!(d < 1e-9 && error > 0.0, "{d} {error}");
+        // Of a distance of zero the square of its error is what the squares of the noise scatter by, √(2 n) 2 e² of n shells.
+        let expected = ((2.0 * n as f64).sqrt() * 2.0 * 1e-4 / n as f64).sqrt();
+        assert!((error / expected - 1.0).abs() < 1e-3, "{error} {expected}");
         // A shift by a tenth is seen as one.
         let shifted = of(vec![1.1; n], 0.001);
         let [d, error] = distance(&shifted, &of(vec![1.0; n], 0.001));
-        assert!((d - 0.1).abs() < 1e-3 && error < 1e-3, "{d} {error}");
+        assert!((d - 0.1).abs() < 1e-3, "{d}");
+        // The mean of n differences, each ± √2 e, and half of them by the rounding of the sum of squares: √2 · 0.001/√400.
+        assert!((error / (2f64.sqrt() * 0.001 / 20.0) - 1.0).abs() < 0.02, "{error}");
     }
 }

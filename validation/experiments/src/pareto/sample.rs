@@ -1,4 +1,4 @@
-//! A run of one setting, for what it measures.
+//! Runs of one setting, for what they measure.
 
 use super::origin::Origin;
 use super::quantity::{Class, Quantities};
@@ -50,7 +50,7 @@ pub struct Made {
 pub type Sampled = Result<Made, String>;
 
 /// Part of a run that is left for it to settle.
-const SETTLE: f64 = 0.2;
+pub const SETTLE: f64 = 0.2;
 /// Fewest samples, whatever time they take.
 const FEWEST: u64 = 16;
 /// Samples of the cheap observables to one of the others.
@@ -97,44 +97,95 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
     Ok(found)
 }
 
-pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ExperimentError> {
-    let (dt, every) = (origin.dt(physics), physics.interval());
-    let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;
-    let stage = origin.stage;
-    let observe = observe(origin, every, Host::Native, physics.integrator.has_time())?;
-    let mut observers = Observers::new(&observe, [stage.name.as_str()]);
-    let mut sampled = Series::new(2);
-    let per_particle = 1.0 / run.len() as f64;
-    let begin = Instant::now();
-    let mut settling = 0;
-    let calm = |made: Result<(), RunError>, run: &Simulation| {
-        made.map_err(|e| e.to_string())?;
-        let ratio = run.temperature() / stage.kt;
-        let hot = || Err(format!("step {}: the temperature is {ratio:.1} kT", run.step_number()));
-        if ratio > FAR_OFF { hot() } else { Ok(()) }
-    };
-    while settling < FEWEST / 4 || !effort.is_used(SETTLE, begin, settling) {
-        let made = run.advance(every, dt, physics.integrator);
-        if let Err(why) = calm(made, &run) {
-            return Ok(Err(why));
+/// A run of one setting that can be sampled on.
+pub struct Sampler<'a> {
+    origin: &'a Origin<'a>,
+    physics: Physics,
+    run: Simulation,
+    observers: Observers,
+    /// Kinetic temperature, and energy of a particle.
+    sampled: Series,
+    time: f64,
+    /// Why it stopped, or that it left its temperature far behind.
+    stopped: Option<String>,
+}
+
+impl<'a> Sampler<'a> {
+    /// Settles for the usual part of an effort.
+    ///
+    /// # Errors
+    /// The setting cannot run at all: no Monte Carlo of forces without potential.
+    pub fn settled(
+        origin: &'a Origin<'a>,
+        physics: Physics,
+        effort: Effort,
+    ) -> Result<Sampler<'a>, ExperimentError> {
+        let every = physics.interval();
+        let run = origin.simulation(&physics, NonZeroUsize::MIN, true, Want::FORCES)?;
+        let observe = observe(origin, every, Host::Native, physics.integrator.has_time())?;
+        let observers = Observers::new(&observe, [origin.stage.name.as_str()]);
+        let sampled = Series::new(2);
+        let mut new = Sampler { origin, physics, run, observers, sampled, time: 0.0, stopped: None };
+        let begin = Instant::now();
+        let mut settling = 0;
+        while new.stopped.is_none() && (settling < FEWEST / 4 || !effort.is_used(SETTLE, begin, settling)) {
+            let made = new.run.advance(every, origin.dt(&physics), physics.integrator);
+            new.note(made);
+            settling += 1;
         }
-        settling += 1;
+        Ok(new)
     }
-    let mut time = 0.0;
-    while sampled.samples() < FEWEST || !effort.is_used(1.0, begin, settling + sampled.samples()) {
-        run.record_flux(false);
-        let made = run.advance(every - 1, dt, physics.integrator).and_then(|()| {
-            run.record_flux(observers.wants_flux(run.step_number() + 1, &stage.name));
-            run.step(dt, physics.integrator, Want::TOTALS)
-        });
-        if let Err(why) = calm(made, &run) {
-            return Ok(Err(why));
+
+    fn note(&mut self, made: Result<(), RunError>) {
+        let ratio = self.run.temperature() / self.origin.stage.kt;
+        self.stopped = match made {
+            Err(why) => Some(why.to_string()),
+            Ok(()) if ratio > FAR_OFF => {
+                Some(format!("step {}: the temperature is {ratio:.1} kT", self.run.step_number()))
+            }
+            Ok(()) => None,
+        };
+    }
+
+    /// The same after more samples.
+    pub fn more(mut self, effort: Effort) -> Sampler<'a> {
+        self.sample(effort);
+        self
+    }
+
+    /// Samples on, for the part of an effort that settling left.
+    pub fn sample(&mut self, effort: Effort) {
+        let (dt, every) = (self.origin.dt(&self.physics), self.physics.interval());
+        let (integrator, stage) = (self.physics.integrator, self.origin.stage.name.as_str());
+        let per_particle = 1.0 / self.run.len() as f64;
+        let (begin, mut samples) = (Instant::now(), 0);
+        while self.stopped.is_none()
+            && (self.sampled.samples() < FEWEST || !effort.is_used(1.0 - SETTLE, begin, samples))
+        {
+            self.run.record_flux(false);
+            let made = self.run.advance(every - 1, dt, integrator).and_then(|()| {
+                let wants = self.observers.wants_flux(self.run.step_number() + 1, stage);
+                self.run.record_flux(wants);
+                self.run.step(dt, integrator, Want::TOTALS)
+            });
+            self.note(made);
+            if self.stopped.is_none() {
+                self.time += dt * every as f64;
+                self.sampled.push(&[self.run.temperature(), per_particle * self.run.potential_energy()]);
+                self.observers.sample(self.run.view(self.time), stage);
+                samples += 1;
+            }
         }
-        time += dt * every as f64;
-        sampled.push(&[run.temperature(), per_particle * run.potential_energy()]);
-        observers.sample(run.view(time), &stage.name);
     }
-    let means = [(Class::Temperature, "T_kin", sampled.mean(0)), (Class::Energy, "u", sampled.mean(1))];
-    let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
-    Ok(Ok(Made { quantities, samples: sampled.samples(), time }))
+
+    pub fn sampled(&self) -> Sampled {
+        if let Some(why) = &self.stopped {
+            return Err(why.clone());
+        }
+        let means =
+            [(Class::Temperature, "T_kin", self.sampled.mean(0)), (Class::Energy, "u", self.sampled.mean(1))];
+        let dimensions = self.origin.scene.model.dimensions();
+        let quantities = Quantities::of(means, &self.observers.finish(), dimensions);
+        Ok(Made { quantities, samples: self.sampled.samples(), time: self.time })
+    }
 }

@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Physics {
     pub integrator: Integrator,
-    /// Δt in units of the scene's own.
+    /// Δt in units of [`super::origin::Origin::unit`].
     pub multiple: f64,
     pub precision: Precision,
 }
@@ -77,6 +77,11 @@ fn force_gradient(lambda: f64, every: u64) -> Integrator {
         coupling.every = every;
     }
     integrator
+}
+
+/// The steps that may be longest.
+pub fn longest() -> Integrator {
+    force_gradient(LAMBDAS[1], 2)
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

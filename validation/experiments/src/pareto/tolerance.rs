@@ -116,5 +116,9 @@ mod tests {
         assert!((of(&["p=2%"]).unwrap().ratio - 1.0).abs() < 1e-12);
         assert_eq!(of(&["p_conservative=2%", "u=0.1%"]), Some(Worst { quantity: "u".into(), ratio: 2.0 }));
         assert_eq!(of(&["sigma=1%"]), None);
+        // The total pressure counts by its own name only.
+        let total = error(Class::Pressure, "p_total", 0.5, 0.001);
+        assert!(!read("p=2%").applies(&total) && read("p_total=2%").applies(&total));
+        assert!(read("D=2%").applies(&error(Class::Diffusion, "D_B", 0.5, 0.001)));
     }
 }
