@@ -25,6 +25,10 @@ use psidpd_passes::instruction_set::InstructionSet;
 /// Number of particles in an evaluation of all ψ.
 const LANES: usize = 128;
 
+/// A density that loses a neighbour and keeps less than this share of `w(0)` is summed anew. Differences leave rounding errors
+/// where nothing is left, and powers below one, or that exist for positive densities alone, turn them into wrong energies.
+const CANCELLED: f64 = 1e-6;
+
 /// Reasons why a fluid has no such energy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoEnergy {
@@ -55,6 +59,8 @@ pub struct LocalEnergy {
     /// Each particle's contribution to its own density, by density: `w(0)`, and its own images.
     own: Vec<f64>,
     near: Near,
+    /// The particles near a neighbour whose density is summed anew.
+    beside: Near,
     excess: ExcessWork,
     work: Work,
     moved: Moved,
@@ -74,8 +80,11 @@ struct Moved {
 /// Scratch arrays for one move.
 #[derive(Debug, Clone, Default)]
 struct Work {
-    /// Changes of densities, neighbour by neighbour, for each density.
+    /// Changes of densities and the moved particle's new contributions, neighbour by neighbour, for each density.
     change: Vec<f64>,
+    after: Vec<f64>,
+    /// Rows and densities that cancellation leaves inaccurate.
+    cancelled: Vec<[usize; 2]>,
     weights: [Vec<f64>; 2],
     r: Vec<f64>,
     phi: Vec<f64>,
@@ -314,6 +323,8 @@ impl LocalEnergy {
         let kind = species[particle] as usize;
         let passes = plan.passes.len();
         work.change.resize(passes * near.id.len(), 0.0);
+        work.after.resize(passes * near.id.len(), 0.0);
+        work.cancelled.clear();
         // The first row is that of the moved particle.
         moved.ids.push(particle as u32);
         moved.n.resize(width, 0.0);
@@ -325,6 +336,7 @@ impl LocalEnergy {
             for ((change, before), after) in change.iter_mut().zip(before).zip(after) {
                 *change = after - before;
             }
+            work.after[p * found..(p + 1) * found].copy_from_slice(after);
         }
         for k in 0..found {
             let changes = |p: usize| work.change[p * found + k];
@@ -343,11 +355,43 @@ impl LocalEnergy {
             if near.repeats {
                 work.slot[id as usize] = row as u32;
             }
-            (0..passes).for_each(|p| moved.n[row * width + p * count + kind] += changes(p));
+            for (p, d) in plan.passes.iter().enumerate() {
+                let n = &mut moved.n[row * width + p * count + kind];
+                *n += changes(p);
+                let least = if species[id as usize] as usize == kind { own[p] } else { 0.0 };
+                if changes(p) < 0.0 && *n - least < CANCELLED * plan.densities[*d].kernel.value(0.0) {
+                    work.cancelled.push([row, p]);
+                }
+            }
         }
         if near.repeats {
             moved.ids.iter().for_each(|id| work.slot[*id as usize] = u32::MAX);
         }
+        for k in 0..self.work.cancelled.len() {
+            let [row, pass] = self.work.cancelled[k];
+            self.sum_anew(row, pass, particle);
+        }
+    }
+
+    /// Sums the density of the species of `particle` at the neighbour in row `row` anew, with `particle` at its new place.
+    fn sum_anew(&mut self, row: usize, pass: usize, particle: usize) {
+        let LocalEnergy { plan, near, beside, work, species, set, moved, own, x, cells, .. } = self;
+        let Some(cells) = cells else { return };
+        let (id, kind) = (moved.ids[row] as usize, species[particle]);
+        cells.near(*set, [x[id]; 2], id, beside);
+        let found = beside.count;
+        vectors::run(*set, Roots([&mut beside.r[0][..found], &mut []]));
+        let kernel = &plan.densities[plan.passes[pass]].kernel;
+        let [weights, _] = weigh(*set, kernel, beside, &mut work.weights);
+        let counts = |other: &u32| *other as usize != particle && species[*other as usize] == kind;
+        let others: f64 =
+            weights.iter().zip(&beside.id).filter(|(_, other)| counts(other)).map(|w| w.0).sum();
+        let after = &work.after[pass * near.count..(pass + 1) * near.count];
+        let moved_one: f64 =
+            after.iter().zip(&near.id).filter(|(_, k)| **k as usize == id).map(|w| w.0).sum();
+        let least = if species[id] == kind { own[pass] } else { 0.0 };
+        let (count, width) = (plan.species.len(), plan.slope_width());
+        moved.n[row * width + pass * count + kind as usize] = others + moved_one + least;
     }
 
     /// Evaluates ψ of the particles of `moved` at their new densities.

@@ -467,6 +467,20 @@ mod tests {
         );
     }
 
+    /// Monte Carlo draws its velocities, so that only the configurational temperature tells that short moves have not yet led a
+    /// lattice, on which no force acts, to equilibrium.
+    #[test]
+    fn trial_moves_that_have_not_come_to_rest_are_warned_of() {
+        let text =
+            "kT = 1.0\nseed = 1\nbox = 4.16\ndensity = 3.0\nsteps = 1000\nintegrator = \"monte-carlo\"\n";
+        let short = format!("{text}max_move = 1e-4\n[initial]\nkind = \"lattice\"\n");
+        let found = watched(SOFT, &short).unwrap();
+        let [one] = &found[..] else { panic!("{found:?}") };
+        assert!(one.thermometer == Thermometer::Configurational && one.mean < 0.5, "{one:?}");
+        assert!(one.to_string().contains("not come to rest"), "{one}");
+        assert_eq!(watched(SOFT, &format!("{text}sweeps = 2\n")).unwrap(), []);
+    }
+
     /// A random start at a tiny kT has 10^5 kT at first, and cools for longer than any number of relaxation
     /// times. However short its steps are, it does not stop, and the warning says that it still falls.
     #[test]
