@@ -2,6 +2,7 @@
 
 use crate::particles::State;
 use crate::run::Simulation;
+use crate::scene::Scene;
 use crate::tests::support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
@@ -75,6 +76,13 @@ fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
         let expected = -kt * (mean(change) / mean(-change)).ln() / (2.0 * interfaces * change * area);
         let found = value(&out[0], "free_energy");
         assert!((found - expected).abs() < 1e-10, "{interfaces}: {found} {expected}");
+        // Half the difference of the two samples, in which the tension is linear: a weight of 1 in the second.
+        let share = |e: f64, weight: f64| (weight - 1.0) / mean(e);
+        let weight = |e: f64| 2.0 * mean(e) - 1.0;
+        let apart = share(change, weight(change)) - share(-change, weight(-change));
+        let error = 0.5 * kt * apart.abs() / (2.0 * interfaces * change * area);
+        let found = out[0].get("free_energy").unwrap().errors[0];
+        assert!((found / error - 1.0).abs() < 1e-9 && error > 0.0, "{interfaces}: {found} {error}");
         let stress = value(&out[0], "stress_conservative");
         assert!((stress - 6.0 / interfaces * (5.0 - 1.5)).abs() < 1e-12, "{stress}");
     }
@@ -297,4 +305,110 @@ fn the_pressures_around_a_drop_have_the_trace_of_the_force() {
             .sum();
         assert!((trace - 1.0).abs() < 1e-10, "{others}: {trace}");
     }
+}
+
+/// A sample that is centred takes its lines of force along: those of a lone particle are in the middle, wherever it is.
+#[test]
+fn lines_of_force_move_with_a_centred_sample() {
+    for y in [0.3, 2.0, 4.4] {
+        let flux = Flux {
+            ways: vec![Line { from: [1.0, y, 1.0], d: [0.0, 0.02, 0.0], f: [0.0, 1.0, 0.0] }],
+            ..Flux::default()
+        };
+        let observe = "stress_profile = { axis = \"y\", bins = 5, recentre = true }";
+        let mut shown = Shown::new(IDEAL, 1.0, &[4.0, 5.0, 6.0], &[[1.0, y, 1.0]], observe);
+        shown.sample(|view| View { flux: Some(&flux), ..view });
+        let normal = shown.finish()[0].get("normal").unwrap().values.clone();
+        assert!((normal[2] - 0.02 / 24.0).abs() < 1e-14, "{y}: {normal:?}");
+        assert!([0, 1, 3, 4].iter().all(|k| normal[*k] == 0.0), "{y}: {normal:?}");
+    }
+}
+
+/// A force on a line through the centre of mass has no tangential part, also where the circular mean is another point.
+#[test]
+fn the_centre_of_a_drop_is_its_centre_of_mass() {
+    let x = [2.0, 2.1, 2.2, 2.9];
+    let centre = x.iter().sum::<f64>() / 4.0;
+    let flux = Flux {
+        drag: vec![Line { from: [centre, 3.9, 3.0], d: [0.0, 0.5, 0.0], f: [0.0, 2.0, 0.0] }],
+        ..Flux::default()
+    };
+    let observe = "drop = { distance = 0.8, range = 3.0, bins = 30 }";
+    let mut shown = Shown::new(IDEAL, 1.0, &[6.0; 3], &x.map(|x| [x, 3.0, 3.0]), observe);
+    shown.sample(|view| View { flux: Some(&flux), ..view });
+    let profile = &shown.finish()[1];
+    let (normal, tangential) = (profile.get("normal").unwrap(), profile.get("tangential").unwrap());
+    assert!(
+        normal.values.iter().any(|p| *p > 0.0) && tangential.values.iter().all(|p| p.abs() < 1e-12),
+        "{profile:?}"
+    );
+}
+
+/// The blocks whose scatter gives the error of one configuration are one and a half ranges wide; together they have every particle.
+#[test]
+fn blocks_of_a_configuration_are_wider_than_the_forces() {
+    let x: Vec<[f64; 3]> =
+        (0..1000).map(|k| [k % 10, k / 10 % 10, k / 100].map(|c| 0.6 * f64::from(c) + 0.1)).collect();
+    let shown = Shown::new(SOFT, 1.0, &[6.0; 3], &x, "temperature = true");
+    let frame = Frame::new(shown.simulation.view(0.0), &shown.fluid);
+    let blocks = psidpd_observe::configurational::sums_of_blocks(&frame);
+    assert_eq!(blocks.len(), 64);
+    let all = psidpd_observe::configurational::sums(&frame);
+    for c in 0..2 {
+        let sum: f64 = blocks.iter().map(|block| block[c]).sum();
+        assert!((sum - all[c]).abs() < 1e-9 * (1.0 + all[c].abs()), "{blocks:?}");
+    }
+}
+
+/// The surface of a wall is where its frozen particles end, those of the other wall apart. The foot of the drop, which the wall
+/// draws out, is below the fitted points. A sphere of radius 2.5 whose middle is 1 above the surface meets it at 114 degrees.
+#[test]
+fn the_angle_of_a_drop_above_its_foot() {
+    let frozen = [[1.0, 1.0, 0.2], [3.0, 1.0, 0.9], [5.0, 1.0, 7.4], [2.0, 6.0, 0.5]];
+    let place = |k: i32| [k % 40, k / 40 % 40, k / 1600].map(|c| 0.2 * f64::from(c) + 0.1);
+    let away = |x: &[f64; 3]| (x[0] - 4.0).hypot(x[1] - 4.0);
+    let is_liquid =
+        |x: &[f64; 3]| x[2] > 0.9 && (away(x).hypot(x[2] - 1.9) < 2.5 || x[2] < 1.4 && away(x) < 3.4);
+    let mut x = frozen.to_vec();
+    x.extend((0..64_000).map(place).filter(is_liquid));
+    let observe = "contact_angle = { above = 0.6, distance = 0.5, bins = [16, 32] }";
+    let mut shown = Shown::new(IDEAL, 1.0, &[8.0; 3], &x, observe);
+    let flags: Vec<bool> = (0..x.len()).map(|k| k < frozen.len()).collect();
+    for _ in 0..2 {
+        shown.sample(|view| View { frozen: &flags, ..view });
+    }
+    let out = shown.finish();
+    assert!(out[0].note.contains("surface is 0.9000"), "{}", out[0].note);
+    let (angle, expected) = (value(&out[0], "angle"), (-0.4f64).acos().to_degrees());
+    assert!(
+        (angle - expected).abs() < 3.0 && (value(&out[0], "radius") - 2.5).abs() < 0.08,
+        "{angle} {expected}"
+    );
+}
+
+/// Heights of a hanging drop are those in its box, which need not begin at 0.
+#[test]
+fn a_hanging_drop_is_where_its_box_is() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), IDEAL).unwrap();
+    let x = [[3.1, 3.2, -4.2], [3.3, 3.0, -4.0], [3.0, 3.1, -3.8]];
+    let atoms: String =
+        x.iter().zip(1..).map(|(x, k)| format!("{k} 1 {} {} {}\n", x[0], x[1], x[2])).collect();
+    let data = format!(
+        "three\n\n3 atoms\n1 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n-5 3 zlo zhi\n\nMasses\n\n1 1.0\n\nAtoms # atomic\n\n{atoms}"
+    );
+    std::fs::write(folder.path().join("three.data"), data).unwrap();
+    let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 1\ndt = 0.01\nsteps = 10\n[initial]\nkind = \"data\"\n\
+                file = \"three.data\"\n[observe]\npendant = { bins = [6, 16], distance = 1.0 }\n";
+    let scene = Scene::parse("s.toml", text, folder.path()).unwrap();
+    let simulation = scene.simulation(scene.initial_state()).unwrap();
+    let fluid = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
+    let mut meter = scene.observe.requests[0].meter.clone();
+    assert!(meter.sample(&Frame::new(simulation.view(0.0), &fluid)));
+    let all = meter.finish();
+    let field = all.iter().find(|o| o.name == "pendant_field").unwrap();
+    let (z, density) = (field.get("z").unwrap(), field.get("density").unwrap());
+    let filled = z.values.iter().zip(&density.values).filter(|(_, n)| **n > 0.0);
+    let heights: Vec<f64> = filled.map(|(z, _)| *z).collect();
+    assert!(!heights.is_empty() && heights.iter().all(|z| (-4.5..-3.5).contains(z)), "{heights:?}");
 }
