@@ -58,9 +58,10 @@ FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) :
   scalar_flag = 1;
   global_freq = 1;
   extscalar = 0;
-  // compute_vector() and the global virial contain the virial of drag and noise.
+  // The pressure contains the virial of drag and noise.
   virial_global_flag = 1;
   thermo_virial = 1;
+  std::fill_n(virial, 6, 0.0);
 
   if (narg < 4) stop(std::string("expected ") + SCHEMES);
   const std::string name = arg[3];
@@ -95,7 +96,10 @@ FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) :
            (scheme == Scheme::force_gradient ? ", 'gradient'" : "") + " or 'noise'");
     }
   }
-  if (scheme == Scheme::force_gradient) keep_shifts();
+  create_attribute = 1;
+  maxexchange = scheme == Scheme::force_gradient ? 9 : 6;
+  grow_arrays(atom->nmax);
+  atom->add_callback(Atom::GROW);
 }
 
 void FixSplitting::stop(const std::string &text, const char *file, int line)
@@ -103,9 +107,14 @@ void FixSplitting::stop(const std::string &text, const char *file, int line)
   error->all(file, line, std::string("Fix ") + style + ": " + text);
 }
 
+void FixSplitting::warn(const std::string &text, const char *file, int line)
+{
+  if (comm->me == 0) error->warning(file, line, std::string("Fix ") + style + ": " + text);
+}
+
 int FixSplitting::setmask()
 {
-  return INITIAL_INTEGRATE | FINAL_INTEGRATE | PRE_FORCE | POST_RUN;
+  return INITIAL_INTEGRATE | FINAL_INTEGRATE | PRE_FORCE | PRE_REVERSE | POST_RUN;
 }
 
 PairPsi *FixSplitting::find_pair()
@@ -126,6 +135,9 @@ PairPsi *FixSplitting::find_pair()
 void FixSplitting::init()
 {
   pair = find_pair();
+  // The pressure of a minimisation must not contain what an earlier run left here.
+  std::fill_n(virial, 6, 0.0);
+  impulses = {};
   // The fix moves no atom while LAMMPS minimises.
   if (update->whichflag == 2) return;
   if (strcmp(update->integrate_style, "verlet") != 0)
@@ -136,43 +148,16 @@ void FixSplitting::init()
   check_others();
 }
 
-void FixSplitting::check_styles_beside()
-{
-  for (const char *known : {"^dpd$", "^dpd/tstat", "^dpd/ext", "^dpd/coul", "^dpd/fdt", "^dpd/gpu", "^dpd/intel", "^dpd/kk",
-                            "^dpd/omp", "^mdpd$", "^edpd", "^tdpd", "^brownian", "^gran"})
-    if (Pair *beside = force->pair_match(known, 0, 1))
-      stop(std::string("pair_style ") + force->pair_match_ptr(beside) +
-           " beside it expects one evaluation of forces in a step of velocity Verlet: use fix nve");
-}
-
-// Stops at fixes that also move atoms, or that expect one evaluation of forces in each step: their random forces
-// are scaled for it, or they advance a state at each.
-void FixSplitting::check_others()
-{
-  for (int k = 0; k < modify->nfix; k++) {
-    const Fix *other = modify->fix[k];
-    if (other == this) continue;
-    const std::string name = std::string("fix ") + other->id + " (" + other->style + ")";
-    if (dynamic_cast<const FixSplitting *>(other)) stop("only one such fix is allowed, and there is also " + name);
-    if (other->time_integrate)
-      stop(name + " integrates too, and its atoms would be elsewhere when forces are computed: remove it; atoms that "
-                  "no fix integrates stay where they are");
-    if (scheme == Scheme::aboba && strcmp(other->style, "pair") == 0)
-      stop(name + " reads the pair style where forces are first computed, with aboba in the middle of a step: use two-stage");
-    for (const char *known :
-         {"shake", "rattle", "langevin", "qtb", "ttm", "srd", "lb/", "smd", "tmd", "colvars", "plumed", "atc", "hyper/", "pimd",
-          "drude/transform", "wall/gran", "wall/body", "electron/stopping", "rx", "append/atoms", "electrode/thermo", "grem",
-          "imd", "nonaffine/displacement", "pafi", "press/langevin", "sgcmc", "package_omp", "package_intel"}) {
-      if (!begins(other->style, known) && strcmp(other->id, known) != 0) continue;
-      stop(name + " expects one evaluation of forces in a step of velocity Verlet: use fix nve");
-    }
-  }
-}
-
 void FixSplitting::setup(int vflag)
 {
   before = pair->effort();
+  show_virial(vflag);
+}
+
+void FixSplitting::show_virial(int vflag)
+{
   v_init(vflag);
+  if (vflag_global) std::copy(impulses.begin(), impulses.end(), virial);
 }
 
 void FixSplitting::initial_integrate(int vflag)
@@ -183,14 +168,21 @@ void FixSplitting::initial_integrate(int vflag)
   if (scheme == Scheme::aboba) {
     drift(0.5 * dt);
     expect();
+    evaluation = Evaluation::middle;
     return;
   }
   kick(lambda * dt);
   drift(0.5 * dt);
   reflect();
   follow();
+  const bool displaces = scheme == Scheme::force_gradient && gradient > 0.0;
+  evaluation = displaces ? Evaluation::other : Evaluation::middle;
   compute_forces(0, 0);
-  if (scheme == Scheme::force_gradient && gradient > 0.0) compute_displaced_forces();
+  if (displaces) {
+    evaluation = Evaluation::middle;
+    compute_displaced_forces();
+  }
+  evaluation = Evaluation::end;
   kick((1.0 - 2.0 * lambda) * dt);
   drift(0.5 * dt);
   expect();
@@ -199,14 +191,15 @@ void FixSplitting::initial_integrate(int vflag)
 void FixSplitting::final_integrate()
 {
   const double dt = update->dt;
-  v_init(vflag_of_step);
   if (scheme != Scheme::aboba) {
     kick(lambda * dt);
-    act();
+    if (is_due()) act();
+    show_virial(vflag_of_step);
     return;
   }
   kick(0.5 * dt);
-  act();
+  if (is_due()) act();
+  show_virial(vflag_of_step);
   kick(0.5 * dt);
   drift(0.5 * dt);
   reflect();
@@ -215,6 +208,7 @@ void FixSplitting::final_integrate()
   const int eflag = (update->eflag_global == step ? 1 : 0) | (update->eflag_atom == step ? 2 : 0);
   if (eflag || vflag_of_step) {
     follow();
+    evaluation = Evaluation::end;
     compute_forces(eflag, vflag_of_step);
   } else {
     comm->forward_comm();
@@ -285,25 +279,22 @@ bool FixSplitting::is_due() const
 // The forces of the step are computed where the thermostat acts.
 void FixSplitting::expect()
 {
-  if (is_due()) pair->expect_heat(static_cast<double>(every) * update->dt, vflag_of_step != 0);
+  if (is_due()) pair->expect_heat(static_cast<double>(every) * update->dt, wants_virial());
 }
 
 void FixSplitting::act()
 {
-  if (!is_due()) return;
-  double impulses[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  const double times = static_cast<double>(every);
-  masses.resize(atom->nlocal);
-  if (!masses.empty())
+  const int owned = atom->nlocal;
+  masses.resize(owned);
+  if (owned > 0)
     pair->engine().find_masses(force->mvv2e, movers(), {held.data(), held.size()}, {masses.data(), masses.size()});
   const uint64_t inaccurate = pair->effort().inaccurate;
-  pair->heat(masses, times * update->dt, uniform, vflag_global != 0, impulses);
-  if (inaccurate == before.inaccurate && pair->effort().inaccurate > inaccurate && comm->me == 0)
-    error->warning(FLERR, std::string("Fix ") + style +
-                              ": the thermostat is inaccurate, as drag is too strong for this timestep; use a smaller gamma or timestep");
-  // The virial is that of the mean force over the step.
-  if (vflag_global)
-    for (int k = 0; k < 6; k++) virial[k] += times * impulses[k];
+  impulses = pair->heat(masses, {static_cast<double>(every) * update->dt, uniform, wants_virial(), has_setters});
+  if (!warned && pair->effort().inaccurate > inaccurate) {
+    warned = true;
+    warn("the thermostat is inaccurate, as drag is too strong for this timestep; use a smaller gamma or timestep");
+  }
+  if (has_setters) keep_pushes();
 }
 
 void FixSplitting::follow()

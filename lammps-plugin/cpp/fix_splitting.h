@@ -9,6 +9,8 @@
 #include "fix.h"
 #include "psidpd-lammps/src/bridge.rs.h"
 
+#include <array>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -28,14 +30,18 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void init() override;
   void setup(int vflag) override;
   void setup_pre_force(int vflag) override { pre_force(vflag); }
-  // Finds the atoms whose whole force other fixes set: drag and noise must not change their velocities either.
+  // Finds the atoms whose force other fixes set: drag and noise must not change their velocities either.
   void pre_force(int vflag) override;
+  void setup_pre_reverse(int eflag, int vflag) override;
+  // Adds drag and noise to the forces that other fixes are going to set, for what those report.
+  void pre_reverse(int eflag, int vflag) override;
   void initial_integrate(int vflag) override;
   void final_integrate() override;
   void post_run() override;
   double compute_scalar() override;
 
-  // Shifts move with their atoms to other ranks.
+  // Shifts and pushes move with their atoms to other ranks.
+  void set_arrays(int i) override;
   void grow_arrays(int most) override;
   void copy_arrays(int from, int to, int delflag) override;
   int pack_exchange(int i, double *buf) override;
@@ -44,7 +50,12 @@ class FixSplitting : public LAMMPS_NS::Fix {
 
  private:
   [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
+  // Warns on one rank.
+  void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
+  // Stops at fixes that also move atoms, or that expect one evaluation of forces in each step, and warns of unknown ones.
   void check_others();
+  // How often forces are computed in a timestep, in words.
+  std::string evaluations() const;
   // Stops at pair styles of a hybrid whose random forces or states expect one evaluation of forces in each step.
   void check_styles_beside();
   // The pair style whose drag and noise this fix applies.
@@ -64,7 +75,6 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void find_ghosts_anew();
   // Moves the atoms of the group by ξΔt² f/m, computes all forces there, and restores x.
   void compute_displaced_forces();
-  void keep_shifts();
   // Adds the shifts to x; restore() subtracts them.
   void shift();
   void restore();
@@ -72,11 +82,21 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void compute_forces(int eflag, int vflag);
   bool is_due() const;
   void expect();
+  // Whether the virial of drag and noise is computed where they act: with every 2 and more, later steps may ask for it.
+  bool wants_virial() const { return thermo_virial && (every > 1 || vflag_of_step); }
+  void show_virial(int vflag);
+  // Applies drag and noise to the present velocities, and keeps their mean forces.
   void act();
+  // Finds what drag and noise would do now, for what is reported before they first act.
+  void rehearse();
   // Adds what other fixes add to forces.
   void add_forces(int vflag);
-  // What a fix makes of forces that are `scale` times a probe.
-  std::vector<double> replaced(LAMMPS_NS::Fix *fix, double scale);
+  // For which part of a timestep the forces at its end act, on average; those in the middle act for the rest.
+  double share_of_end() const { return scheme == Scheme::aboba ? 0.0 : 2.0 * lambda; }
+  // Stores the pushes of the last action.
+  void keep_pushes();
+  // Marks the atoms whose force a fix replaces.
+  void find_held(LAMMPS_NS::Fix *fix);
 
   enum class Scheme { two_stage, force_gradient, aboba };
   Scheme scheme = Scheme::two_stage;
@@ -86,10 +106,26 @@ class FixSplitting : public LAMMPS_NS::Fix {
   LAMMPS_NS::bigint every = 1;
   bool uniform = false;
   PairPsi *pair = nullptr;
-  // For each atom whether other fixes set its whole force.
+  // For each atom the directions in which other fixes set its force: bit 0 for x, 1 for y, 2 for z.
   std::vector<uint8_t> held;
+  // Whether there are fixes that set forces; all ranks agree.
+  bool has_setters = false;
+  // Number of atoms that the arrays have room for.
+  int room = 0;
+  // For each atom, in the directions in which its force is set, the mean force of drag and noise since they last acted, and what
+  // forces in the middle of the timestep add to its mean force.
+  double **pushes = nullptr;
+  // Which forces are computed.
+  enum class Evaluation { other, middle, end };
+  Evaluation evaluation = Evaluation::other;
+  // The virial of the mean forces of drag and noise since they last acted.
+  std::array<double, 6> impulses{};
   // Masses for the thermostat, infinite for atoms that keep their velocities.
   std::vector<double> masses;
+  // IDs of fixes that a warning has named.
+  std::set<std::string> named;
+  // Whether this run has warned that the thermostat is inaccurate.
+  bool warned = false;
   // Iterations of the thermostat before this run.
   Effort before{};
   // Flag of the virial of the present step.
@@ -97,6 +133,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
   // For force-gradient: the displacement of each atom, and its position before.
   double **shifts = nullptr;
   std::vector<double> home;
+  // Forces that a probe overwrites.
+  std::vector<double> covered;
 };
 
 }    // namespace psidpd

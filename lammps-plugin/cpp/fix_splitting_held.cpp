@@ -1,16 +1,21 @@
 // Atoms whose force other fixes set.
 //
-// Such a fix replaces drag and noise too where these are forces. Here they are not, so it is asked for two sets of forces
-// what it makes of them: where the difference is gone the atom is held.
+// Such a fix replaces drag and noise too where these are forces. Here they are not, so it is given a probe of forces: where
+// it changes them it sets them, and drag and noise must not move the atom. What it then reports as the force that was there is
+// made the mean force of the timestep, and of drag and noise since they last acted: so the mean of reports is the momentum that
+// other atoms lost.
 
 #include "fix_splitting.h"
 
+#include "pair_psi.h"
+
 #include "atom.h"
 #include "domain.h"
+#include "error.h"
 #include "modify.h"
+#include "update.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 using namespace LAMMPS_NS;
@@ -19,57 +24,106 @@ using namespace psidpd;
 
 namespace {
 
-// Fixes that set forces, or take components out of them.
-bool replaces_forces(const char *style)
+bool begins_with_one_of(const char *style, std::initializer_list<const char *> names)
 {
-  for (const char *known :
-       {"setforce", "freeze", "lineforce", "planeforce", "aveforce", "manifoldforce", "flow/gauss"})
-    if (strncmp(style, known, strlen(known)) == 0) return true;
-  return false;
+  return std::any_of(names.begin(), names.end(), [=](const char *name) { return !strncmp(style, name, strlen(name)); });
+}
+
+// Fixes that set forces to a value of their own.
+bool sets_forces(const char *style) { return begins_with_one_of(style, {"setforce", "freeze"}); }
+
+// Fixes that take components out of forces, or average them.
+bool takes_from_forces(const char *style)
+{
+  return begins_with_one_of(style, {"lineforce", "planeforce", "aveforce", "manifoldforce", "flow/gauss"});
 }
 
 }    // namespace
 
 void FixSplitting::pre_force(int)
 {
-  const int owned = atom->nlocal;
-  held.assign(owned, 0);
+  held.assign(atom->nlocal, 0);
+  has_setters = false;
   for (int k = 0; k < modify->nfix; k++) {
     Fix *fix = modify->fix[k];
-    if (!(modify->fmask[k] & POST_FORCE) || !replaces_forces(fix->style)) continue;
-    const auto none = replaced(fix, 0.0), probe = replaced(nullptr, 1.0), found = replaced(fix, 1.0);
-    int is_part = 0;
-    for (int i = 0; i < owned; i++) {
-      if (!(atom->mask[i] & groupbit)) continue;
-      bool gone = true, kept = true;
-      for (size_t c = 3 * static_cast<size_t>(i); c < 3 * static_cast<size_t>(i) + 3; c++) {
-        const double left = found[c] - none[c];
-        gone = gone && left == 0.0;
-        kept = kept && std::fabs(left - probe[c]) <= 1e-6 * std::fabs(probe[c]);
-      }
-      if (gone) held[i] = 1;
-      if (!gone && !kept) is_part = 1;
-    }
-    int any = 0;
-    MPI_Allreduce(&is_part, &any, 1, MPI_INT, MPI_MAX, world);
-    if (any)
-      stop(std::string("fix ") + fix->id + " (" + fix->style +
-           ") changes a part of the forces on atoms, and drag and noise would bypass it: hold atoms by 'fix setforce 0 0 0' "
-           "in all directions, leave them out of the group, or use fix nve");
+    if (!(modify->fmask[k] & POST_FORCE)) continue;
+    has_setters = has_setters || sets_forces(fix->style);
+    if (sets_forces(fix->style) || takes_from_forces(fix->style)) find_held(fix);
   }
 }
 
-std::vector<double> FixSplitting::replaced(Fix *fix, double scale)
+void FixSplitting::find_held(Fix *fix)
 {
+  const int owned = atom->nlocal, dimension = domain->dimension;
+  const auto is_touched = [=](int i) { return (atom->mask[i] & fix->groupbit) != 0; };
+  // No force that is set, and different for each atom, as averages keep equal forces.
+  const auto probe = [=](int i, int c) { return 0.731058578630005 + 0.0123 * c + 1.7e-3 * (atom->tag[i] & 1023); };
+  covered.clear();
+  for (int i = 0; i < owned; i++) {
+    if (!is_touched(i)) continue;
+    double *f = atom->f[i];
+    covered.insert(covered.end(), f, f + 3);
+    for (int c = 0; c < dimension; c++) f[c] = probe(i, c);
+  }
+  fix->post_force(0);
+  const double *before = covered.data();
+  const uint8_t whole = dimension == 2 ? 3 : 7;
+  bool is_part = false;
+  for (int i = 0; i < owned; i++) {
+    if (!is_touched(i)) continue;
+    double *f = atom->f[i];
+    uint8_t changed = 0;
+    for (int c = 0; c < dimension; c++)
+      if (f[c] != probe(i, c)) changed |= 1 << c;
+    std::copy_n(before, 3, f);
+    before += 3;
+    if (sets_forces(fix->style)) held[i] |= changed;
+    if ((atom->mask[i] & groupbit) && changed && (changed != whole || !sets_forces(fix->style))) is_part = true;
+  }
+  if (is_part)
+    error->one(FLERR, std::string("Fix ") + style + ": fix " + fix->id + " (" + fix->style +
+                          ") changes a part of the forces on atoms, and drag and noise would bypass it: hold atoms by 'fix setforce 0 0 0' "
+                          "in all directions, leave them out of the group, or use fix nve");
+}
+
+void FixSplitting::setup_pre_reverse(int eflag, int vflag)
+{
+  vflag_of_step = vflag;
+  evaluation = Evaluation::other;
+  warned = false;
+  rehearse();
+  pre_reverse(eflag, vflag);
+}
+
+// The velocities stay as they are.
+void FixSplitting::rehearse()
+{
+  if (!pair || update->whichflag != 1 || !(update->dt > 0.0) || !(wants_virial() || has_setters)) return;
   const size_t count = 3 * static_cast<size_t>(atom->nlocal);
-  double *f = count > 0 ? atom->f[0] : nullptr;
-  const std::vector<double> before(f, f + count);
+  double *v = count > 0 ? atom->v[0] : nullptr;
+  const std::vector<double> present(v, v + count);
+  act();
+  std::copy(present.begin(), present.end(), v);
+}
+
+void FixSplitting::pre_reverse(int, int)
+{
+  if (!has_setters) return;
   for (int i = 0; i < atom->nlocal; i++)
     for (int c = 0; c < 3; c++)
-      // Different for each atom and direction: an average or a projection changes them.
-      f[3 * i + c] = c == 2 && domain->dimension == 2 ? 0.0 : scale * (1.5 + std::sin(atom->tag[i] + 2.0 * c));
-  if (fix) fix->post_force(0);
-  std::vector<double> after(f, f + count);
-  std::copy(before.begin(), before.end(), f);
-  return after;
+      if (held[i] >> c & 1) {
+        double &f = atom->f[i][c], &middle = pushes[i][3 + c];
+        if (evaluation == Evaluation::middle) middle = (1.0 - share_of_end()) * f;
+        if (evaluation == Evaluation::end) f = share_of_end() * f + middle;
+        f += pushes[i][c];
+      }
+}
+
+void FixSplitting::keep_pushes()
+{
+  const auto force = pair->engine().forces_on_fixed();
+  const double unit = pair->engine().facts().force_unit;
+  const bool acts = !force.empty();
+  for (int i = 0; i < atom->nlocal; i++)
+    for (int c = 0; c < 3; c++) pushes[i][c] = acts && held[i] ? unit * force[3 * static_cast<size_t>(i) + c] : 0.0;
 }

@@ -183,6 +183,7 @@ void PairPsi::init_style()
   apart = has_splitting();
   check_host();
   check_callers();
+  check_thermostats();
   check_box();
   lost_atoms.begin(atom, world);
   // LAMMPS sizes its buffers by this; later communications never send more.
@@ -311,7 +312,7 @@ void PairPsi::read_restart(FILE *fp)
 double PairPsi::memory_usage()
 {
   double bytes = Pair::memory_usage();
-  bytes += listed.bytes() + special.bytes() + exclusions.bytes() + exchange.vectors.capacity() * sizeof(double);
+  bytes += listed.bytes() + special.bytes() + exclusions.bytes() + ghost_reach.bytes() + exchange.vectors.capacity() * sizeof(double);
   if (style) bytes += static_cast<double>((*style)->memory());
   return bytes;
 }

@@ -5,6 +5,7 @@
 
 #include "exclusions.h"
 #include "ghost_exchange.h"
+#include "ghost_reach.h"
 #include "listed_pairs.h"
 #include "lost_atoms.h"
 #include "pair.h"
@@ -15,6 +16,7 @@
 #include <cstdint>
 #include <exception>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -52,9 +54,19 @@ class PairPsi : public LAMMPS_NS::Pair {
   std::string why_not_apart() const;
   // Announces that the thermostat will act, for a time, where the next forces are computed.
   void expect_heat(double time, bool wants_virial);
-  // Applies drag and noise for a time to the velocities of atoms with these masses (energy over squared velocity), at
-  // the positions where forces were last computed; adds the virial. Atoms of infinite mass keep their velocities.
-  void heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial);
+  // What drag and noise do.
+  struct Action {
+    // Time for which they act.
+    double time;
+    bool uniform;
+    // Whether to find the virial, and the forces on atoms of infinite mass.
+    bool wants_virial, wants_fixed;
+  };
+  // Applies drag and noise to the velocities of atoms with these masses (energy over squared velocity), at the positions
+  // where forces were last computed. Atoms of infinite mass keep their velocities. Returns the virial of the mean force.
+  std::array<double, 6> heat(const std::vector<double> &masses, const Action &action);
+  // Atoms are going to be displaced from the present positions, where ghosts may have been found; or are back there.
+  void displace(bool away);
   // The engine, which exists after init_style().
   Style &engine() { return **style; }
   // Iterations of the thermostat in its last update, and of all its updates since the style was set up.
@@ -134,6 +146,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   void check_plane();
   void check_ghosts();
   void check_lost();
+  void check_reach(bool alone);
+  void check_thermostats();
   void check_callers();
   bool has_device() const { return given.device != "cpu"; }
   void check_device();
@@ -157,9 +171,14 @@ class PairPsi : public LAMMPS_NS::Pair {
   Given given;
   double built_kt = 0.0;
   bool described = false;
+  // IDs of fixes that a warning has named.
+  std::set<std::string> named;
   std::vector<double *> density_rows;
 
   LostAtoms lost_atoms;
+  GhostReach ghost_reach;
+  // Whether atoms are displaced from where ghosts are found.
+  bool displaced = false;
   GhostExchange exchange;
   // Whether ghosts are away from the images of their atoms, in this evaluation.
   bool strained = false;

@@ -9,6 +9,7 @@
 #include "fix.h"
 #include "force.h"
 #include "modify.h"
+#include "neighbor.h"
 #include "update.h"
 
 #include <algorithm>
@@ -125,6 +126,40 @@ void PairPsi::check_ghosts()
       stop("ghost atoms reach " + std::to_string(reach) + ", the cut-off is " + std::to_string(cutoff) +
            ": raise it with 'comm_modify cutoff'");
   }
+}
+
+// Warns of fixes with a temperature: drag and noise keep one already.
+void PairPsi::check_thermostats()
+{
+  if (!(*style)->facts().needs_velocities || update->whichflag == 2) return;
+  for (int k = 0; k < modify->nfix; k++) {
+    Fix *fix = modify->fix[k];
+    int dimension = 0;
+    if (!fix->extract("t_target", dimension) || !named.insert(fix->id).second) continue;
+    warn(std::string("fix ") + fix->id + " (" + fix->style +
+         ") is a second thermostat beside drag and noise, which keep the temperature alone: use fix nve" +
+         (fix->time_integrate ? "" : " without it") + ", or gamma 0");
+  }
+}
+
+void PairPsi::displace(bool away)
+{
+  if (away && neighbor->ago == 0) ghost_reach.begin(atom);
+  displaced = away;
+}
+
+// Stops where LAMMPS's ghosts, or the lists that it makes of them, would lack atoms: LAMMPS itself does not look then.
+void PairPsi::check_reach(bool alone)
+{
+  const bool lists = neighbor->nlist > 0;
+  if (neighbor->dist_check || (alone && !lists)) return;
+  const std::string text = ghost_reach.lost(atom, neighbor);
+  if (text.empty()) return;
+  stop_here(text + "; " +
+            (alone ? std::string("this style needs no ghosts on one rank, but a compute, a fix or another style has asked for "
+                                 "neighbor lists, which would lack pairs")
+                   : std::string("pairs would be left out")) +
+            ": use 'neigh_modify delay 0 every 1 check yes', or a wider skin (command 'neighbor')");
 }
 
 // 'thermo_modify lost' decides whether LAMMPS stops or continues; a style cannot read it.

@@ -119,6 +119,7 @@ void PairPsi::compute(int eflag, int vflag)
       stop("pairs were excluded after the setup of the style, perhaps by a fix: run again");
     if (why_listed.empty() && SpecialPairs::are_scaled(atom, force) && is_narrow())
       stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
+    if (!displaced) ghost_reach.begin(atom);
     find_images();
     special.find(atom, force, why_listed.empty());
     const std::string trouble = exclusions.find(atom, neighbor, group, setflag, why_listed.empty());
@@ -159,6 +160,7 @@ void PairPsi::compute(int eflag, int vflag)
   const Extent box = extent();
   strained = exchange.images.have_moved(atom, domain);
   const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
+  check_reach(alone);
   tell_left_out(alone);
   Totals totals;
   if (alone) {

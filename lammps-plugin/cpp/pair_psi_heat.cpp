@@ -39,7 +39,7 @@ void PairPsi::expect_heat(double time, bool wants_virial)
   attempt([&] { (*style)->expect_thermostat(time, wants_virial); });
 }
 
-void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform, bool wants_virial, double *virial)
+std::array<double, 6> PairPsi::heat(const std::vector<double> &masses, const Action &action)
 {
   refresh();
   const size_t owned = atom->nlocal;
@@ -47,9 +47,10 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   Heat what;
   what.seed = given.seed;
   what.step = static_cast<uint64_t>(update->ntimestep);
-  what.uniform = uniform;
-  what.time = time;
-  what.virial = wants_virial;
+  what.uniform = action.uniform;
+  what.time = action.time;
+  what.virial = action.wants_virial;
+  what.fixed = action.wants_fixed;
   Style &fluid = **style;
   Extent box = extent();
   const Request forces{};
@@ -60,7 +61,7 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
   const bool acts = attempt([&] {
     return fluid.thermostat_pairs(box, flags, atoms(reach), {masses.data(), owned}, what);
   });
-  if (!acts) return;
+  if (!acts) return {};
   rust::Slice<double> v;
   if (owned > 0) v = {atom->v[0], 3 * owned};
   const double velocity = fluid.facts().velocity_unit, energy = fluid.facts().energy_unit;
@@ -89,5 +90,6 @@ void PairPsi::heat(const std::vector<double> &masses, double time, bool uniform,
     w = round.virial;
   }
   times(velocity);
-  for (int k = 0; k < 6; k++) virial[k] += energy * w[k];
+  for (double &one : w) one *= energy;
+  return w;
 }

@@ -21,6 +21,8 @@ mod ffi {
         energy_unit: f64,
         /// One unit of velocity of the model.
         velocity_unit: f64,
+        /// One unit of force of the model.
+        force_unit: f64,
         /// The number of threads that run.
         threads: usize,
     }
@@ -99,6 +101,8 @@ mod ffi {
         /// Time for which the thermostat acts.
         time: f64,
         virial: bool,
+        /// Whether to find the forces on atoms of infinite mass.
+        fixed: bool,
     }
 
     /// The atoms of a rank, of which a group moves.
@@ -257,6 +261,9 @@ mod ffi {
             vectors: &mut [f64],
             v: &mut [f64],
         ) -> Result<Round>;
+        /// The mean force of drag and noise in the last update on each owned atom of infinite mass, in units of the model, if
+        /// it was asked for.
+        fn forces_on_fixed(self: &Style) -> &[f64];
         /// Iterations of the thermostat in its last update.
         fn iterations(self: &Style) -> usize;
         fn effort(self: &Style) -> Effort;
@@ -335,6 +342,7 @@ impl Style {
             noise_range: scale.length * plan.noise_range().unwrap_or(0.0),
             energy_unit: scale.energy,
             velocity_unit: scale.velocity(),
+            force_unit: scale.force(),
             threads: self.engine.settings().threads.get(),
         }
     }

@@ -34,6 +34,7 @@ impl Style {
         guard(|| {
             let Style { thermostat, engine, scale, converted, .. } = self;
             let Some(thermostat) = thermostat else { return Ok(false) };
+            thermostat.ask_for_forces_on_fixed(heat.fixed);
             thermostat.take(engine);
             let around = Around { domain: &scale.domain(extent)?, images };
             let (request, _) = converted.take(scale, atoms, None);
@@ -84,6 +85,12 @@ impl Style {
             }
             Ok(round(need))
         })
+    }
+
+    /// The mean force of drag and noise in the last update on each owned atom of infinite mass, in units of the model; zero for
+    /// others. Empty if nobody asked for it.
+    pub fn forces_on_fixed(&self) -> &[f64] {
+        self.thermostat.as_ref().map_or(&[], |thermostat| thermostat.forces_on_fixed().as_flattened())
     }
 
     pub fn iterations(&self) -> usize {

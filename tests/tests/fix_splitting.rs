@@ -397,6 +397,9 @@ fn iterations_are_counted() {
             assert!(line.ends_with("its pairs were those of the forces 4 times"), "{ranks} ranks: {line}");
         }
     }
+    // Each run counts its own.
+    let both = said(&format!("{head}run 9\nrun 6\n"), 1);
+    assert!(both.contains("acted 4 times") && both.contains("acted 3 times"), "{both}");
     let strong = head.replace(&warren(), &folder.path().join("strong.toml").display().to_string());
     let model = std::fs::read_to_string(warren()).unwrap().replace("gamma = 18.0", "gamma = 1e12");
     assert!(model.contains("1e12"));
@@ -406,17 +409,43 @@ fn iterations_are_counted() {
     assert!(said.contains("as drag is too strong for this timestep"), "{said}");
 }
 
-/// Minimisers work as without the fix, and the pair style has no drag.
+/// Minimisers work as without the fix, after a run too, and the pair style has no drag: positions, and with a box that is relaxed
+/// its size and pressure.
 #[test]
 fn minimisation_is_not_affected() {
-    let minimise = "min_style cg\nminimize 0 1e-3 50 500\n";
     let folder = tempfile::tempdir().unwrap();
-    let head = from_data(folder.path(), "comm_modify vel yes", "two-stage", 0.01);
-    let with = run(&format!("{head}{minimise}"), 1);
-    let without = run(&format!("{head}unfix 1\n{minimise}"), 1);
-    assert!(difference(&with.x, &without.x) < 1e-9);
-    let start = run(&format!("{head}run 0\n"), 1);
-    assert!(difference(&with.x, &start.x) > 1e-4);
+    let out = folder.path().join("said.txt").display().to_string();
+    for (before, relax) in [
+        ("", ""),
+        ("run 20\n", ""),
+        ("", "fix br all box/relax iso 0.0 vmax 0.01\n"),
+        ("run 20\n", "fix br all box/relax iso 0.0 vmax 0.01\n"),
+    ] {
+        for fix in ["two-stage", "force-gradient every 2", "aboba"] {
+            let minimise = format!(
+                "{relax}thermo_style custom step pe press lx\nmin_style cg\nminimize 0 1e-3 50 500\n\
+                 print \"$(press:%.15g) $(lx:%.15g)\" file {out}\n"
+            );
+            let head = from_data(folder.path(), "comm_modify vel yes", fix, 0.01);
+            let end = |script: &str| {
+                let frame = run(script, 1);
+                let said = std::fs::read_to_string(&out).unwrap();
+                let words = said.split_whitespace().map(|w| w.parse::<f64>().unwrap());
+                (frame, words.collect::<Vec<_>>())
+            };
+            let (with, found) = end(&format!("{head}{before}{minimise}"));
+            let (without, expected) = end(&format!("{head}{before}unfix 1\n{minimise}"));
+            assert!(difference(&with.x, &without.x) < 1e-9, "{fix}, {before}{relax}");
+            for (a, b) in found.iter().zip(&expected) {
+                assert!(
+                    (a - b).abs() < 1e-9 * (1.0 + b.abs()),
+                    "{fix}, {before}{relax}: {found:?} {expected:?}"
+                );
+            }
+            let start = run(&format!("{head}run 0\n"), 1);
+            assert!(difference(&with.x, &start.x) > 1e-4);
+        }
+    }
 }
 
 /// Each error is one line, before any step.

@@ -157,3 +157,45 @@ fn ghosts_by_type_are_enough() {
         }
     }
 }
+
+/// Where LAMMPS is told not to look how far atoms go, a run stops as soon as pairs would be missing: on several ranks, and on one
+/// where a compute has asked for a list. Otherwise nothing is needed of LAMMPS, and with `check yes` all is as ever.
+#[test]
+fn ghosts_that_are_too_old_stop_the_run() {
+    let fast = "neighbor 0.0 bin\nneigh_modify delay 0 every 20 check no";
+    let rdf = "compute g all rdf 20\nfix a all ave/time 1 1 1 c_g[*] mode vector\n";
+    let outcome = |before: &str, more: &str, ranks: usize| {
+        let folder = tempfile::tempdir().unwrap();
+        let script = format!(
+            "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F F\n{more}timestep 0.02\nrun 25\n",
+            particles(before, "block 0 5 0 5 0 5", 2, 500),
+            warren()
+        );
+        let path = folder.path().join("in.lammps");
+        std::fs::write(&path, script).unwrap();
+        let run = psidpd_tests::lammps().0.run_script(ranks, folder.path(), &path, &[], LIMIT);
+        run.map(|run| run.stdout).map_err(|e| e.to_string())
+    };
+    for fix in
+        ["fix 1 all nve\n", "fix 1 all dpd/splitting two-stage\n", "fix 1 all dpd/splitting force-gradient\n"]
+    {
+        for (before, more, ranks, refused) in [
+            (fast, fix.to_owned(), 1, false),
+            (fast, fix.to_owned(), 2, true),
+            (fast, format!("{fix}{rdf}"), 1, true),
+            ("neighbor 0.02 bin\nneigh_modify delay 0 every 20 check no", fix.to_owned(), 2, true),
+            ("neighbor 0.0 bin\nneigh_modify delay 0 every 1 check yes", format!("{fix}{rdf}"), 1, false),
+            ("neighbor 0.0 bin\nneigh_modify delay 0 every 1 check yes", fix.to_owned(), 2, false),
+            ("neighbor 1.5 bin\nneigh_modify delay 0 every 5 check no", format!("{fix}{rdf}"), 2, false),
+        ] {
+            match outcome(before, &more, ranks) {
+                Ok(said) => assert!(!refused, "{before}, {more}, {ranks} ranks: {said}"),
+                Err(said) => {
+                    let named = said.contains("since ghost atoms were found, more than half the skin");
+                    assert!(refused && named, "{before}, {more}, {ranks} ranks: {said}");
+                    assert!(ranks > 1 || said.contains("has asked for neighbor lists"), "{said}");
+                }
+            }
+        }
+    }
+}

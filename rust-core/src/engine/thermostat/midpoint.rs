@@ -69,11 +69,11 @@ impl PairThermostat {
         // The midpoint is half of the change away.
         let factor = if noise { 2.0 } else { 1.0 };
         let mut virial = [0.0; 6];
-        if self.wants_virial {
+        if self.wants_middle() {
             let mut at = v.to_vec();
             // After the last iteration, `p` is δ without its residual.
             add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut at);
-            virial = self.virial_at(pool, &at, noise);
+            virial = self.virial_at(pool, &at, v.len(), noise);
         }
         add_to_host(pool, &self.lists.place, &self.solution.change, factor, v);
         virial
@@ -122,12 +122,23 @@ impl PairThermostat {
         outcome.is_none()
     }
 
-    /// The virial of drag at the velocities `v`, and of noise.
-    pub(super) fn virial_at(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> [f64; 6] {
+    /// Whether anything is computed from the velocities in the middle of the update.
+    pub(super) fn wants_middle(&self) -> bool {
+        self.wants_virial || self.on_fixed.is_asked
+    }
+
+    /// The virial of drag at the velocities `v`, and of noise; finds the forces on those of the first `owned` particles that have
+    /// infinite mass too, if these are asked for.
+    pub(super) fn virial_at(&mut self, pool: &Pool, v: &[[f64; 3]], owned: usize, noise: bool) -> [f64; 6] {
         let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
+        let with_noise = noise;
         let noise = if noise { kt.sqrt() } else { 0.0 };
         sums.gather(pool, lists.order(), v);
         sums.close(planes);
-        virial(pool, planes, sums, noise, 2.0 / *dt)
+        let virial = virial(pool, planes, sums, noise, 2.0 / *dt);
+        if with_noise {
+            self.sum_forces_on_fixed(pool, owned);
+        }
+        virial
     }
 }

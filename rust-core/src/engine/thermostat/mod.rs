@@ -22,6 +22,7 @@ mod bodies;
 mod effort;
 mod encounter;
 mod exchange;
+mod fixed;
 mod forces;
 mod listed;
 mod measure;
@@ -50,6 +51,7 @@ use super::surroundings::Around;
 use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
 use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
+use fixed::OnFixed;
 use listed::{FromForces, Listed};
 use pass::{Sums, fill};
 use psidpd_passes::instruction_set::InstructionSet;
@@ -99,6 +101,7 @@ pub struct PairThermostat {
     /// Whether distances are stored.
     wants_virial: bool,
     from_forces: FromForces,
+    on_fixed: OnFixed,
     exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
@@ -134,6 +137,7 @@ impl PairThermostat {
             effort: Effort::default(),
             wants_virial: false,
             from_forces: FromForces::default(),
+            on_fixed: OnFixed::default(),
             exchange: Exchange::default(),
             noise: [PairNoise::default(); 2],
         })

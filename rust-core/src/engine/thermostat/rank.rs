@@ -103,7 +103,7 @@ impl PairThermostat {
             }
             Round::Curvature => match self.advance(pool, totals) {
                 true => Ok(self.show_direction(pool, vectors)),
-                false if self.wants_virial => {
+                false if self.wants_middle() => {
                     vectors[..v.len()].copy_from_slice(v);
                     add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut vectors[..v.len()]);
                     self.exchange.round = Round::Middle;
@@ -112,7 +112,7 @@ impl PairThermostat {
                 false => Ok(self.end(pool, v, [0.0; 6])),
             },
             Round::Middle => {
-                let virial = self.virial_at(pool, vectors, true);
+                let virial = self.virial_at(pool, vectors, v.len(), true);
                 Ok(self.end(pool, v, virial))
             }
         }

@@ -1,0 +1,52 @@
+//! The force of drag and noise on particles of infinite mass, like those of a wall.
+//!
+//! They take the opposite of what the midpoint rule gives their partners, so that their sum is exactly the momentum that the
+//! others lost.
+
+use super::PairThermostat;
+use super::pass::Sums;
+use crate::engine::sweep::Pool;
+
+/// The forces on particles of infinite mass, if they are asked for.
+#[derive(Debug, Default)]
+pub struct OnFixed {
+    pub is_asked: bool,
+    /// The mean force over the time of the last update on each owned particle, in the order of the host; zero for others.
+    force: Vec<[f64; 3]>,
+}
+
+impl PairThermostat {
+    /// Sets whether later updates by the midpoint rule find the forces on particles of infinite mass.
+    pub fn ask_for_forces_on_fixed(&mut self, on: bool) {
+        self.on_fixed.is_asked = on;
+        self.on_fixed.force.clear();
+    }
+
+    /// The mean force of drag and noise on each particle of infinite mass, over the time of the last update by the midpoint
+    /// rule; zero for others. Empty if nobody asked for it.
+    pub fn forces_on_fixed(&self) -> &[[f64; 3]] {
+        &self.on_fixed.force
+    }
+
+    /// Sums the forces at the vectors of the last `gather`.
+    pub(super) fn sum_forces_on_fixed(&mut self, pool: &Pool, owned: usize) {
+        if !self.on_fixed.is_asked {
+            return;
+        }
+        let PairThermostat { planes, lists, sums, masses, set, kt, dt, on_fixed, .. } = self;
+        sums.compute(pool, *set, planes, kt.sqrt());
+        on_fixed.force.clear();
+        on_fixed.force.resize(owned, [0.0; 3]);
+        let order = lists.order();
+        let own: Vec<_> = planes.iter().map(|plane| plane.own.clone()).collect();
+        for (own, (image, below)) in own.into_iter().zip(Sums::halves(&mut sums.of_plane, planes)) {
+            for (k, sorted) in own.enumerate() {
+                let Some(force) = on_fixed.force.get_mut(order[sorted] as usize) else { continue };
+                if masses.inverse[sorted] == 0.0 {
+                    let [a, b] = [image[k].0, below.get(k).map_or([0.0; 4], |b| b.0)];
+                    *force = std::array::from_fn(|c| -2.0 / *dt * (a[c] + b[c]));
+                }
+            }
+        }
+    }
+}
