@@ -15,7 +15,7 @@ pub fn coefficients(input: &[u8]) {
             let pairs: Vec<Option<WarrenPair>> = (0..count)
                 .map(|_| {
                     let [a, b, gamma, rc, rd] = std::array::from_fn(|_| bytes.number());
-                    (bytes.byte() > 8).then_some(WarrenPair { a, b, gamma, rc, rd })
+                    (bytes.byte() > 8).then_some(WarrenPair { a, b, gamma, rc, rd, weight: None })
                 })
                 .collect();
             let masses: Vec<f64> = (0..types).map(|_| bytes.number()).collect();

@@ -1,5 +1,5 @@
 /* pair_style mdpd/psi T cutoff seed [law conservative | lucy] [precision double | mixed] [threads N]
-   pair_coeff I J A B gamma rc rd
+   pair_coeff I J A B gamma rc rd [rt [exponent]]
 
    The coefficients of the built-in mdpd. 'law lucy' computes the built-in's own force, which has no
    potential; the default is the conservative force of the quadratic kernel. */
@@ -18,7 +18,7 @@ namespace psidpd {
 
 class PairMDPDPsi : public PairTable {
  public:
-  explicit PairMDPDPsi(LAMMPS *lmp) : PairTable(lmp, "mdpd/psi", {"A", "B", "gamma", "rc", "rd"}) {}
+  explicit PairMDPDPsi(LAMMPS *lmp) : PairTable(lmp, "mdpd/psi", {"A", "B", "gamma", "rc", "rd", "rt", "exponent"}, 2) {}
 
  protected:
   void read_settings(int narg, char **arg) override
@@ -40,11 +40,15 @@ class PairMDPDPsi : public PairTable {
 
   void check(const Coefficients &given) override
   {
-    const double gamma = given.value[2], rc = given.value[3], rd = given.value[4];
+    const double gamma = given.value[2], rc = given.value[3], rd = given.value[4], rt = given.value[5], exponent = given.value[6];
     if (!(gamma >= 0.0)) complain("gamma must not be negative, found " + std::to_string(gamma));
-    if (rc > cutoff || rd > cutoff)
+    // 0 stands for rc, and for an exponent of 1.
+    if (!(rt >= 0.0)) complain("rt, the range of drag and noise, must not be negative, found " + std::to_string(rt));
+    if (!(exponent >= 0.0)) complain("the exponent of w_R must be positive, found " + std::to_string(exponent));
+    if (rc > cutoff || rd > cutoff || rt > cutoff)
       complain("the ranges rc = " + std::to_string(rc) + " and rd = " + std::to_string(rd) +
-                   " must not exceed the cut-off of pair_style, " + std::to_string(cutoff));
+                   (rt > 0.0 ? " and rt = " + std::to_string(rt) : "") + " must not exceed the cut-off of pair_style, " +
+                   std::to_string(cutoff));
   }
 
   rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) override

@@ -14,8 +14,8 @@
 using namespace LAMMPS_NS;
 using namespace psidpd;
 
-PairTable::PairTable(LAMMPS *lmp, const char *name, std::vector<std::string> names) :
-    PairPsi(lmp, name), names(std::move(names))
+PairTable::PairTable(LAMMPS *lmp, const char *name, std::vector<std::string> names, size_t optional) :
+    PairPsi(lmp, name), names(std::move(names)), needed(this->names.size() - optional)
 {
   writedata = 1;
 }
@@ -39,10 +39,10 @@ void PairTable::read_settings(int narg, char **arg)
 void PairTable::coeff(int narg, char **arg)
 {
   const int count = static_cast<int>(names.size());
-  if (narg != 2 + count) {
+  if (narg < 2 + static_cast<int>(needed) || narg > 2 + count) {
     std::string expected = "expected 'pair_coeff I J";
-    for (const auto &name : names) expected += " " + name;
-    stop(expected + "', found " + std::to_string(narg) + " arguments");
+    for (size_t k = 0; k < names.size(); k++) expected += (k == needed ? " [" : " ") + names[k];
+    stop(expected + (needed < names.size() ? "]" : "") + "', found " + std::to_string(narg) + " arguments");
   }
   const int types = atom->ntypes;
   if (!allocated) allocate();
@@ -58,7 +58,7 @@ void PairTable::coeff(int narg, char **arg)
   utils::bounds(FLERR, arg[0], 1, types, ilo, ihi, error);
   utils::bounds(FLERR, arg[1], 1, types, jlo, jhi, error);
   Coefficients given{true, {}};
-  for (int k = 0; k < count; k++) given.value[k] = utils::numeric(FLERR, arg[2 + k], false, lmp);
+  for (int k = 0; k < narg - 2; k++) given.value[k] = utils::numeric(FLERR, arg[2 + k], false, lmp);
   attempt<true>([&] { check(given); });
 
   int set = 0;
@@ -136,7 +136,9 @@ void *PairTable::extract(const char *what, int &dim)
 std::string PairTable::words(int i, int j) const
 {
   std::string line = std::to_string(i) + " " + std::to_string(j);
-  for (const auto &table : value) line += " " + exact(table[i][j]);
+  size_t count = value.size();
+  while (count > needed && value[count - 1][i][j] == 0.0) count--;
+  for (size_t k = 0; k < count; k++) line += " " + exact(value[k][i][j]);
   return line;
 }
 

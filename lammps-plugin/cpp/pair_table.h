@@ -9,8 +9,9 @@ namespace psidpd {
 
 class PairTable : public PairPsi {
  public:
-  // Takes the names of the coefficients, at most six, in the order of pair_coeff.
-  PairTable(LAMMPS_NS::LAMMPS *lmp, const char *name, std::vector<std::string> names);
+  // Takes the names of the coefficients, at most seven, in the order of pair_coeff; the last of them, which are `optional`, are 0 if
+  // left out.
+  PairTable(LAMMPS_NS::LAMMPS *lmp, const char *name, std::vector<std::string> names, size_t optional = 0);
   ~PairTable() override;
 
   void coeff(int narg, char **arg) override;
@@ -37,6 +38,7 @@ class PairTable : public PairPsi {
   std::vector<Coefficients> without_gaps(std::vector<Coefficients> pairs) const;
 
   const std::vector<std::string> names;
+  const size_t needed;
   // One table of types for each coefficient; fix adapt changes its entries.
   std::vector<double **> value;
   std::vector<Coefficients> built;

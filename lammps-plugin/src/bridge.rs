@@ -4,7 +4,7 @@ use crate::error::StyleError;
 use crate::style::{Style, guard};
 use psidpd_core::document::Document;
 use psidpd_core::engine::{Mark, Path, SpecialPair, Surroundings, Want};
-use psidpd_core::model::{SplinePair, WarrenPair};
+use psidpd_core::model::{DragWeight, SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
 mod ffi {
@@ -32,7 +32,7 @@ mod ffi {
     struct Coefficients {
         /// Whether pair_coeff set them.
         set: bool,
-        value: [f64; 6],
+        value: [f64; 7],
     }
 
     /// The box as LAMMPS stores it.
@@ -296,7 +296,7 @@ fn spline_style(
     thermostat_range: f64,
 ) -> Result<Box<Style>, StyleError> {
     let spline = |c: &ffi::Coefficients| {
-        let [strength, repulsion, attraction, repulsion_range, attraction_range, gamma] = c.value;
+        let [strength, repulsion, attraction, repulsion_range, attraction_range, gamma, _] = c.value;
         SplinePair { strength, repulsion, attraction, repulsion_range, attraction_range, gamma }
     };
     let pairs: Vec<Option<SplinePair>> = pairs.iter().map(|c| c.set.then(|| spline(c))).collect();
@@ -311,8 +311,10 @@ fn warren_style(
     masses: &[f64],
 ) -> Result<Box<Style>, StyleError> {
     let warren = |c: &ffi::Coefficients| {
-        let [a, b, gamma, rc, rd, _] = c.value;
-        WarrenPair { a, b, gamma, rc, rd }
+        let [a, b, gamma, rc, rd, range, exponent] = c.value;
+        let or = |value: f64, default: f64| if value == 0.0 { default } else { value };
+        let weight = DragWeight { range: or(range, rc), exponent: or(exponent, 1.0) };
+        WarrenPair { a, b, gamma, rc, rd, weight: Some(weight) }
     };
     let pairs: Vec<Option<WarrenPair>> = pairs.iter().map(|c| c.set.then(|| warren(c))).collect();
     let masses = Some(masses).filter(|m| !m.is_empty());

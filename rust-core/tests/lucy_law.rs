@@ -6,7 +6,7 @@ use psidpd_core::truth::conservative as evaluate;
 use std::f64::consts::PI;
 
 fn pair(a: f64, b: f64, rc: f64, rd: f64) -> Option<WarrenPair> {
-    Some(WarrenPair { a, b, gamma: 4.5, rc, rd })
+    Some(WarrenPair { a, b, gamma: 4.5, rc, rd, weight: None })
 }
 
 /// Compares the forces on three particles with the law as it is written above.

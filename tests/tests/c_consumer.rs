@@ -65,7 +65,7 @@ fn assert_close(found: &[f64], expected: impl IntoIterator<Item = f64>, what: &s
 }
 
 fn check_against_reference(printed: &BTreeMap<String, Vec<f64>>) {
-    let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 4.5, rc: 1.0, rd: 0.75 };
+    let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 4.5, rc: 1.0, rd: 0.75, weight: None };
     let model = warren_ab(&["F".to_owned()], &[Some(pair)], 3, ForceLaw::Conservative).unwrap();
     let fluid = model.at(1.0).unwrap();
     let lengths = [printed["box"][0], printed["box"][1], printed["box"][2]];

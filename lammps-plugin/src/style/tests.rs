@@ -95,7 +95,7 @@ fn mistakes_are_named() {
 
 #[test]
 fn types_without_coefficients_take_no_part() {
-    let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 1.0, rc: 1.0, rd: 0.75 };
+    let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 1.0, rc: 1.0, rd: 0.75, weight: None };
     let mut table = vec![None; 9];
     table[4] = Some(pair);
     for masses in [None, Some(&[7.0, 1.0, 2.0][..])] {

@@ -27,4 +27,6 @@ mod presets;
 pub use continuation::{Bounds, Continuation, Stray, continuation};
 pub use file::{KNOWN_FUNCTIONS, Model, Published, Units};
 pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity};
-pub use presets::{ForceLaw, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab};
+pub use presets::{
+    DragWeight, ForceLaw, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
+};

@@ -68,7 +68,7 @@ fn request(particles: Particles) -> Request {
 
 fn warren(species: usize, law: ForceLaw) -> Fluid {
     let names: Vec<String> = ["A", "B", "C"][..species].iter().map(|s| (*s).to_owned()).collect();
-    let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
+    let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75, weight: None });
     warren_ab(&names, &vec![pair; species * species], 3, law).unwrap().at(1.0).unwrap()
 }
 

@@ -62,7 +62,7 @@ fn huggins(epsilon: f64) -> Model {
 }
 
 fn warren(a: f64, b: f64, dimensions: usize) -> Model {
-    let pair = WarrenPair { a, b, gamma: 18.0, rc: 1.0, rd: 0.75 };
+    let pair = WarrenPair { a, b, gamma: 18.0, rc: 1.0, rd: 0.75, weight: None };
     warren_ab(&["F".into()], &[Some(pair)], dimensions, ForceLaw::Conservative).unwrap()
 }
 

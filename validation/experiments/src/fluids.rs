@@ -146,7 +146,7 @@ impl WarrenSet {
     }
 
     pub fn pair(&self, gamma: f64) -> WarrenPair {
-        WarrenPair { a: A, b: self.b, gamma, rc: RC, rd: RD }
+        WarrenPair { a: A, b: self.b, gamma, rc: RC, rd: RD, weight: None }
     }
 
     /// The model with friction `gamma` and one of the two force laws.

@@ -16,6 +16,17 @@ pub struct WarrenPair {
     pub rc: f64,
     /// Range of the density.
     pub rd: f64,
+    /// The weight of drag and noise, if it is not `1 − r/rc`.
+    pub weight: Option<DragWeight>,
+}
+
+/// The weight `w_R = (1 − r/range)^exponent` of drag and noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DragWeight {
+    /// Where the weight ends.
+    pub range: f64,
+    /// The power of the linear weight, above 0.
+    pub exponent: f64,
 }
 
 /// Reasons why coefficients define no model.
@@ -28,20 +39,21 @@ pub enum PresetError {
     /// The table is not square or empty, or the number of masses differs from that of types.
     #[error("expected coefficients for every pair of types, and as many masses as types")]
     Shape,
-    /// `B` or `r_d` differ between pairs, which Warren's no-go theorem excludes (Phys. Rev. E 87, 045303 (2013)).
+    /// `B r_d^{d+1}` differs between pairs, which Warren's no-go theorem excludes (Phys. Rev. E 87, 045303 (2013)).
     #[error(
-        "{name} differs between type pairs ({first} and {second}): with one density that does not \
-         tell types apart no potential gives such forces (Warren, Phys. Rev. E 87, 045303); use one \
-         {name} for all pairs, or pair_style dpd/psi with a model file whose psi depends on the \
-         partial densities n_A, n_B, or 'law lucy' for the force of LAMMPS's mdpd, which has no potential"
+        "{name} differs between pairs of types ({first} and {second}): the force then is the gradient of no potential (Warren, \
+         Phys. Rev. E 87, 045303). Take one {name} for all pairs, or 'law lucy', the force of LAMMPS's mdpd, which has no \
+         potential either, or pair_style dpd/psi with a model file; the nearest model is\n\n{nearest}"
     )]
     NoPotential {
-        /// The coefficient, `B` or `rd`.
+        /// The coefficient: `B`, or its product with a power of `rd`.
         name: &'static str,
-        /// The coefficient of one pair.
+        /// Its value for one pair.
         first: f64,
-        /// The coefficient of another pair.
+        /// Its value for another pair.
         second: f64,
+        /// The text of the model file that comes nearest.
+        nearest: String,
     },
     /// The model file's reader refuses a coefficient.
     #[error(transparent)]
@@ -74,13 +86,17 @@ pub(super) fn pair_text(names: &[String], upper: &[(usize, usize, WarrenPair)]) 
     let mut text = String::new();
     for (i, j, pair) in upper {
         let between = format!("between = [{}, {}]", names[*i], names[*j]);
+        let weight = pair.weight.unwrap_or(DragWeight { range: pair.rc, exponent: 1.0 });
         // Writing to a String cannot fail.
         let _ = write!(
             text,
             "\n[[pair]]\n{between}\nform = \"soft\"\nstrength = {:?}\nrange = {:?}\n\n\
              [[thermostat]]\n{between}\ngamma = {:?}\nrange = {:?}\n",
-            pair.a, pair.rc, pair.gamma, pair.rc,
+            pair.a, pair.rc, pair.gamma, weight.range,
         );
+        if weight.exponent != 1.0 {
+            let _ = writeln!(text, "exponent = {:?}", weight.exponent);
+        }
     }
     text
 }

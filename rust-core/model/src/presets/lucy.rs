@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     fn pair(a: f64, b: f64, rc: f64, rd: f64) -> Option<WarrenPair> {
-        Some(WarrenPair { a, b, gamma: 4.5, rc, rd })
+        Some(WarrenPair { a, b, gamma: 4.5, rc, rd, weight: None })
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod lucy;
 mod spline;
 mod warren;
 
-pub use coefficients::{PresetError, WarrenPair};
+pub use coefficients::{DragWeight, PresetError, WarrenPair};
 pub use lucy::lucy_mdpd;
 pub use spline::{SplinePair, spline_dpd};
 pub use warren::{ForceLaw, warren_ab};

@@ -9,7 +9,7 @@ use psidpd_passes::noise::threefry2x32;
 
 /// A fluid whose ψ is not linear in its only density.
 fn warren() -> Fluid {
-    let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
+    let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75, weight: None });
     warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap().at(1.0).unwrap()
 }
 

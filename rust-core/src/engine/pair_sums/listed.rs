@@ -49,7 +49,7 @@ mod tests {
     use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 
     fn model() -> Model {
-        let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
+        let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75, weight: None });
         warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap()
     }
 

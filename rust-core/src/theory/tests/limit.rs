@@ -29,7 +29,7 @@ fn which_fluids_have_a_thermodynamic_limit() {
 #[test]
 fn mixtures_collapse_in_the_worst_composition() {
     let two = |like: f64, unlike: f64| {
-        let pair = |a: f64| Some(WarrenPair { a, b: 0.0, gamma: 4.5, rc: 1.0, rd: 1.0 });
+        let pair = |a: f64| Some(WarrenPair { a, b: 0.0, gamma: 4.5, rc: 1.0, rd: 1.0, weight: None });
         let pairs = [pair(like), pair(unlike), None, pair(25.0)];
         warren_ab(&["A".into(), "B".into()], &pairs, 3, ForceLaw::Conservative).unwrap().at(1.0).unwrap()
     };

@@ -27,7 +27,7 @@ pub fn own_style(origin: &Origin) -> Result<Option<PairStyle>, ExperimentError> 
         return Ok(None);
     }
     if let (Some(a), Some(b), Some(rd)) = (number("A"), number("B"), number("rd")) {
-        let pair = WarrenPair { a, b, gamma, rc, rd };
+        let pair = WarrenPair { a, b, gamma, rc, rd, weight: None };
         let Ok(model) = warren_ab(&["F".to_owned()], &[Some(pair)], 3, ForceLaw::Conservative) else {
             return Ok(None);
         };
