@@ -24,14 +24,16 @@ class Exclusions {
   // Most rules of neigh_modify for types and groups: a word has room for the two sides of each.
   static constexpr int most_rules = 16;
 
-  // Stores at the setup of the style how many rules there are; `types` is the number of atom types.
-  void begin(const LAMMPS_NS::Neighbor *neighbor, int types);
-  // Number of pairs of types, groups and molecules that neigh_modify excluded at setup.
-  int rules() const { return rules_at_setup; }
-  // Whether there are as many rules as at setup.
-  bool are_known(const LAMMPS_NS::Neighbor *neighbor) const { return count(neighbor) == rules_at_setup; }
+  // Begins the setup of the style; `types` is the number of atom types.
+  void begin(int types);
+  // Number of pairs of types of the style, of groups and of molecules that are excluded now. Fixes add to them when LAMMPS sets
+  // them up, after the pair styles.
+  int rules(const LAMMPS_NS::Neighbor *neighbor, int **setflag) const;
   // Whether any pairs are excluded; all ranks agree.
-  bool exclude(int **setflag) const { return rules_at_setup > 0 || !pairs_elsewhere(setflag).empty(); }
+  bool exclude(const LAMMPS_NS::Neighbor *neighbor, int **setflag) const
+  {
+    return rules(neighbor, setflag) > 0 || !pairs_elsewhere(setflag).empty();
+  }
   // LAMMPS asked for the cut-off of a pair of types: a hybrid asks for its own pairs only.
   void ask(int i, int j) { asked[static_cast<size_t>(i - 1) * types + j - 1] = 1; }
   // Pairs of types with coefficients that a hybrid gives to other styles alone.
@@ -47,9 +49,12 @@ class Exclusions {
   size_t bytes() const { return marks.capacity() * sizeof(uint32_t); }
 
  private:
-  static int count(const LAMMPS_NS::Neighbor *neighbor);
+  // Whether the style has coefficients for a type.
+  bool knows(int type, int **setflag) const;
+  // Excluded pairs of types that the style knows, each once: fix srp excludes its own anew in each run.
+  std::vector<std::array<int, 2>> pairs_of_types(const LAMMPS_NS::Neighbor *neighbor, int **setflag) const;
 
-  int types = 0, rules_at_setup = 0;
+  int types = 0;
   std::vector<char> asked;
   // Two words for each atom and ghost: sides of rules for types and groups, and the molecule.
   std::vector<uint32_t> marks;

@@ -150,6 +150,9 @@ void FixSplitting::init()
 
 void FixSplitting::setup(int vflag)
 {
+  // A fix that was set up later may have excluded pairs.
+  const std::string why = pair->why_not_apart();
+  if (!why.empty()) stop("cannot apply drag and noise here: " + why);
   before = pair->effort();
   show_virial(vflag);
 }

@@ -188,16 +188,18 @@ void PairPsi::init_style()
   lost_atoms.begin(atom, world);
   // LAMMPS sizes its buffers by this; later communications never send more.
   comm_forward = static_cast<int>((*style)->facts().variables);
-  exclusions.begin(neighbor, atom->ntypes);
+  special.begin(atom, world);
+  exclusions.begin(atom->ntypes);
 
   why_listed.clear();
   const auto because = [this](const std::string &text) { why_listed += (why_listed.empty() ? "" : " and ") + text; };
-  if (SpecialPairs::are_scaled(atom, force)) {
+  if (special.are_scaled(atom, force)) {
     if (atom->molecular == Atom::TEMPLATE) because("special_bonds with atom_style template");
     if (atom->map_style == Atom::MAP_NONE) because("special_bonds without an atom map");
     if (is_narrow()) because("special_bonds in a box narrower than twice the cut-off");
   }
-  if (neighbor->nex_type + neighbor->nex_group > Exclusions::most_rules || neighbor->nex_mol > 1)
+  // A fix may exclude more pairs when LAMMPS sets it up, after the pair styles.
+  if (exclusions.rules(neighbor, setflag) - neighbor->nex_mol > Exclusions::most_rules || neighbor->nex_mol > 1)
     because("more exclusions of neigh_modify than it can keep");
   if (neighbor->includegroup) because("neigh_modify include");
   // These fixes exclude a group of their own, and do so only after pair styles have requested their lists.
@@ -250,7 +252,7 @@ std::string PairPsi::advice()
     add("in a tiled layout each rank works on ghosts along all periodic directions, also images of its own atoms; a brick layout "
         "has none along directions with one rank");
   const auto is_nve = [](const Fix *fix) { return strcmp(fix->style, "nve") == 0; };
-  if (!apart && why_listed.empty() && exclusions.rules() == 0 && std::any_of(modify->fix, modify->fix + modify->nfix, is_nve))
+  if (!apart && why_listed.empty() && exclusions.rules(neighbor, setflag) == 0 && std::any_of(modify->fix, modify->fix + modify->nfix, is_nve))
     add("'fix dpd/splitting' in place of fix nve takes timesteps six times as long: some 1.5 to 2 times faster, and with "
         "force-gradient more accurate");
   return text;
@@ -260,8 +262,8 @@ std::string PairPsi::search()
 {
   if (why_listed.empty()) {
     std::string text = "own cell list every step; no neighbor list is requested";
-    if (exclusions.rules() > 0) text += "\n  exclusions    pairs that neigh_modify excludes are left out";
-    if (SpecialPairs::are_scaled(atom, force))
+    if (exclusions.rules(neighbor, setflag) > 0) text += "\n  exclusions    pairs that neigh_modify excludes are left out";
+    if (special.are_scaled(atom, force))
       text += "\n  special bonds factors above 0 scale phi and w of bonded neighbors, not drag and noise; with 0 they do not "
               "interact\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others";
     return text;

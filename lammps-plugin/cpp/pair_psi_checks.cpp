@@ -78,7 +78,7 @@ void PairPsi::check_callers()
 void PairPsi::check_device()
 {
   if (!has_device()) return;
-  if (SpecialPairs::are_scaled(atom, force))
+  if (special.are_scaled(atom, force))
     stop("device gpu computes all pairs at full strength: use 'special_bonds lj 1 1 1', or device cpu");
   if (!why_listed.empty())
     stop("device gpu takes no pairs from a neighbor list, which this run needs because of " + why_listed + ": use device cpu");

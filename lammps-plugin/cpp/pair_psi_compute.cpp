@@ -115,16 +115,14 @@ void PairPsi::compute(int eflag, int vflag)
     check_ghosts();
     check_lost();
     if (domain->box_change) check_box();
-    if (why_listed.empty() && !exclusions.are_known(neighbor))
-      stop("pairs were excluded after the setup of the style, perhaps by a fix: run again");
-    if (why_listed.empty() && SpecialPairs::are_scaled(atom, force) && is_narrow())
+    if (why_listed.empty() && special.are_scaled(atom, force) && is_narrow())
       stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
     if (!displaced) ghost_reach.begin(atom);
     find_images();
     special.find(atom, force, why_listed.empty());
     const std::string trouble = exclusions.find(atom, neighbor, group, setflag, why_listed.empty());
     if (!trouble.empty()) stop(trouble);
-    if (has_device() && exclusions.exclude(setflag))
+    if (has_device() && exclusions.exclude(neighbor, setflag))
       stop("device gpu computes all pairs: it cannot leave out those of neigh_modify exclude, or those that a hybrid gives "
            "to other styles; use device cpu");
   }

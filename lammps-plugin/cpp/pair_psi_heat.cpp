@@ -7,6 +7,7 @@
 #include "atom.h"
 #include "domain.h"
 #include "force.h"
+#include "neighbor.h"
 #include "update.h"
 
 #include <algorithm>
@@ -17,10 +18,10 @@ using namespace psidpd;
 std::string PairPsi::why_not_apart() const
 {
   if (!why_listed.empty()) return "pairs come from a neighbor list, because of " + why_listed;
-  if (exclusions.rules() > 0) return "neigh_modify excludes pairs from interacting";
+  if (exclusions.rules(neighbor, setflag) > 0) return "neigh_modify excludes pairs from interacting";
   if (!exclusions.pairs_elsewhere(setflag).empty()) return "the hybrid gives pairs of types that this style knows to another style alone";
   const double *factor = force->special_lj;
-  if (SpecialPairs::are_scaled(atom, force) && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
+  if (special.are_scaled(atom, force) && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
     return "special_bonds has factors of 0; in DPD bonded atoms interact like all others, with 'special_bonds lj 1 1 1'";
   if (domain->deform_vremap) return "fix deform changes velocities at the edges of the box ('remap v')";
   return {};

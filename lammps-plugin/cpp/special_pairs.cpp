@@ -8,10 +8,22 @@
 using namespace LAMMPS_NS;
 using namespace psidpd;
 
-bool SpecialPairs::are_scaled(const Atom *atom, const Force *force)
+// Molecules of a template have their neighbors there, and delete_bonds may leave neighbors without bonds.
+void SpecialPairs::begin(const Atom *atom, MPI_Comm world)
+{
+  int here = atom->molecular == Atom::TEMPLATE;
+  for (int i = 0; atom->molecular == Atom::MOLECULAR && atom->nspecial && i < atom->nlocal; i++) here |= atom->nspecial[i][2] > 0;
+  int any = 0;
+  MPI_Allreduce(&here, &any, 1, MPI_INT, MPI_MAX, world);
+  bonded = any != 0;
+}
+
+// A fix may make the first bond later.
+bool SpecialPairs::are_scaled(const Atom *atom, const Force *force) const
 {
   const double *factor = force->special_lj;
-  return atom->molecular != Atom::ATOMIC && (factor[1] != 1.0 || factor[2] != 1.0 || factor[3] != 1.0);
+  return atom->molecular != Atom::ATOMIC && (bonded || atom->nbonds > 0) &&
+      (factor[1] != 1.0 || factor[2] != 1.0 || factor[3] != 1.0);
 }
 
 // Collects each pair once if both atoms are of this rank, and otherwise with all ghosts of the second atom;

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <mpi.h>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -18,8 +19,10 @@ namespace psidpd {
 
 class SpecialPairs {
  public:
-  // Whether special_bonds gives bonded neighbors factors other than 1.
-  static bool are_scaled(const LAMMPS_NS::Atom *atom, const LAMMPS_NS::Force *force);
+  // Looks, at the setup of the style, whether any atom has bonded neighbors; all ranks call this.
+  void begin(const LAMMPS_NS::Atom *atom, MPI_Comm world);
+  // Whether there are bonded neighbors, which special_bonds gives factors other than 1.
+  bool are_scaled(const LAMMPS_NS::Atom *atom, const LAMMPS_NS::Force *force) const;
 
   // Collects the pairs with a factor other than 1 if `act`, or none.
   void find(LAMMPS_NS::Atom *atom, const LAMMPS_NS::Force *force, bool act);
@@ -30,6 +33,7 @@ class SpecialPairs {
   size_t bytes() const { return pairs.capacity() * sizeof(SpecialPair); }
 
  private:
+  bool bonded = false;
   // In the first `of_owned` pairs both atoms are of this rank; the others have ghosts.
   std::vector<SpecialPair> pairs;
   size_t of_owned = 0;
