@@ -8,7 +8,9 @@ use std::path::PathBuf;
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(lammps_host)");
-    for name in ["PSIDPD_LAMMPS_INCLUDE", "PSIDPD_MPI_INCLUDE", "PSIDPD_LAMMPS_VERSION"] {
+    for name in
+        ["PSIDPD_LAMMPS_INCLUDE", "PSIDPD_MPI_INCLUDE", "PSIDPD_LAMMPS_VERSION", "PSIDPD_LAMMPS_HEADERS"]
+    {
         println!("cargo::rerun-if-env-changed={name}");
     }
     for folder in ["cpp", "compat"] {
@@ -23,6 +25,9 @@ fn main() {
         .expect("PSIDPD_LAMMPS_VERSION: the number that lammps_version() of the host returns, like 20250722");
     println!("cargo::rustc-cfg=lammps_host");
     println!("cargo::rustc-env=PSIDPD_LAMMPS_VERSION={version}");
+    // Headers in one folder may change, and keep old dates: the variable tells cargo.
+    let made_of = env::var("PSIDPD_LAMMPS_HEADERS").unwrap_or_default();
+    println!("cargo::rustc-env=PSIDPD_LAMMPS_HEADERS={made_of}");
     // LAMMPS unloads plugins with dlclose, and a Rust library must stay loaded.
     println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete");
 

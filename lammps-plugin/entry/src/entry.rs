@@ -7,6 +7,7 @@
 use crate::styles;
 use crate::table::{Creator, Styles};
 use crate::version;
+use crate::{headers, host};
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
 
@@ -62,6 +63,8 @@ unsafe fn styles_for(lmp: *mut c_void) -> Result<&'static Styles, String> {
     } else if openmpi != (env!("PSIDPD_MPI") == "openmpi") {
         // MPI handles differ in size, and so does the layout of every LAMMPS class that holds one.
         ("another MPI than this LAMMPS uses".to_owned(), "the two do not mix".to_owned())
+    } else if let Some((built, here)) = another_release() {
+        (built, here)
     } else {
         return styles::load().map_err(|reason| {
             format!(
@@ -73,6 +76,19 @@ unsafe fn styles_for(lmp: *mut c_void) -> Result<&'static Styles, String> {
         "The psidpd plugin was built for {built}, {here}: its styles are not loaded. \
          Build the plugin for this LAMMPS with 'psidpd lammps plugin'."
     ))
+}
+
+/// Why this is another release than that of the build, though the version number is the same: what the plugin was built for, and what
+/// is here.
+fn another_release() -> Option<(String, String)> {
+    let built = env!("PSIDPD_LAMMPS_RELEASE");
+    let here = host::release();
+    if let Some(here) = here.filter(|here| !built.is_empty() && here != built) {
+        return Some((format!("LAMMPS {built}"), format!("this is LAMMPS {here}")));
+    }
+    let header = headers::difference(env!("PSIDPD_LAMMPS_LAYOUT"), &host::headers()?)?;
+    let built = format!("another LAMMPS {}", named(BUILT_FOR));
+    Some((built, format!("whose classes differ from those of this one in {header}")))
 }
 
 /// Registers the styles in a LAMMPS that has no `plugin` command: call it with the handle of the

@@ -35,21 +35,26 @@ pub fn symbol(name: &CStr) -> Option<*mut c_void> {
     (!found.is_null()).then_some(found)
 }
 
-/// The folders that may contain this library: of its path as loaded, and of the path with links resolved.
-fn folders() -> Vec<PathBuf> {
+/// The file of the library with an address, as it was loaded.
+pub fn file_of(address: *const c_void) -> Option<PathBuf> {
     let mut place = Place {
         file: std::ptr::null(),
         base: std::ptr::null_mut(),
         symbol: std::ptr::null(),
         address: std::ptr::null_mut(),
     };
-    // SAFETY: the address is in this library, and `place` has the layout that the C library documents.
-    let found = unsafe { dladdr((folders as fn() -> Vec<PathBuf>) as *const c_void, &raw mut place) };
+    // SAFETY: dladdr only looks the address up, and `place` has the layout that the C library documents.
+    let found = unsafe { dladdr(address, &raw mut place) };
     if found == 0 || place.file.is_null() {
-        return vec![];
+        return None;
     }
     // SAFETY: dladdr has stored a C string there, which lives as long as the library is loaded.
-    let file = Path::new(OsStr::from_bytes(unsafe { CStr::from_ptr(place.file) }.to_bytes())).to_owned();
+    Some(Path::new(OsStr::from_bytes(unsafe { CStr::from_ptr(place.file) }.to_bytes())).to_owned())
+}
+
+/// The folders that may contain this library: of its path as loaded, and of the path with links resolved.
+fn folders() -> Vec<PathBuf> {
+    let Some(file) = file_of((folders as fn() -> Vec<PathBuf>) as *const c_void) else { return vec![] };
     let real = std::fs::canonicalize(&file).unwrap_or_default();
     [file, real].iter().filter_map(|file| file.parent().map(Path::to_owned)).collect()
 }

@@ -19,7 +19,7 @@ pub struct Style {
 
 #[repr(C)]
 pub struct Styles {
-    /// The LAMMPS and the psidpd version of the build: [`BUILT`].
+    /// The LAMMPS, a digest of its headers and the psidpd version of the build: [`BUILT`].
     pub built: *const c_char,
     /// Number of styles.
     pub count: usize,
@@ -35,4 +35,11 @@ unsafe impl Sync for Style {}
 unsafe impl Sync for Styles {}
 
 /// The versions in which the two files must agree.
-pub const BUILT: &str = concat!(env!("PSIDPD_LAMMPS_VERSION"), " ", env!("CARGO_PKG_VERSION"), "\0");
+pub const BUILT: &str = concat!(
+    env!("PSIDPD_LAMMPS_VERSION"),
+    " ",
+    env!("PSIDPD_LAMMPS_HEADERS"),
+    " ",
+    env!("CARGO_PKG_VERSION"),
+    "\0"
+);

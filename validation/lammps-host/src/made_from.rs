@@ -43,6 +43,13 @@ pub(super) fn digest(
     for part in SOURCES.iter().chain(&CPP) {
         add(&root.join(part), &root.join(part), &mut hasher)?;
     }
+    headers(host)?.hash(&mut hasher);
+    Ok(format!("{:016x}", hasher.finish()))
+}
+
+/// A digest of the headers of LAMMPS and of MPI.
+pub(super) fn headers(host: &Host) -> Result<String, LammpsError> {
+    let mut hasher = DefaultHasher::new();
     // Of a source tree only its own headers count, without those of packages in subfolders. Of MPI only
     // `mpi.h` counts, because its folder may hold headers of other software.
     let entries = fs::read_dir(&host.include).map_err(PathError::at("read", &host.include))?;

@@ -30,6 +30,9 @@ pub struct BuiltFor {
     /// Integer widths and kind of MPI: `smallbig mpich`.
     pub abi: String,
     pub psidpd_version: String,
+    /// The release in words, which tells updates of a stable version apart: `22 Jul 2025 - Update 4`.
+    #[serde(default)]
+    pub release: String,
     /// A digest of the sources, headers and compiler options; an equal digest needs no new build.
     #[serde(default)]
     pub made_from: String,
@@ -44,6 +47,7 @@ impl BuiltFor {
             lammps_version: version.number,
             abi: version.abi.clone(),
             psidpd_version: env!("CARGO_PKG_VERSION").into(),
+            release: version.name.clone(),
             made_from: String::new(),
             sizes: [0; 2],
         }
@@ -51,12 +55,13 @@ impl BuiltFor {
 
     /// Whether this plugin can replace the plugin that `other` describes.
     fn serves(&self, other: &BuiltFor) -> bool {
-        (self.lammps_version, &self.abi, &self.psidpd_version)
-            == (other.lammps_version, &other.abi, &other.psidpd_version)
+        (self.lammps_version, &self.abi, &self.psidpd_version, &self.release)
+            == (other.lammps_version, &other.abi, &other.psidpd_version, &other.release)
     }
 
     fn words(&self) -> String {
-        format!("LAMMPS {} ({}) and psidpd {}", self.lammps_version, self.abi, self.psidpd_version)
+        let BuiltFor { lammps_version, release, abi, psidpd_version, .. } = self;
+        format!("LAMMPS {lammps_version} ({release}, {abi}) and psidpd {psidpd_version}")
     }
 }
 
@@ -71,7 +76,13 @@ pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsErro
     let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
     let base = match host.kind {
         HostKind::Environment if host.root == venv_dir() => base_dir(),
-        HostKind::Environment => base_dir().join(name + "-wheel"),
+        // Wheels of one version differ by their update.
+        HostKind::Environment => {
+            let update = version.name.split_once(" - ").map_or("", |(_, update)| update);
+            let update: String = update.chars().filter(char::is_ascii_alphanumeric).collect();
+            let update = if update.is_empty() { update } else { format!("-{}", update.to_lowercase()) };
+            base_dir().join(format!("{name}{update}-wheel"))
+        }
         HostKind::Prefix => base_dir().join(name),
         HostKind::Source => base_dir().join(name + "-source"),
     };
@@ -181,6 +192,8 @@ fn build_with(
         .env("PSIDPD_LAMMPS_INCLUDE", &host.include)
         .env("PSIDPD_MPI_INCLUDE", &host.mpi_include)
         .env("PSIDPD_LAMMPS_VERSION", version.number.to_string())
+        .env("PSIDPD_LAMMPS_RELEASE", &version.tag)
+        .env("PSIDPD_LAMMPS_HEADERS", made_from::headers(host)?)
         .current_dir(root)
         .stdin(Stdio::null())
         .output()
@@ -370,7 +383,13 @@ mod tests {
     }
 
     fn version(number: i32) -> HostVersion {
-        HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
+        HostVersion {
+            number,
+            abi: "smallbig mpich".into(),
+            name: "a test".into(),
+            tag: String::new(),
+            plugins: true,
+        }
     }
 
     /// A stand-in for cargo: it makes two libraries of `text` in the build folder that its last two arguments name.
