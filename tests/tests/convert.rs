@@ -82,7 +82,7 @@ fn is_the_same_fluid(style: &str) {
     assert!(String::from_utf8_lossy(&out.stdout).contains("mdpd/psi 1.0 1.0 9872598\n"), "{}", said(&out));
 
     // A command that cannot be rewritten is named with its line, and the exit code is 1.
-    let hidden = format!("{}if \"1 > 0\" then \"fix 2 all mvv/dpd\"\n", OLD.replace("STYLE", style));
+    let hidden = format!("{}fix 2 all adapt 1 pair mdpd A * * v_a\n", OLD.replace("STYLE", style));
     std::fs::write(at("in.hidden"), &hidden).unwrap();
     let out = psidpd(folder.path(), &["lammps", "convert", "in.hidden", "--law", "lucy"]);
     let expected = format!(

@@ -1,10 +1,15 @@
-//! Rewrites scripts for LAMMPS's built-in `mdpd` to the pair style `mdpd/psi`.
+//! Rewrites scripts for LAMMPS's built-in `mdpd` and `dpd`, and programs in Python that drive it, to the pair style `mdpd/psi`.
 //!
 //! Only the commands that concern the built-in change; all other lines keep their bytes. A command without a
 //! counterpart is kept and reported.
 
 mod command;
 mod data;
+mod fluid;
+mod python;
+mod style;
+mod survey;
+mod variables;
 mod work;
 
 #[cfg(test)]
@@ -50,6 +55,8 @@ pub struct Converted {
     pub left: Vec<Note>,
     /// Remarks about what the user must rewrite by hand.
     pub by_hand: Vec<Note>,
+    /// Models with the potentials nearest to coefficients that have none; a note says so, with `NEAREST` for the model.
+    models: Vec<(Note, String)>,
 }
 
 /// Converts the script in a file, with the files that it includes. If `out` names a file, the new script is written
@@ -58,7 +65,7 @@ pub struct Converted {
 pub fn files(
     old: &Path,
     law: Law,
-    plugin: &str,
+    plugin: Option<&str>,
     out: Option<&Path>,
     overwrite: bool,
 ) -> Result<(Vec<PathBuf>, Converted), LammpsError> {
@@ -67,7 +74,8 @@ pub fn files(
     };
     // LAMMPS looks for files in its working folder, most often that of the script.
     let beside = |path: &Path, name: &str| path.parent().unwrap_or(Path::new("")).join(name);
-    let mut new = script(&read(old)?, law, plugin, &|name| read(&beside(old, name)).ok());
+    let convert = if old.extension().is_some_and(|end| end == "py") { python::program } else { script };
+    let mut new = convert(&read(old)?, law, plugin, &|name| read(&beside(old, name)).ok());
     let mut results: Vec<(PathBuf, String)> =
         out.map(|path| (path.to_owned(), new.script.clone())).into_iter().collect();
     let without_out = "was not rewritten: choose an --out";
@@ -90,6 +98,20 @@ pub fn files(
             }),
             None => new.left.push(Note { text: format!("{name} {without_out}"), ..note.clone() }),
         }
+    }
+    for (k, (note, text)) in std::mem::take(&mut new.models).into_iter().enumerate() {
+        let nearest = match out {
+            Some(path) => {
+                let number = if k == 0 { String::new() } else { (k + 1).to_string() };
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                let name = format!("{name}.nearest{number}.toml");
+                let path = path.with_file_name(&name);
+                results.push((path, text));
+                format!("is {name}")
+            }
+            None => format!("is\n\n{text}"),
+        };
+        new.by_hand.push(Note { text: note.text.replace("NEAREST", &nearest), ..note });
     }
     // No file is written unless all can be: existing files may be somebody's work.
     if let Some((path, _)) = results.iter().find(|(path, _)| !overwrite && path.is_file()) {

