@@ -184,8 +184,8 @@ fn ghosts_that_are_too_old_stop_the_run() {
             (fast, fix.to_owned(), 2, true),
             (fast, format!("{fix}{rdf}"), 1, true),
             ("neighbor 0.02 bin\nneigh_modify delay 0 every 20 check no", fix.to_owned(), 2, true),
-            ("neighbor 0.0 bin\nneigh_modify delay 0 every 1 check yes", format!("{fix}{rdf}"), 1, false),
-            ("neighbor 0.0 bin\nneigh_modify delay 0 every 1 check yes", fix.to_owned(), 2, false),
+            ("neighbor 0.3 bin\nneigh_modify delay 0 every 1 check yes", format!("{fix}{rdf}"), 1, false),
+            ("neighbor 0.3 bin\nneigh_modify delay 0 every 1 check yes", fix.to_owned(), 2, false),
             ("neighbor 1.5 bin\nneigh_modify delay 0 every 5 check no", format!("{fix}{rdf}"), 2, false),
         ] {
             match outcome(before, &more, ranks) {
