@@ -134,11 +134,11 @@ fn defaults_are_those_of_the_page() {
     let page =
         std::fs::read_to_string(psidpd_tests::root().join("lammps-plugin/doc/fix_dpd_splitting.md")).unwrap();
     assert!(page.contains(
-        "## Default\n\nevery 1, lambda 0.21 with two-stage and 1/6 with force-gradient, gradient 1/24, noise gaussian\n"
+        "## Default\n\nevery 1, lambda 0.21 with two-stage and 0.17 with force-gradient, gradient 1/24, noise gaussian\n"
     ));
     let folder = tempfile::tempdir().unwrap();
     let end = |fix: &str| run(&format!("{}run 4\n", from_data(folder.path(), "", fix, 0.03)), 1).v;
-    let [sixth, part] = [1.0 / 6.0, 1.0 / 24.0];
+    let part = 1.0 / 24.0;
     for (scheme, documented, others) in [
         (
             "two-stage",
@@ -147,8 +147,8 @@ fn defaults_are_those_of_the_page() {
         ),
         (
             "force-gradient",
-            format!("every 1 lambda {sixth} gradient {part} noise gaussian"),
-            vec!["lambda 0.1667", "gradient 0.0417"],
+            format!("every 1 lambda 0.17 gradient {part} noise gaussian"),
+            vec!["lambda 0.1701", "gradient 0.0417"],
         ),
         ("aboba", "every 1 noise gaussian".to_owned(), vec!["every 2", "noise uniform"]),
     ] {

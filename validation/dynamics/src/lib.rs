@@ -12,3 +12,4 @@ pub mod run;
 pub mod scene;
 #[cfg(test)]
 mod tests;
+pub mod trial;

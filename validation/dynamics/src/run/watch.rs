@@ -429,6 +429,18 @@ mod tests {
         assert!(is_off(&far), "{far:?}");
     }
 
+    /// The pairs of all forces are stored for as many particles as watch and advice evaluate, and for no more.
+    #[test]
+    fn memory_counts_the_evaluations_of_the_watch() {
+        let bytes = |edge: f64| {
+            let text = format!(
+                "model = \"m.toml\"\nkT = 1.0\nbox = {edge:?}\ndensity = 6.05\ndt = 0.005\nsteps = 1000\n"
+            );
+            bytes_per_particle(&scene(SET6, &text).unwrap())
+        };
+        assert_eq!(bytes(4.0) - bytes(50.0), EVALUATION);
+    }
+
     /// Forty seeds of a slab in the plane, where ∇²U nearly cancels and single configurations scatter by 15
     /// %, and twenty of a small slab of Warren's set 6. Each seed raises a false alarm once in 500 stages;
     /// among sixty seeds one alarm has a probability of 12 %, two of 1 %.

@@ -15,7 +15,7 @@ pub(super) const INTEGRATOR: Key = key("integrator", Choice(|| names(&Integrator
 
 pub(super) const LAMBDA: Key = key("lambda", Number, OPTIONAL,
     "The parameter of `groot-warren`, from 0 to 1, 0.65 if left out (0.5 is velocity Verlet); of `two-stage`, \
-     from 0 to 0.5, 0.21 if left out; and of `force-gradient`, 1/6 if left out.",
+     from 0 to 0.5, 0.21 if left out; and of `force-gradient`, 0.17 if left out.",
     "integrator = \"groot-warren\"\nlambda = 0.5");
 
 pub(super) const GRADIENT: Key = key("gradient", Number, OPTIONAL,

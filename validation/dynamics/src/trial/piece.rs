@@ -1,0 +1,281 @@
+//! A small periodic box of a fluid, in equilibrium.
+
+use super::samples::StepErrors;
+use super::{CAP, GOAL, two_digits};
+use crate::integrator::{Coupling, Integrator};
+use crate::run::{RunError, Simulation, State};
+use psidpd_core::engine::noise::{Law, PairNoise};
+use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::engine::{PeriodicBox, Settings, Want};
+use psidpd_core::model::Model;
+use psidpd_observe::configurational;
+use psidpd_observe::frame::Frame;
+use std::num::NonZeroUsize;
+
+/// Particles of a piece, if the range of the forces leaves room for so few, and most.
+const PARTICLES: f64 = 400.0;
+const MOST: f64 = 6000.0;
+
+/// Edge of the smallest piece, in ranges of the forces.
+const EDGE: f64 = 2.2;
+
+/// Rounds that relax a random start, and the steps of each. Velocities are drawn anew after each, so no heat is left.
+const ROUNDS: u32 = 10;
+const ROUND: u64 = 30;
+
+/// ωΔt of the steps that settle a piece.
+const SHORT: f64 = 0.45;
+
+/// Samples of the pressure, and steps between them.
+const PRESSURES: usize = 100;
+const BETWEEN: u64 = 6;
+
+/// Most trials of a search.
+const TRIALS: usize = 6;
+
+/// Most steps that settle a piece.
+const SETTLE: f64 = 1200.0;
+
+/// Number density of each species, and what else a piece needs to know.
+#[derive(Debug, Clone)]
+pub struct Composition<'a> {
+    pub model: &'a Model,
+    pub masses: &'a [f64],
+    pub kt: f64,
+    pub densities: &'a [f64],
+    pub seed: u64,
+}
+
+/// A piece of a fluid in equilibrium, and how fast its particles are.
+#[derive(Debug)]
+pub struct Piece {
+    model: Model,
+    kt: f64,
+    seed: u64,
+    state: State,
+    /// Frequency ω of the fastest species.
+    pub frequency: f64,
+    /// The root mean square frequency of all particles, of ∇²U; `None` where forces jump or have no potential.
+    pub mean_frequency: Option<f64>,
+    /// The rate κ at which drag takes kinetic energy.
+    pub drag: f64,
+    /// The pressure at kT of its configurations.
+    pub pressure: f64,
+    /// Its thermal pressure `∂p/∂kT / ρ`.
+    pub thermal_pressure: f64,
+}
+
+/// The step that moves a piece while it settles, and its reference.
+const ACCURATE: Integrator =
+    Integrator::ForceGradient { lambda: 0.17, gradient: 1.0 / 24.0, coupling: Coupling::DEFAULT };
+
+impl Piece {
+    /// `None` where there is no density, or where the forces reach so far that a piece is no small one.
+    pub fn settled(of: &Composition) -> Result<Option<Piece>, RunError> {
+        let Some(mut state) = start(of)? else { return Ok(None) };
+        let fluid = of.model.at(of.kt)?;
+        let evaluator = Evaluator::new(fluid)?;
+        let (mut number, mut rates) = (3, [0.0; 2]);
+        for round in 0..=ROUNDS {
+            draw_velocities(&mut state, of, number);
+            number += 3;
+            let mut run = simulation(of.model, of.kt, state.clone(), of.seed)?;
+            rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
+            let [frequency, drag] = rates;
+            let fastest = frequency.max(0.1 * drag);
+            if fastest <= 0.0 {
+                break;
+            }
+            let steps = match round {
+                ROUNDS => {
+                    let relaxation = 30.0 / fastest + 10.0 * drag / (fastest * fastest);
+                    (relaxation * fastest / SHORT).min(SETTLE) as u64
+                }
+                _ => ROUND,
+            };
+            run.prepare_for(ACCURATE, SHORT / fastest, Want::FORCES)?;
+            if run.advance(steps, SHORT / fastest, ACCURATE).is_err() {
+                return Ok(None);
+            }
+            state = run.state().clone();
+        }
+        let mut run = simulation(of.model, of.kt, state.clone(), of.seed)?;
+        let dt = SHORT / rates[0].max(0.1 * rates[1]);
+        let mut samples = Vec::new();
+        if dt.is_finite() {
+            rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
+            for _ in 0..PRESSURES {
+                let made = run
+                    .advance(BETWEEN - 1, dt, ACCURATE)
+                    .and_then(|()| run.step(dt, ACCURATE, Want::TOTALS));
+                if made.is_err() {
+                    return Ok(None);
+                }
+                let flux = 2.0 * run.kinetic_energy()
+                    / (run.dimensions() as f64 * state.domain.volume(run.dimensions()));
+                let virial = run.scalar_pressure(run.conservative_pressure_tensor()) - flux;
+                samples.push([virial, run.potential_energy()]);
+            }
+        }
+        let ideal = run.len() as f64 * of.kt / state.domain.volume(run.dimensions());
+        let mean = |k: usize| samples.iter().map(|s| s[k]).sum::<f64>() / samples.len().max(1) as f64;
+        let (virial, energy) = (mean(0), mean(1));
+        let products = samples.iter().map(|s| (s[0] - virial) * (s[1] - energy)).sum::<f64>();
+        // ∂⟨W⟩/∂kT at the energies of this kT.
+        let covariance = products / samples.len().max(1) as f64 / (ideal * of.kt);
+        let mean_frequency = configurational::missing(&evaluator.fluid, &state.domain).is_none().then(|| {
+            let square = configurational::mean_square_frequency(&Frame::new(run.view(0.0), &evaluator));
+            square.max(0.0).sqrt()
+        });
+        let [frequency, drag] = rates;
+        Ok(Some(Piece {
+            model: of.model.clone(),
+            kt: of.kt,
+            seed: of.seed,
+            state,
+            frequency,
+            mean_frequency,
+            drag,
+            pressure: ideal + virial,
+            thermal_pressure: 1.0 + covariance.max(0.0),
+        }))
+    }
+
+    /// The longest step that may be advised, whatever its errors.
+    pub fn cap(&self) -> f64 {
+        CAP / self.frequency
+    }
+
+    /// Errors of steps of `dt`; `None` where the piece does not survive them.
+    pub fn errors(&self, integrator: Integrator, dt: f64) -> Result<Option<StepErrors>, RunError> {
+        let run = simulation(&self.model, self.kt, self.state.clone(), self.seed.wrapping_add(1))?;
+        StepErrors::measured(run, (integrator, dt), self.drag, self.thermal_pressure)
+    }
+
+    /// The longest step up to the cap whose errors are about [`GOAL`] or less, with its errors; `None` where no step is known.
+    pub fn longest(&self, integrator: Integrator) -> Result<Option<(f64, StepErrors)>, RunError> {
+        let mut dt = two_digits(self.cap());
+        if !dt.is_finite() {
+            return Ok(None);
+        }
+        for _ in 0..TRIALS {
+            let errors = self.errors(integrator, dt)?;
+            match errors {
+                // Where configurations scatter too much to tell, shorter steps tell no more.
+                Some(errors) if !errors.is_known() => break,
+                Some(errors) if errors.worst() <= GOAL.max(errors.resolution()) => {
+                    return Ok(Some((dt, errors)));
+                }
+                _ => {}
+            }
+            let worst = errors.map_or(f64::INFINITY, |errors| errors.worst());
+            let shorter = two_digits(dt * (GOAL / worst).powf(1.0 / 6.0).clamp(0.7, 0.93));
+            if shorter * self.frequency <= SHORT {
+                break;
+            }
+            dt = shorter;
+        }
+        Ok(None)
+    }
+}
+
+/// On one thread: a piece is too small for more.
+fn simulation(model: &Model, kt: f64, state: State, seed: u64) -> Result<Simulation, RunError> {
+    let mut run = Simulation::new(model, kt, state, seed)?;
+    run.set_settings(Settings { threads: NonZeroUsize::MIN, ..run.settings() })?;
+    Ok(run)
+}
+
+/// The frequency ω of the fastest species: see the module.
+fn frequency(run: &Simulation, evaluator: &Evaluator, number: u32) -> f64 {
+    /// Displacement of the differences, in ranges of the forces.
+    const SMALL: f64 = 0.01;
+    let State { domain, mass, x, species, tag, .. } = run.state();
+    let dimensions = run.dimensions();
+    let range = evaluator.fluid.cutoff();
+    let lightest = mass.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    let time = SMALL * range / (run.kt() / lightest).sqrt();
+    let draws = PairNoise::new(u64::from(number), 0);
+    let tags: Vec<u32> = tag.iter().map(|tag| *tag as u32).collect();
+    let mut to = [x.clone(), x.clone()];
+    for c in 0..dimensions {
+        let mut drawn = vec![0.0; x.len()];
+        draws.fill(Law::Gaussian, &tags, &vec![u32::MAX - c as u32; x.len()], &mut drawn);
+        for k in 0..x.len() {
+            let by = 0.5 * time * (run.kt() / mass[species[k] as usize]).sqrt() * f64::from(drawn[k]);
+            to[0][k][c] -= by;
+            to[1][k][c] += by;
+        }
+    }
+    to.iter_mut().flatten().for_each(|x| domain.wrap(x, &mut [0; 3]));
+    let [before, after] = to.map(|x| evaluator.evaluate(&x, species, domain).forces.clone());
+    let mut sums = vec![(0.0, 0usize); mass.len()];
+    for k in 0..x.len() {
+        let (sum, count) = &mut sums[species[k] as usize];
+        *sum += (0..dimensions).map(|c| ((after[k][c] - before[k][c]) / time).powi(2)).sum::<f64>();
+        *count += 1;
+    }
+    let of = |((sum, count), mass): (&(f64, usize), &f64)| match count {
+        0 => 0.0,
+        _ => (sum / *count as f64 / (dimensions as f64 * run.kt() * mass)).powf(0.25),
+    };
+    sums.iter().zip(mass).map(of).fold(0.0, f64::max)
+}
+
+fn drag(run: &mut Simulation) -> Result<f64, RunError> {
+    Ok(run.warmth(1e-3)?.map_or(0.0, |warmth| warmth.rate))
+}
+
+fn gaussian_or_uniform(of: &Composition, tags: &[u32], number: u32, law: Law) -> Vec<f32> {
+    let mut drawn = vec![0.0; tags.len()];
+    PairNoise::new(of.seed, 0).fill(law, tags, &vec![u32::MAX - number; tags.len()], &mut drawn);
+    drawn
+}
+
+/// Particles at random in a cube.
+fn start(of: &Composition) -> Result<Option<State>, RunError> {
+    let fluid = of.model.at(of.kt)?;
+    let total: f64 = of.densities.iter().sum();
+    if total.is_nan() || total <= 0.0 {
+        return Ok(None);
+    }
+    let dimensions = fluid.dimensions;
+    let volume = (PARTICLES / total).max((EDGE * fluid.cutoff()).powi(dimensions as i32));
+    if volume * total > MOST {
+        return Ok(None);
+    }
+    let length = volume.powf(1.0 / dimensions as f64);
+    let lengths = [length, length, if dimensions == 2 { 1.0 } else { length }];
+    let Ok(domain) = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, dimensions == 3]) else {
+        return Ok(None);
+    };
+    let species: Vec<i32> = (0..)
+        .zip(of.densities)
+        .flat_map(|(s, rho)| std::iter::repeat_n(s, (rho * volume).round() as usize))
+        .collect();
+    let tags: Vec<u32> = (1..=species.len() as u32).collect();
+    let mut x = vec![[0.0; 3]; species.len()];
+    for c in 0..dimensions {
+        for (x, place) in x.iter_mut().zip(gaussian_or_uniform(of, &tags, c as u32, Law::Uniform)) {
+            x[c] = lengths[c] * (0.5 + f64::from(place) / 12f64.sqrt());
+        }
+    }
+    Ok(Some(State { species, ..State::at_rest(domain, of.masses.to_vec(), x) }))
+}
+
+/// Velocities of Maxwell's distribution without momentum in sum.
+fn draw_velocities(state: &mut State, of: &Composition, number: u32) {
+    let dimensions = of.model.dimensions();
+    let tags: Vec<u32> = state.tag.iter().map(|tag| *tag as u32).collect();
+    for c in 0..dimensions {
+        let (mut momentum, mut mass) = (0.0, 0.0);
+        let speeds = gaussian_or_uniform(of, &tags, number + c as u32, Law::Gaussian);
+        for (k, speed) in speeds.into_iter().enumerate() {
+            let m = state.mass[state.species[k] as usize];
+            state.v[k][c] = f64::from(speed) * (of.kt / m).sqrt();
+            momentum += m * state.v[k][c];
+            mass += m;
+        }
+        state.v.iter_mut().for_each(|v| v[c] -= momentum / mass);
+    }
+}
