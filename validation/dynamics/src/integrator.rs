@@ -253,7 +253,7 @@ impl Integrator {
                 ..apart
             },
             Integrator::ForceGradient { lambda, coupling, .. } => Properties {
-                accuracy: Accuracy { temperature: [0.006, 0.0], pressure: [0.0, 0.0, 0.006] },
+                accuracy: Accuracy { temperature: [0.02, 0.0], pressure: [0.0, 0.0, 0.02] },
                 lammps: splitting(coupling),
                 force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
                 ..apart

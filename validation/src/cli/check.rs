@@ -97,8 +97,29 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// The error of the configurational temperature above which a time step gives a warning.
+/// The error above which a time step gives a warning.
 const TOO_LONG: f64 = 0.1;
+
+/// Above this an error is no small correction, and its value means nothing.
+const FAR_OFF: f64 = 1.0;
+
+/// An error in percent, as far as it is known.
+fn percent(error: f64, resolution: f64) -> String {
+    match error {
+        e if e < resolution && resolution > TOO_LONG => "what a short trial cannot tell".to_owned(),
+        e if e < resolution.max(1e-4) => format!("less than {} %", two_digits(100.0 * resolution.max(1e-4))),
+        e if e <= FAR_OFF => format!("about {} %", two_digits(100.0 * e)),
+        _ => format!("more than {} %", two_digits(100.0 * FAR_OFF)),
+    }
+}
+
+/// What step to take instead.
+fn remedy(step: &StepEstimate) -> String {
+    match step.one_percent {
+        Some(dt) => format!("use dt = {}, or an integrator that allows longer steps", two_digits(dt)),
+        None => "use a shorter step; psidpd pareto finds how long it may be".to_owned(),
+    }
+}
 
 /// A warning about the worst of the time steps that are too long.
 fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
@@ -108,13 +129,13 @@ fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
         id: "time-step",
         severity: Severity::Warning,
         message: format!(
-            "dt = {} of stage \"{}\" puts the configurational temperature off by about {} % and the pressure that steps carry by \
-             {} % of rho kT: use dt = {}, or an integrator that allows longer steps (docs/integrators.md)",
+            "dt = {} of stage \"{}\" puts temperatures off by {} and the pressure that steps carry by {} of rho kT: {} \
+             (docs/integrators.md)",
             worst.dt,
             worst.stage,
-            two_digits(100.0 * worst.error),
-            two_digits(100.0 * worst.carried),
-            two_digits(worst.one_percent)
+            percent(worst.error, worst.resolution),
+            percent(worst.carried, worst.resolution),
+            remedy(worst)
         ),
     })
 }
@@ -127,19 +148,23 @@ fn two_digits(x: f64) -> String {
 }
 
 fn print_step(step: &StepEstimate, which: &str) {
-    let thinner = step.thinner.map(|by| {
-        format!(", a liquid in equilibrium with its vapour too thin by {} %", two_digits(100.0 * by))
+    let told = step.carried >= step.resolution.max(1e-4) && step.carried <= FAR_OFF;
+    let thinner = step.thinner.filter(|_| told).map(|by| {
+        format!(", a liquid in equilibrium with its vapour too thin by about {} %", two_digits(100.0 * by))
     });
+    let one_percent = match step.one_percent {
+        Some(dt) => format!("about 1 % of both, or less, at dt = {}", two_digits(dt)),
+        None => "no step with 1 % is known".to_owned(),
+    };
     say!(
-        "time step     {} of stage \"{}\"{which}, {}: configurational temperature off by about {} %, the pressure that steps \
-         carry by {} % of rho kT{}; 1 % of both at dt = {} (estimate: frequency {:.1}, drag rate {:.2})",
+        "time step     {} of stage \"{}\"{which}, {}: temperatures off by {}, the pressure that steps carry by {} of rho kT{}; \
+         {one_percent} (estimate: frequency {:.1} of the fastest species, drag rate {:.2})",
         step.dt,
         step.stage,
         step.integrator,
-        two_digits(100.0 * step.error),
-        two_digits(100.0 * step.carried),
+        percent(step.error, step.resolution),
+        percent(step.carried, step.resolution),
         thinner.unwrap_or_default(),
-        two_digits(step.one_percent),
         step.frequency,
         step.drag
     );

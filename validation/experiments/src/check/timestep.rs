@@ -1,88 +1,91 @@
-//! How long a time step of a scene may be: an estimate from the stiffness of the forces and from the drag.
+//! How far a time step of a scene is off.
 //!
-//! A small piece of the fluid is sampled, at the densities of the scene, for
+//! A small piece of the fluid, at the density of the stiffest part of the scene, has the frequency ω of its fastest species
+//! ([`psidpd_dynamics::trial`]) and the rate κ = 2 ⟨Σ D/μ⟩/(dN) at which drag takes kinetic energy. Where ωΔt is small, the
+//! errors are those of the rule in `docs/integrators.md`; where it is not, the piece tries the step and measures them.
 //!
-//! ```text
-//! ω² = ⟨Σ ∇²U/m⟩/(dN),    κ = 2 ⟨Σ D/μ⟩/(dN)
-//! ```
-//!
-//! the mean square frequency of a particle in the force field of the others, and the rate at which drag takes
-//! its kinetic energy. The relative error of the configurational temperature, and that of the pressure that steps carry in ρkT, are then
-//! about
-//!
-//! ```text
-//! a (ωΔt)⁴ + b κΔt,    a′ (ωΔt)² + b′ κΔt + c′ (ωΔt)⁴
-//! ```
-//!
-//! with factors of each integrator from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them. A liquid
-//! in equilibrium with its vapour has the carried pressure of the vapour: it is thinner by the error over ρ ∂p/∂ρ, which a second sample
-//! gives, a little denser.
+//! A liquid in equilibrium with its vapour has the carried pressure of the vapour: it is thinner by the error over ρ ∂p/∂ρ, which a
+//! second piece gives, a little denser.
 
-use psidpd_core::engine::noise::{Law, PairNoise};
-use psidpd_core::engine::pair_sums::Evaluator;
-use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_dynamics::integrator::Integrator;
-use psidpd_dynamics::run::{RunError, Simulation, State};
-use psidpd_dynamics::scene::Scene;
-use psidpd_observe::configurational;
-use psidpd_observe::frame::Frame;
+use psidpd_dynamics::prediction::predict;
+use psidpd_dynamics::run::RunError;
+use psidpd_dynamics::scene::{Scene, Stage};
+use psidpd_dynamics::trial::{Composition, Piece};
 use serde::Serialize;
 
-/// Particles of the sample, if the range leaves room for so few, and most.
-const PARTICLES: f64 = 400.0;
-const MOST: f64 = 6000.0;
+/// Up to this ωΔt the rule holds.
+const RULE: f64 = 0.25;
 
-/// Steps that settle the sample; samples, and steps between them.
-const SETTLE: u64 = 300;
-const SAMPLES: usize = 6;
-const BETWEEN: u64 = 20;
+/// Errors of the step of fourth order up to the ωΔt of the reference are less than this.
+const NONE: f64 = 0.002;
+
+/// Pieces of a scene among which the stiffest is sought, at most.
+const PIECES: usize = 3;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepEstimate {
     pub stage: String,
     pub integrator: String,
     pub dt: f64,
-    /// Frequency ω.
+    /// Frequency ω of the fastest species.
     pub frequency: f64,
+    /// The root mean square frequency of all particles, of ∇²U; none where forces jump.
+    pub mean_frequency: Option<f64>,
     /// Drag κ.
     pub drag: f64,
-    /// Relative error of the configurational temperature.
+    /// Relative error of the temperatures, the larger of the kinetic and the configurational one; infinite where the fluid does not last.
     pub error: f64,
     /// Error of the pressure that steps carry, in ρkT.
     pub carried: f64,
+    /// Errors below this are not told from none.
+    pub resolution: f64,
     /// By how much of its density a liquid in equilibrium with its vapour is too thin, if the fluid resists compression.
     pub thinner: Option<f64>,
-    /// The Δt at which the larger of the first two is 0.01.
-    pub one_percent: f64,
+    /// The longest Δt with errors of about 0.01, if one is known.
+    pub one_percent: Option<f64>,
 }
 
-/// Of each stage with conditions of its own; empty if there is no temperature of configurations, or no density.
+/// Of each stage with conditions of its own, of a ramp the first level and the last; empty where nothing can be said: without a
+/// density, or where the forces reach too far for a small piece.
 pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
     let mut found: Vec<StepEstimate> = Vec::new();
     let mut known: Vec<(f64, Option<Sample>)> = Vec::new();
-    for stage in scene.stages.iter().filter(|stage| stage.integrator.has_time()) {
-        let sample = match known.iter().find(|(kt, _)| *kt == stage.kt) {
-            Some((_, sample)) => *sample,
+    let mut longest: Vec<(f64, Integrator, Option<f64>)> = Vec::new();
+    let at_an_end = |stage: &&Stage| stage.level.is_none_or(|[level, levels]| level == 1 || level == levels);
+    let timed = scene.stages.iter().filter(|stage| stage.integrator.has_time());
+    for stage in timed.filter(at_an_end) {
+        let at = match known.iter().position(|(kt, _)| *kt == stage.kt) {
+            Some(at) => at,
             None => {
-                let sample = sampled(scene, stage.kt)?;
-                known.push((stage.kt, sample));
-                sample
+                known.push((stage.kt, sampled(scene, stage.kt)?));
+                known.len() - 1
             }
         };
-        let Some(Sample { frequency, drag, resistance }) = sample else { continue };
-        let drag = if stage.thermostat { drag } else { 0.0 };
-        let of = |dt: f64| stage.integrator.properties().accuracy.errors(dt, frequency, drag);
-        let [error, carried] = of(stage.dt);
+        let Some(sample) = &known[at].1 else { continue };
+        let Some([error, carried, resolution]) = errors(&sample.piece, stage)? else { continue };
+        let one_percent = match longest.iter().find(|(kt, of, _)| (*kt, *of) == (stage.kt, stage.integrator))
+        {
+            Some((.., dt)) => *dt,
+            None => {
+                let dt = one_percent(&sample.piece, stage)?;
+                longest.push((stage.kt, stage.integrator, dt));
+                dt
+            }
+        };
+        let resistance = sample.resistance;
         let estimate = StepEstimate {
             stage: stage.name.clone(),
             integrator: stage.integrator.to_string(),
             dt: stage.dt,
-            frequency,
-            drag,
+            frequency: sample.piece.frequency,
+            mean_frequency: sample.piece.mean_frequency,
+            drag: if stage.thermostat { sample.piece.drag } else { 0.0 },
             error,
             carried,
+            resolution,
             thinner: resistance.map(|resistance| carried * stage.kt / resistance),
-            one_percent: longest(|dt| of(dt).into_iter().fold(0.0, f64::max)),
+            one_percent,
         };
         let same = |other: &&StepEstimate| {
             other.integrator == estimate.integrator
@@ -95,6 +98,50 @@ pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
     Ok(found)
 }
 
+fn is_fourth_order(stage: &Stage) -> bool {
+    matches!(stage.integrator, Integrator::ForceGradient { .. })
+}
+
+/// Errors by the rule: of the temperature of configurations, and of the carried pressure.
+fn by_rule(piece: &Piece, stage: &Stage, dt: f64) -> Option<[f64; 2]> {
+    let drag = if stage.thermostat { piece.drag } else { 0.0 };
+    let frequency = if is_fourth_order(stage) { Some(piece.frequency) } else { piece.mean_frequency };
+    Some(stage.integrator.properties().accuracy.errors(dt, frequency?, drag))
+}
+
+/// Errors of the temperatures and of the carried pressure, and what is not told from none; `None` where nothing is known.
+fn errors(piece: &Piece, stage: &Stage) -> Result<Option<[f64; 3]>, RunError> {
+    let rule = by_rule(piece, stage, stage.dt);
+    if piece.frequency * stage.dt <= RULE
+        && let Some([error, carried]) = rule
+    {
+        let resolution = if is_fourth_order(stage) { NONE } else { 0.0 };
+        return Ok(Some([error, carried, resolution]));
+    }
+    if !stage.thermostat || piece.drag <= 0.0 {
+        // Heat that steps add stays, so the error depends on how long the stage is.
+        return Ok(None);
+    }
+    let Some(found) = piece.errors(stage.integrator, stage.dt)? else {
+        return Ok(Some([f64::INFINITY, f64::INFINITY, 0.0]));
+    };
+    // Steps of lower order carry a wrong pressure at right temperatures.
+    let carried = rule.filter(|_| !is_fourth_order(stage)).map_or(0.0, |rule| rule[1]);
+    Ok(Some([found.temperatures(), found.carried().max(carried), found.resolution()]))
+}
+
+/// The longest Δt with errors of about 0.01.
+fn one_percent(piece: &Piece, stage: &Stage) -> Result<Option<f64>, RunError> {
+    if !is_fourth_order(stage) {
+        let error = |dt| by_rule(piece, stage, dt).map(|errors| errors[0].max(errors[1]));
+        return Ok(error(1.0).map(|_| longest(|dt| error(dt).unwrap_or(f64::INFINITY)).min(piece.cap())));
+    }
+    if !stage.thermostat || piece.drag <= 0.0 {
+        return Ok(None);
+    }
+    Ok(piece.longest(stage.integrator)?.map(|(dt, _)| dt))
+}
+
 /// The Δt at which an error that grows is 0.01.
 fn longest(error: impl Fn(f64) -> f64) -> f64 {
     let [mut low, mut high] = [1e-9f64, 1e9];
@@ -105,95 +152,54 @@ fn longest(error: impl Fn(f64) -> f64) -> f64 {
     low
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Sample {
-    /// Frequency ω.
-    frequency: f64,
-    /// Drag κ.
-    drag: f64,
+    piece: Piece,
     /// ∂p/∂ρ at constant composition, if positive.
     resistance: Option<f64>,
 }
 
 const DENSER: f64 = 1.04;
 
-/// The fluid of a scene where it is densest.
+/// The fluid of a scene where its particles are fastest.
 fn sampled(scene: &Scene, kt: f64) -> Result<Option<Sample>, RunError> {
-    let densities = scene.densities();
+    let mut fastest: Option<(Piece, Vec<f64>)> = None;
+    for densities in compositions(scene, kt)? {
+        let Some(piece) = settled(scene, kt, &densities)? else { continue };
+        if fastest.as_ref().is_none_or(|(other, _)| piece.frequency > other.frequency) {
+            fastest = Some((piece, densities));
+        }
+    }
+    let Some((piece, densities)) = fastest else { return Ok(None) };
     let total: f64 = densities.iter().sum();
     let denser: Vec<f64> = densities.iter().map(|rho| DENSER * rho).collect();
-    let Some([frequency, drag, pressure]) = at_densities(scene, kt, &densities)? else { return Ok(None) };
-    let compressed = at_densities(scene, kt, &denser)?.map(|[.., pressure]| pressure);
-    let resistance = compressed.map(|compressed| (compressed - pressure) / ((DENSER - 1.0) * total));
-    Ok(Some(Sample { frequency, drag, resistance: resistance.filter(|resistance| *resistance > 0.0) }))
+    let compressed = settled(scene, kt, &denser)?.map(|piece| piece.pressure);
+    let resistance = compressed.map(|compressed| (compressed - piece.pressure) / ((DENSER - 1.0) * total));
+    Ok(Some(Sample { piece, resistance: resistance.filter(|resistance| *resistance > 0.0) }))
 }
 
-/// ω, κ and the conservative pressure of a piece of the fluid.
-fn at_densities(scene: &Scene, kt: f64, densities: &[f64]) -> Result<Option<[f64; 3]>, RunError> {
-    let fluid = scene.model.at(kt)?;
-    let total: f64 = densities.iter().sum();
-    if total.is_nan() || total <= 0.0 {
-        return Ok(None);
-    }
-    let dimensions = fluid.dimensions;
-    let volume = (PARTICLES / total).max((2.2 * fluid.cutoff()).powi(dimensions as i32));
-    if volume * total > MOST {
-        return Ok(None);
-    }
-    let length = volume.powf(1.0 / dimensions as f64);
-    let lengths = [length, length, if dimensions == 2 { 1.0 } else { length }];
-    let Ok(domain) = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, dimensions == 3]) else {
-        return Ok(None);
-    };
-    if configurational::missing(&fluid, &domain).is_some() {
-        return Ok(None);
-    }
-    let state = start(scene, domain, densities, kt, dimensions);
-    let mut run = Simulation::new(&scene.model, kt, state, scene.seed)?;
-    // Short steps relax the random start.
-    let dt = 0.25 * scene.stages.iter().map(|s| s.dt).fold(0.01, f64::min);
-    let integrator = Integrator::VelocityVerlet;
-    run.prepare(dt, Want::FORCES)?;
-    if run.advance(SETTLE, dt, integrator).is_err() {
-        return Ok(None);
-    }
-    let Ok(evaluator) = Evaluator::new(fluid) else { return Ok(None) };
-    let (mut square, mut drag, mut pressure) = (0.0, 0.0, 0.0);
-    for _ in 0..SAMPLES {
-        let made =
-            run.advance(BETWEEN - 1, dt, integrator).and_then(|()| run.step(dt, integrator, Want::TOTALS));
-        if made.is_err() {
-            return Ok(None);
-        }
-        pressure += run.scalar_pressure(run.conservative_pressure_tensor());
-        drag += run.warmth(dt)?.map_or(0.0, |warmth| warmth.rate);
-        square += configurational::mean_square_frequency(&Frame::new(run.view(0.0), &evaluator));
-    }
-    let samples = SAMPLES as f64;
-    Ok(Some([(square / samples).max(0.0).sqrt(), drag / samples, pressure / samples]))
+fn settled(scene: &Scene, kt: f64, densities: &[f64]) -> Result<Option<Piece>, RunError> {
+    Piece::settled(&Composition { model: &scene.model, masses: &scene.mass, kt, densities, seed: scene.seed })
 }
 
-fn start(scene: &Scene, domain: PeriodicBox, densities: &[f64], kt: f64, dimensions: usize) -> State {
-    let volume = domain.volume(dimensions);
-    let species: Vec<i32> = (0..)
-        .zip(densities)
-        .flat_map(|(s, rho)| std::iter::repeat_n(s, (rho * volume).round() as usize))
-        .collect();
-    let n = species.len();
-    let (lengths, draws) = (domain.lengths(), PairNoise::new(scene.seed, 0));
-    let tags: Vec<u32> = (1..=n as u32).collect();
-    let draw = |number: u32, law: Law| {
-        let mut drawn = vec![0.0; n];
-        draws.fill(law, &tags, &vec![u32::MAX - number; n], &mut drawn);
-        drawn
-    };
-    let (mut x, mut v) = (vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
-    for c in 0..dimensions {
-        let (places, speeds) = (draw(c as u32, Law::Uniform), draw(3 + c as u32, Law::Gaussian));
-        for k in 0..n {
-            x[k][c] = lengths[c] * (0.5 + f64::from(places[k]) / 12f64.sqrt());
-            v[k][c] = f64::from(speeds[k]) * (kt / scene.mass[species[k] as usize]).sqrt();
+/// The densities of the species in the parts of a scene, and of the liquid that a thinner start condenses to.
+fn compositions(scene: &Scene, kt: f64) -> Result<Vec<Vec<f64>>, RunError> {
+    let densities = scene.densities();
+    let mut parts = scene.mixtures();
+    // The last is the mean of the whole box.
+    parts.pop();
+    parts.retain(|rho| *rho != densities);
+    let mut all = vec![densities];
+    all.append(&mut parts);
+    all.truncate(PIECES);
+    if let [rho] = all[0][..]
+        && let Some(theory) = predict(&scene.model.at(kt)?, Some(rho))
+        && let Ok(phases) = &theory.phases
+    {
+        let liquid = theory.correlated_liquid.unwrap_or(phases.liquid);
+        if (phases.vapour..liquid).contains(&rho) {
+            all.push(vec![liquid]);
         }
     }
-    State { v, species, ..State::at_rest(domain, scene.mass.clone(), x) }
+    Ok(all)
 }

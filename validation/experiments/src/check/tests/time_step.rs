@@ -32,7 +32,9 @@ fn an_ideal_gas_has_the_step_of_its_drag() {
         assert!(is_near(found.carried, 0.75 * found.drag * found.dt, 1e-12), "{found:?}");
         let share = if found.stage == "velocity-verlet" { 0.25 } else { 0.12 };
         assert!(is_near(found.error, share * found.drag * found.dt, 1e-12), "{found:?}");
-        assert!(is_near(found.one_percent, 0.01 / 0.75 / found.drag, 1e-12), "{found:?}");
+        assert!(is_near(found.one_percent.unwrap(), 0.01 / 0.75 / found.drag, 1e-12), "{found:?}");
+        // The pressure of the gas is ρkT: it thins by as much as its pressure errs.
+        assert!(is_near(found.thinner.unwrap(), found.carried, 0.01), "{found:?}");
     }
 }
 
@@ -55,32 +57,48 @@ fn units_of_energy_change_no_estimate() {
     assert!(is_near(hot.thinner.unwrap(), cold.thinner.unwrap(), 1e-3), "{cold:?} {hot:?}");
 }
 
-/// Standard DPD and Warren's set 6, whose ω and κ are 6.3 and 2.2, 18.3 and 22.5 in equilibrium; the sample of the first, not quite
-/// settled, has 6.1 and 2.3. Of velocity Verlet's errors the carried pressure, of a root in Δt, decides; of the
-/// fourth-order step both are 0.006 (ωΔt)⁴.
+/// Standard DPD and Warren's set 6, whose root mean square ω and κ are 6.3 and 2.2, 18.3 and 22.5 in equilibrium. Of velocity
+/// Verlet's errors the carried pressure, of a root in Δt, decides. Fast particles are faster than the mean.
 #[test]
-fn liquids_have_the_steps_of_stiffness_and_drag() {
+fn short_steps_have_the_errors_of_the_rule() {
     for (model, density, [frequency, drag]) in [(SOFT, 3.0, [6.3, 2.2]), (SET6, 6.05, [18.3, 22.5])] {
-        let stages =
-            [("velocity-verlet", 0.01), ("baoab", 0.02), ("two-stage", 0.06), ("force-gradient", 0.07)];
+        let stages = [("velocity-verlet", 0.008), ("baoab", 0.006)];
         let found = estimated(model, density, &stages);
-        let (w, k) = (found[0].frequency, found[0].drag);
+        let (w, k) = (found[0].mean_frequency.unwrap(), found[0].drag);
         assert!(is_near(w, frequency, 0.07) && is_near(k, drag, 0.07), "{w} {k}");
+        assert!((1.0..1.8).contains(&(found[0].frequency / w)), "{found:?}");
         let root = (-0.75 * k + (0.5625 * k * k + 0.02 * w * w).sqrt()) / (w * w);
         let fourth = |found: &StepEstimate| (w * found.dt).powi(4);
         let square = |found: &StepEstimate| (w * found.dt).powi(2);
-        let [verlet, baoab, two_stage, gradient] = &found[..] else { panic!("{found:?}") };
+        let [verlet, baoab] = &found[..] else { panic!("{found:?}") };
         for (found, error, carried, step) in [
-            (verlet, 5.0 * fourth(verlet) + 0.0025 * k, 0.5 * square(verlet) + 0.0075 * k, root),
+            (
+                verlet,
+                5.0 * fourth(verlet) + 0.25 * k * verlet.dt,
+                0.5 * square(verlet) + 0.75 * k * verlet.dt,
+                root,
+            ),
             (baoab, 5.0 * fourth(baoab), 0.5 * square(baoab), 0.02f64.sqrt() / w),
-            (two_stage, 0.01 * fourth(two_stage), 0.1 * square(two_stage), 0.1f64.sqrt() / w),
-            (gradient, 0.006 * fourth(gradient), 0.006 * fourth(gradient), (1.0 / 0.6f64).powf(0.25) / w),
         ] {
             assert!(
                 is_near(found.error, error, 1e-12) && is_near(found.carried, carried, 1e-12),
                 "{found:?}"
             );
-            assert!(is_near(found.one_percent, step, 1e-9), "{step}: {found:?}");
+            assert!(is_near(found.one_percent.unwrap(), step, 1e-9), "{step}: {found:?}");
         }
+    }
+}
+
+/// `docs/force-gradient.md` has measured 1 % or less for Warren's liquid at 0.06, and for standard DPD at 0.12; at 0.19 this has
+/// T 1.084(3) and a carried pressure that is 11.6(3) % of ρkT too high.
+#[test]
+fn long_steps_are_tried() {
+    for (model, density, dt, worst) in
+        [(SET6, 6.05, 0.06, 0.0..0.021), (SOFT, 3.0, 0.12, 0.0..0.021), (SOFT, 3.0, 0.19, 0.058..0.23)]
+    {
+        let found = estimated(model, density, &[("force-gradient", dt)]).remove(0);
+        assert!(worst.contains(&found.carried), "{found:?}");
+        let advised = found.one_percent.unwrap();
+        assert!(advised * found.mean_frequency.unwrap() < 1.3 && advised > 0.04, "{found:?}");
     }
 }
