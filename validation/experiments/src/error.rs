@@ -50,6 +50,8 @@ pub enum ExperimentError {
         "no stage of the scene has a thermostat and a fixed temperature, so there is nothing to compare with"
     )]
     NoStage,
+    #[error("no hard case and no group of them has \"{0}\" in its name; the groups: {1}")]
+    NoCase(String, String),
     #[error("{what}: {source}")]
     Stopped { what: String, source: Box<RunError> },
     #[error("the reference, {what}, is unstable: {why}; lower the dt of the scene")]

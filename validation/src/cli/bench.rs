@@ -1,4 +1,4 @@
-use super::run::thread_count;
+use super::run::{at_least, thread_count};
 use super::*;
 use psidpd_dynamics::device::Device;
 use psidpd_experiments::bench::{Asked, Options, advice, contender::FEW_ABOVE, memory, page, run as measure};
@@ -27,7 +27,7 @@ pub struct Arguments {
     #[arg(long, value_name = "S", value_parser = positive)]
     seconds: Option<f64>,
     /// Steps of every timed run, whatever time they take; no skin is looked for.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = at_least(1))]
     steps: Option<u64>,
     /// Above this many particles few codes are timed: see docs/bench.md.
     #[arg(long, value_name = "N", default_value_t = FEW_ABOVE)]

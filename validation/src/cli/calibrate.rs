@@ -1,4 +1,4 @@
-use super::run::threads_at_once;
+use super::run::{at_least, threads_at_once};
 use super::*;
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
@@ -32,10 +32,10 @@ pub struct Arguments {
     #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
     tolerance: f64,
     /// Particles in each run.
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(100..))]
-    particles: u32,
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = at_least(100))]
+    particles: u64,
     /// Steps of each run that are measured.
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = at_least(100))]
     steps: u64,
     /// Steps before them.
     #[arg(long, value_name = "N", default_value_t = 500)]

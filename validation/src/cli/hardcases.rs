@@ -1,9 +1,9 @@
 use super::*;
 use psidpd_experiments::hardcases::{self, Extent};
 
-/// Cases that are hard for a simulation: what must happen in each, and what did, by integrator and precision.
+/// Run cases that are hard for a simulation, and compare what happens with what must happen, by integrator and precision.
 ///
-/// The exit code is 1 if something else happened. docs/hardcases.md has the cases.
+/// The exit code is 1 if a case does not do what it must. docs/hardcases.md has the cases.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Only the integrators that are recommended, velocity Verlet in both precisions, the others in mixed.
@@ -15,7 +15,7 @@ pub struct Arguments {
     /// In LAMMPS with the plugin too, which must be installed.
     #[arg(long)]
     lammps: bool,
-    /// Only cases, or groups of them, with these words in their names.
+    /// Only the cases, or groups of cases, whose name contains these words.
     #[arg(long, value_name = "WORDS")]
     only: Option<String>,
     /// Tests use this fault in the engine.

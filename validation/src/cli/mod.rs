@@ -65,45 +65,45 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Compare the native runner, the LAMMPS plugin, LAMMPS's mdpd and eam/alloy in one fluid.
-    Validate(validate::Arguments),
-    /// Time LAMMPS, the plugin and the native runner side by side.
-    Bench(bench::Arguments),
-    /// What a unit of simulated time costs with each integrator, time step and precision, and how far off its results are.
-    Pareto(pareto::Arguments),
-    /// Cases that are hard for a simulation: what must happen in each, and what did.
-    Hardcases(hardcases::Arguments),
+    /// Write a scene to begin with, and its model.
+    New(new::Arguments),
     /// What a model or scene will compute, and what cannot work.
     Check(check::Arguments),
+    /// Run a scene natively.
+    Run(run::Arguments),
+    /// Make report.html of a run again, from the files in its folder.
+    Report(report::Arguments),
+    /// Run a scene at many values of its keys.
+    Sweep(sweep::Arguments),
+    /// A picture of the particles, or of their density, in a data, dump or XYZ file.
+    Snapshot(snapshot::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),
-    /// Find the corrected density with which a model has the pressure it was made for.
-    Calibrate(calibrate::Arguments),
-    /// Figures and tables of the papers: measured, and compared with what is published.
-    Reproduce(reproduce::Arguments),
+    /// Energy, virial, densities and forces of one configuration.
+    Forces(forces::Arguments),
     /// Make a model file of a real liquid.
     #[command(subcommand)]
     Model(model::Verb),
-    /// Write a scene to begin with, and its model.
-    New(new::Arguments),
-    /// Run a scene natively.
-    Run(run::Arguments),
-    /// The GPUs that can make the steps of a run.
-    Devices(devices::Arguments),
-    /// Run a scene at many values of its keys.
-    Sweep(sweep::Arguments),
-    /// Make report.html of a run again, from the files in its folder.
-    Report(report::Arguments),
-    /// A picture of the particles, or of their density, in a data, dump or XYZ file.
-    Snapshot(snapshot::Arguments),
-    /// Energy, virial, densities and forces of one configuration.
-    Forces(forces::Arguments),
+    /// Find the corrected density with which a model has the pressure it was made for.
+    Calibrate(calibrate::Arguments),
+    /// What a unit of simulated time costs with each integrator, time step and precision, and how far off its results are.
+    Pareto(pareto::Arguments),
     /// Write a fluid for another code.
     #[command(subcommand)]
     Export(export::Verb),
     /// Install LAMMPS into a local environment, or build the plugin for it.
     #[command(subcommand)]
     Lammps(lammps::Verb),
+    /// Compare the native runner, the LAMMPS plugin, LAMMPS's mdpd and eam/alloy in one fluid.
+    Validate(validate::Arguments),
+    /// Figures and tables of the papers: measured, and compared with what is published.
+    Reproduce(reproduce::Arguments),
+    /// Time LAMMPS, the plugin and the native runner side by side.
+    Bench(bench::Arguments),
+    /// Run cases that are hard for a simulation, and compare what happens with what must happen.
+    Hardcases(hardcases::Arguments),
+    /// The GPUs that can make the steps of a run.
+    Devices(devices::Arguments),
     /// Print a script that completes verbs and options in a shell.
     Completions(shell::Completions),
     /// Write manual pages.

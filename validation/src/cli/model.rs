@@ -1,4 +1,5 @@
 use super::calibrate::Runs;
+use super::run::at_least;
 use super::*;
 use psidpd_experiments::from_eos::{Options, Substance, from_eos};
 
@@ -32,7 +33,7 @@ pub struct FromEos {
     #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
     tolerance: f64,
     /// Steps of each run of the homogeneous liquid; the slab has eight times as many.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(100..))]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least(100))]
     steps: u64,
     #[command(flatten)]
     runs: Runs,

@@ -31,11 +31,11 @@ pub struct Arguments {
     /// Threads that share the work; what a run writes does not depend on their number.
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
-    /// In what the forces of pairs are computed; as the scene says if left out, or else mixed.
+    /// Precision of the pair forces [default: that of the scene, or else mixed].
     #[arg(long, value_parser = precision, value_name = "mixed|double")]
     precision: Option<Precision>,
-    /// The processor that computes the steps, of those that `psidpd devices` lists; as the scene says if left out, or
-    /// else the CPU.
+    /// The processor that computes the steps, one of those that `psidpd devices` lists [default: that of the scene, or
+    /// else the CPU].
     #[arg(long, value_name = "cpu|gpu|gpu:N")]
     device: Option<Device>,
     /// Make report.html at the end, also of a run that stopped.
@@ -88,6 +88,14 @@ pub fn threads_at_once(text: &str) -> Result<NonZeroUsize, String> {
 pub fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
     let count = text.parse().map_err(|e| format!("{e}"))?;
     Pool::count(count).map_err(|e| e.to_string())
+}
+
+/// Parses a whole number that must not be smaller than `least`.
+pub fn at_least(least: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
+    move |text| match text.parse::<u64>() {
+        Ok(number) if number >= least => Ok(number),
+        _ => Err(format!("must be a whole number from {least}")),
+    }
 }
 
 /// The content of the file of `--json`.

@@ -40,7 +40,7 @@ pub struct Arguments {
     /// kT, for the colours of psi.
     #[arg(long = "kT", value_name = "T", allow_negative_numbers = true, value_parser = temperature)]
     kt: Option<f64>,
-    /// Most frames of a film, evenly chosen.
+    /// The largest number of frames in a film; from a longer trajectory, frames are taken at even intervals.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=1000))]
     frames: u16,
     /// The weighted local density in a plane through the middle of the box, instead of particles.

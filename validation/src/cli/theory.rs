@@ -1,4 +1,5 @@
 use super::check::{number_density, per_species};
+use super::run::at_least;
 use super::*;
 use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point};
 use psidpd_dynamics::prediction::{Prediction, predict, published};
@@ -41,7 +42,7 @@ pub struct Arguments {
     #[arg(long)]
     measure: bool,
     /// Steps of each run of --measure.
-    #[arg(long, value_name = "N", default_value_t = 5000, value_parser = clap::value_parser!(u64).range(30..))]
+    #[arg(long, value_name = "N", default_value_t = 5000, value_parser = at_least(30))]
     steps: u64,
     /// Time step of --measure.
     #[arg(long, default_value_t = 0.01)]

@@ -2,6 +2,7 @@
 
 use super::keys::TABLES;
 use super::{Arc, FileError, Source};
+use psidpd_core::document::Place;
 use psidpd_core::model::keys as model_keys;
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -58,9 +59,13 @@ impl Edit {
         Value::from_str(&self.value).map_or_else(|_| value(self.value.as_str()), Item::Value)
     }
 
-    fn error(&self, message: String) -> FileError {
+    fn place(&self, key: &str) -> Place {
         let source = Arc::new(Source::new("--set", &self.text));
-        FileError::new(&source, 0..self.key().len(), "", message)
+        Place { source, span: 0..self.key().len(), key: key.to_owned() }
+    }
+
+    fn error(&self, message: String) -> FileError {
+        self.place("").error(message)
     }
 }
 
@@ -112,6 +117,19 @@ pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
         set(&mut document, &edit)?;
     }
     Ok(document.to_string())
+}
+
+/// Puts an error at the edit that caused it, if it is in a line that the file itself does not have.
+pub fn blamed(error: FileError, original: &str, edits: &[Edit]) -> FileError {
+    let line = error.place.source.text().lines().nth(error.line() - 1).unwrap_or_default();
+    let is_in = |edit: &&Edit| {
+        let key = edit.path.last().map_or("", String::as_str);
+        line.trim_start().trim_start_matches('"').starts_with(key) || line.contains(&format!("{key} ="))
+    };
+    match edits.iter().rev().find(is_in).filter(|_| original.lines().all(|own| own != line)) {
+        Some(edit) => FileError { place: edit.place(&error.place.key), ..error },
+        None => error,
+    }
 }
 
 /// Parses the text. Invalid TOML stays unedited, so that the reader reports its error.

@@ -94,8 +94,11 @@ impl Scene {
             let known = model.as_ref().and_then(|m| m.root().get("parameters")?.as_section()?.get(name));
             known.is_some()
         };
-        let (text, of_model) = edits::edit_scene(document.source.text(), edits, &parameters)?;
-        Scene::read(&Document::parse(&path.display().to_string(), &text)?, base, &of_model)
+        let original = document.source.text();
+        let (text, of_model) = edits::edit_scene(original, edits, &parameters)?;
+        Document::parse(&path.display().to_string(), &text)
+            .and_then(|edited| Scene::read(&edited, base, &of_model))
+            .map_err(|error| edits::blamed(error, original, edits))
     }
 
     /// Parses a scene from a text; messages use `name` as the name of the file, and the path of the model

@@ -92,7 +92,12 @@ pub fn run(
     let folder = tempfile::tempdir().map_err(ExperimentError::at(&std::env::temp_dir()))?;
     let lammps = lammps.then(|| PluginHost::find(&|line| progress.note(line))).transpose()?;
     let mut cases = cases(extent);
+    let mut groups: Vec<&str> = cases.iter().map(|case| case.group).collect();
+    groups.dedup();
     cases.retain(|case| only.is_none_or(|words| case.name.contains(words) || case.group.contains(words)));
+    if let Some(words) = only.filter(|_| cases.is_empty()) {
+        return Err(ExperimentError::NoCase(words.to_owned(), groups.join(", ")));
+    }
     let mut runs = Vec::new();
     for (k, case) in cases.iter().enumerate() {
         let mut settings = settings(extent);
@@ -155,5 +160,14 @@ mod tests {
         let wrong: Vec<&Verdict> = results.iter().filter(|r| r.wrong.is_some()).collect();
         assert!(wrong.is_empty(), "{}\n{wrong:#?}", table(&results).to_text_with(false));
         assert!(results.len() > 100);
+    }
+
+    #[test]
+    fn words_of_no_case_are_an_error() {
+        let error = run(Extent::Quick, false, Some("zzz"), None, &Progress::new()).unwrap_err();
+        assert!(
+            error.to_string().contains("\"zzz\"") && error.to_string().contains("singular formulas"),
+            "{error}"
+        );
     }
 }
