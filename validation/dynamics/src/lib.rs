@@ -5,6 +5,7 @@ extern crate self as psidpd_dynamics;
 
 pub mod checkpoint;
 pub mod device;
+pub mod freezing;
 pub mod integrator;
 pub mod particles;
 pub mod prediction;

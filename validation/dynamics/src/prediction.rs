@@ -1,5 +1,6 @@
 //! Predictions of theory and literature for a fluid, and how far the theory can be trusted.
 
+use crate::freezing::{Freezing, freezing};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{Binodal, Correlated, Interface, MeanField, TheoryError};
 use psidpd_formats::Expected;
@@ -25,6 +26,8 @@ pub struct Prediction {
     /// Density of zero pressure with correlations to first order: close to that of the liquid.
     pub correlated_liquid: Option<f64>,
     pub interface: Result<Interface, TheoryError>,
+    /// What a measured line says of crystals, which mean field does not know.
+    pub freezing: Option<Freezing>,
 }
 
 /// The theory of a fluid at a number density; `None` without a mean field or with several species. The
@@ -42,6 +45,7 @@ pub fn predict(fluid: &Fluid, density: Option<f64>) -> Option<Prediction> {
         .and_then(|b| correlations.as_ref()?.zero_pressure_density([0.5 * b.liquid, BEYOND * b.liquid]));
     let liquid = correlated_liquid.or(phases.as_ref().ok().map(|b| b.liquid));
     let asked = density.is_some();
+    let freezing = freezing(fluid, density);
     let density = density.or(liquid).unwrap_or(3.0);
     Some(Prediction {
         density,
@@ -52,6 +56,7 @@ pub fn predict(fluid: &Fluid, density: Option<f64>) -> Option<Prediction> {
         interface: theory.interface(201),
         correlated_liquid,
         phases,
+        freezing,
     })
 }
 
@@ -62,6 +67,7 @@ impl Prediction {
         if let Ok(b) = &self.phases {
             let (low, high) = (b.vapour, self.correlated_liquid.unwrap_or(b.liquid));
             let expected = match self.density {
+                _ if self.freezing.is_some_and(|f| f.is_certain()) => "a crystal",
                 rho if rho <= low => "a vapour",
                 rho if rho >= high * (1.0 - MATTERS) => "a liquid, compressed or near coexistence",
                 _ => "vapour and liquid, where the box has room for both",
@@ -83,7 +89,7 @@ impl Prediction {
 
     /// Lines that say where and by how much mean field fails for this fluid; empty where correlations change little.
     pub fn doubts(&self) -> Vec<String> {
-        let mut doubts = Vec::new();
+        let mut doubts: Vec<String> = self.freezing.iter().map(Freezing::message).collect();
         if let Some(c) = &self.correlated {
             let rho = self.density;
             for (name, n) in self.names.iter().zip(&c.mean_density) {

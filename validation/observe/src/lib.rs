@@ -17,6 +17,7 @@ pub mod meter;
 pub mod observation;
 pub mod observers;
 pub mod options;
+pub mod order;
 pub mod profile;
 pub mod request;
 pub mod series;

@@ -4,6 +4,7 @@ use super::error::ObserveError;
 use super::frame::{Frame, View};
 use super::meter::AnyMeter;
 use super::observation::Observation;
+use super::order::{Order, Sight};
 use super::request::Observe;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;
@@ -18,6 +19,8 @@ pub struct Observers {
     stage: String,
     /// The step before the first step of the stage.
     start: u64,
+    /// The order of the particles in each stage whose observables assume a liquid.
+    order: Vec<(String, Order)>,
     #[serde(skip)]
     fluid: Option<(f64, Evaluator)>,
 }
@@ -108,6 +111,17 @@ impl Observers {
             self.fluid = fluid.map(|fluid| (view.kt, fluid));
         }
         let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(view, fluid));
+        let of_liquids = |o: &Observer| o.stages.iter().any(|s| s.stage == stage && s.meter.of_liquids());
+        if let Some(frame) = &frame
+            && self.observers.iter().any(|o| due(o) && of_liquids(o))
+        {
+            let known = self.order.iter().position(|(name, _)| name == stage);
+            let at = known.unwrap_or_else(|| {
+                self.order.push((stage.to_owned(), Order::default()));
+                self.order.len() - 1
+            });
+            self.order[at].1.sample(&sight(frame), |k| frame.moves(k));
+        }
         for observer in self.observers.iter_mut().filter(|o| due(o)) {
             for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
                 let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));
@@ -136,8 +150,14 @@ impl Observers {
     pub fn finish(&self) -> Vec<Observation> {
         let mut all = Vec::new();
         for sampled in self.observers.iter().flat_map(|o| &o.stages) {
+            let order =
+                self.order.iter().find(|(name, _)| sampled.meter.of_liquids() && *name == sampled.stage);
+            let crystal = order.and_then(|(_, order)| order.crystal());
             for mut observation in sampled.meter.finish() {
                 observation.stage.clone_from(&sampled.stage);
+                if let Some(crystal) = crystal {
+                    observation = observation.note(crystal.note());
+                }
                 if sampled.left_out > 0 {
                     let text = format!("Samples without a value, left out: {}.", sampled.left_out);
                     observation = observation.note(text);
@@ -146,5 +166,21 @@ impl Observers {
             }
         }
         all
+    }
+}
+
+/// What tells a crystal from a liquid in a configuration.
+fn sight<'a>(frame: &Frame<'a>) -> Sight<'a> {
+    let view = frame.view;
+    let mass = (0..view.x.len()).map(|k| frame.mass(k)).sum::<f64>() / view.x.len() as f64;
+    Sight {
+        time: view.time,
+        domain: view.domain,
+        dimensions: view.dimensions,
+        x: view.x,
+        images: view.images,
+        tags: view.tags,
+        range: frame.evaluator.fluid.conservative_range(),
+        speed: (view.kt / mass).sqrt(),
     }
 }

@@ -38,6 +38,13 @@ pub fn check(model: &Model, kt: f64, densities: Option<&[f64]>) -> Result<Findin
     let stability = at.map(|(theory, rho)| theory.stability(rho));
     let pressure = at.map(|(theory, rho)| theory.pressure(rho));
     let state = warnings::State { densities, pressure, stability: stability.as_ref(), no_theory };
+    let one = |rho: &[f64]| (rho.len() == 1).then(|| rho[0]);
+    let prediction = prediction::predict(&fluid, densities.and_then(one));
+    let mut found = warnings::all(&fluid, &state)?;
+    if prediction.as_ref().and_then(|p| p.freezing).is_some_and(|f| f.is_certain()) {
+        found.push(warnings::crystal());
+        found.sort_by_key(|w| std::cmp::Reverse(w.severity));
+    }
     Ok(Findings {
         title: model.title.clone(),
         reference: model.reference.clone(),
@@ -49,9 +56,8 @@ pub fn check(model: &Model, kt: f64, densities: Option<&[f64]>) -> Result<Findin
         densities: densities.map(<[f64]>::to_vec),
         steps: Vec::new(),
         cost: None,
-        theory: prediction::predict(&fluid, densities.and_then(|rho| (rho.len() == 1).then(|| rho[0])))
-            .map_or(Vec::new(), |p| p.summary()),
-        warnings: warnings::all(&fluid, &state)?,
+        theory: prediction.map_or(Vec::new(), |p| p.summary()),
+        warnings: found,
     })
 }
 

@@ -143,3 +143,25 @@ fn a_quadratic_kernel_is_not_advised_where_it_is_quadratic() {
     assert!(cluster("bell").contains("positive definite kernel"));
     assert!(!cluster("quadratic").contains("kernel"));
 }
+
+/// The crystal of A = −100 and B = 80 is announced as what it is, and Warren's liquid is not.
+#[test]
+fn crystals_are_not_called_liquids() {
+    let warren = |a: f64, b: f64| {
+        format!(
+            "title = \"w\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n[excess_free_energy]\n\
+             F = \"pi/30*0.75^4*{b}*n^2\"\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = {a}\nrange = 1\n"
+        )
+    };
+    for density in [None, Some(vec![5.7]), Some(vec![2.9])] {
+        let solid = found(&warren(-100.0, 80.0), 1.0, density.clone());
+        let said = solid.theory.join("\n");
+        assert!(has(&solid, "crystal") && solid.works(), "{solid:?}");
+        assert!(
+            said.contains("expect a crystal") && said.contains("Vanya") && !said.contains("expect a liquid"),
+            "{said}"
+        );
+        let liquid = found(&warren(-40.0, 25.0), 1.0, density);
+        assert!(!has(&liquid, "crystal") && !liquid.theory.join(" ").contains("crystal"), "{liquid:?}");
+    }
+}

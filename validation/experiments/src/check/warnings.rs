@@ -203,6 +203,17 @@ fn unstable(fluid: &Fluid, stability: &Stability) -> Option<Warning> {
     Some(Warning { id: "clustering", severity: Severity::Warning, message })
 }
 
+/// A fluid that a measured line has found to be a crystal.
+pub fn crystal() -> Warning {
+    Warning {
+        id: "crystal",
+        severity: Severity::Warning,
+        message: "expect a crystal: tensions, widths, contact angles, viscosities and whatever else assumes a liquid mean nothing; \
+                  a weaker attraction or a higher kT melts it"
+            .into(),
+    }
+}
+
 fn jumps(fluid: &Fluid) -> Vec<Warning> {
     let mut found = Vec::new();
     for density in fluid.densities.iter().filter(|d| d.force_kernel.kind() == KernelKind::Linear) {

@@ -192,6 +192,7 @@ impl Meter for Drop {
     };
 
     const NEEDS_FLUX: bool = true;
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<Drop, FileError> {
         let range = options.within_half_box("range")?.unwrap_or(options.half_box());

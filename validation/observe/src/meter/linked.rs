@@ -157,20 +157,31 @@ impl Distance {
         if let Some(value) = self.value() {
             return value;
         }
-        let mut neighbours = vec![0usize; x.len()];
-        for_each_pair(x, domain, dimensions, self.longest, |p| {
-            if takes_part(p.i) && takes_part(p.j) {
-                neighbours[p.i] += 1;
-                neighbours[p.j] += 1;
-            }
-        });
-        let mut counts: Vec<usize> = (0..x.len()).filter(|k| takes_part(*k)).map(|k| neighbours[k]).collect();
-        counts.sort_unstable();
-        let dense = counts.get(counts.len() * 9 / 10).copied().unwrap_or(0) as f64;
-        let density = dense / shell_volume(dimensions, 0.0, self.longest);
+        let density = density_of_densest_tenth(x, domain, dimensions, self.longest, takes_part);
         let linked = (LINKED[dimensions - 2] / density).powf(1.0 / dimensions as f64);
         *self.chosen.insert(linked.min(self.longest))
     }
+}
+
+/// The number density around the particles of the densest tenth, within `range` of each.
+pub(crate) fn density_of_densest_tenth(
+    x: &[[f64; 3]],
+    domain: &PeriodicBox,
+    dimensions: usize,
+    range: f64,
+    takes_part: impl Fn(usize) -> bool,
+) -> f64 {
+    let mut neighbours = vec![0usize; x.len()];
+    for_each_pair(x, domain, dimensions, range, |p| {
+        if takes_part(p.i) && takes_part(p.j) {
+            neighbours[p.i] += 1;
+            neighbours[p.j] += 1;
+        }
+    });
+    let mut counts: Vec<usize> = (0..x.len()).filter(|k| takes_part(*k)).map(|k| neighbours[k]).collect();
+    counts.sort_unstable();
+    let dense = counts.get(counts.len() * 9 / 10).copied().unwrap_or(0) as f64;
+    dense / shell_volume(dimensions, 0.0, range)
 }
 
 #[cfg(test)]

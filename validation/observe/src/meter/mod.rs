@@ -10,7 +10,7 @@ mod distances;
 mod drop;
 mod energy;
 mod interface_width;
-mod linked;
+pub(crate) mod linked;
 mod local_density;
 mod msd;
 mod pendant;
@@ -53,6 +53,9 @@ pub trait Meter: Sized {
     /// True if the observable needs motion in time, which Monte Carlo does not have.
     const OF_MOTION: bool = false;
 
+    /// True if the results mean nothing for a crystal.
+    const OF_LIQUIDS: bool = false;
+
     fn read(options: &Options) -> Result<Self, FileError>;
 
     /// Takes a sample; returns false if the configuration allows none.
@@ -89,6 +92,10 @@ macro_rules! meters {
 
             pub fn needs_flux(&self) -> bool {
                 match self { $(AnyMeter::$variant(_) => <$meter as Meter>::NEEDS_FLUX),+ }
+            }
+
+            pub fn of_liquids(&self) -> bool {
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::OF_LIQUIDS),+ }
             }
 
             pub fn sample(&mut self, frame: &Frame) -> bool {

@@ -124,6 +124,7 @@ impl Meter for Msd {
     };
 
     const OF_MOTION: bool = true;
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<Msd, FileError> {
         let fluid = options.place.fluid;

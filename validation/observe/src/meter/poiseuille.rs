@@ -74,6 +74,7 @@ impl Meter for Poiseuille {
     };
 
     const OF_MOTION: bool = true;
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<Poiseuille, FileError> {
         let drive = options.place.drive;

@@ -60,6 +60,7 @@ impl Meter for StressProfile {
     };
 
     const NEEDS_FLUX: bool = true;
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<StressProfile, FileError> {
         let across = Across::read(options, false)?;

@@ -61,6 +61,7 @@ impl Meter for SurfaceTension {
 
     const NEEDS: Want = Want::TOTALS;
     const NEEDS_FLUX: bool = true;
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
         let place = options.place;

@@ -86,6 +86,7 @@ impl Meter for Viscosity {
     const NEEDS: Want = Want { virial: true, ..Want::FORCES };
 
     const OF_MOTION: bool = true;
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<Viscosity, FileError> {
         let place = options.place;

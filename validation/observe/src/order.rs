@@ -1,0 +1,291 @@
+//! Whether the particles of a run are a crystal: ordered, and each at its place.
+//!
+//! Neither suffices alone. A viscous liquid, or a short run, leaves particles where they are; and a start on a lattice is ordered
+//! until it melts.
+//!
+//! ```text
+//! order          c_i = ⟨ S_ij/√(S_ii S_jj) ⟩_j      S_ij = Σ_{a,b} P₆(â·b̂)
+//! displacement   u_i² = ⟨ (|r_ij(t)| − |r_ij(0)|)² ⟩_j
+//! ```
+//!
+//! j runs over the nearest neighbours of i, and a, b over the directions from i and from j to theirs. By the addition theorem
+//! S_ij is the product of the bond-order vectors q_6m of the two (Steinhardt, Nelson and Ronchetti, Phys. Rev. B 28, 784 (1983)),
+//! and c_i the mean product by which ten Wolde, Ruiz-Montero and Frenkel, J. Chem. Phys. 104, 9932 (1996), tell solid particles
+//! from liquid ones; in two dimensions cos 6θ takes the place of P₆. c is near 0.1 in liquids, and 0.5 to 1 in crystals, whichever
+//! their lattice, also where grains, drops or slabs have no common direction. Distances from the neighbours of the
+//! start leave out drift and rotation.
+
+use crate::meter::linked::density_of_densest_tenth;
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::pair_sums::for_each_pair;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// The largest number of particles that are followed.
+const PROBES: usize = 1000;
+
+/// A particle with a larger c is ordered.
+const ORDERED: f64 = 0.5;
+
+/// The smallest share of ordered particles in a crystal; half of the particles of a small drop are at its surface.
+const SHARE: f64 = 0.3;
+
+/// The largest root mean square displacement in a crystal, in distances of neighbours: twice that of vibrations by Lindemann's rule at
+/// melting, as it is a difference of four positions.
+const CAGE: f64 = 0.35;
+
+/// The largest growth of the mean square displacement in a crystal while the time doubles; diffusion has 2.
+const GROWTH: f64 = 1.4;
+
+/// A shorter run tells nothing: in samples, and in times that a free particle takes from neighbour to neighbour.
+const LEAST_SAMPLES: u64 = 16;
+const LEAST_FLIGHTS: f64 = 10.0;
+
+/// A configuration as this module needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct Sight<'a> {
+    pub time: f64,
+    pub domain: &'a PeriodicBox,
+    pub dimensions: usize,
+    /// Positions in the box, the numbers of periods that each particle has crossed, and tags.
+    pub x: &'a [[f64; 3]],
+    pub images: &'a [[i32; 3]],
+    pub tags: &'a [i32],
+    /// The range of the forces.
+    pub range: f64,
+    /// The thermal speed √(kT/m).
+    pub speed: f64,
+}
+
+/// What is known of the order of a stage. It goes into checkpoints.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Order {
+    samples: u64,
+    start: f64,
+    probes: Vec<Probe>,
+    /// The last two looks, at times one of which is twice the other.
+    looks: Vec<Look>,
+}
+
+/// A particle that is followed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Probe {
+    tag: i32,
+    neighbours: Vec<Neighbour>,
+}
+
+/// A neighbour at the first sample.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Neighbour {
+    tag: i32,
+    /// What the vector to the image that is near has more than the difference of unwrapped positions.
+    image: [f64; 3],
+    distance: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Look {
+    time: f64,
+    /// The share of ordered particles.
+    ordered: f64,
+    /// The mean square change of distances from the neighbours of ordered particles, in squares of the distance of neighbours.
+    square: f64,
+    /// The time of a free flight from neighbour to neighbour.
+    flight: f64,
+}
+
+/// A crystal that a run has become, or has been from the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crystal {
+    /// The share of ordered particles.
+    pub ordered: f64,
+    /// The root mean square displacement of these against their neighbours, in distances of neighbours.
+    pub displacement: f64,
+    /// The time over which they were followed.
+    pub time: f64,
+}
+
+impl Crystal {
+    /// A remark beside an observable that assumes a liquid.
+    pub fn note(&self) -> String {
+        format!(
+            "The particles are a crystal, and this assumes a liquid: {:.0} % of them have ordered neighbours, and after a time of \
+             {:.3} these are {:.3} of the distance between neighbours from their places.",
+            100.0 * self.ordered,
+            self.time,
+            self.displacement
+        )
+    }
+}
+
+/// The number of nearest neighbours: the two shells of bcc, of which fcc and hcp have one and a part; the shell of the hexagonal lattice.
+fn neighbours(dimensions: usize) -> usize {
+    if dimensions == 2 { 6 } else { 14 }
+}
+
+/// The distance within which a particle of a liquid of density `rho` has at least twice as many neighbours as are needed.
+fn reach(dimensions: usize, rho: f64) -> f64 {
+    if dimensions == 2 { (4.5 / rho).sqrt() } else { (7.2 / rho).cbrt() }
+}
+
+/// P₆, in two dimensions cos 6θ, of the cosine of an angle.
+fn sixfold(cosine: f64, dimensions: usize) -> f64 {
+    let s = cosine * cosine;
+    match dimensions {
+        2 => ((32.0 * s - 48.0) * s + 18.0) * s - 1.0,
+        _ => (((231.0 * s - 315.0) * s + 105.0) * s - 5.0) / 16.0,
+    }
+}
+
+/// A near particle: distance, index and unit vector.
+type Near = (f64, usize, [f64; 3]);
+
+/// The nearest neighbours of some particles, by distance.
+type Nearest = HashMap<usize, Vec<Near>>;
+
+fn nearest(
+    sight: &Sight,
+    of: impl IntoIterator<Item = usize>,
+    moves: impl Fn(usize) -> bool,
+    reach: f64,
+) -> Nearest {
+    let most = neighbours(sight.dimensions);
+    let mut found: Nearest = of.into_iter().map(|k| (k, Vec::with_capacity(most + 1))).collect();
+    for_each_pair(sight.x, sight.domain, sight.dimensions, reach, |p| {
+        if !(moves(p.i) && moves(p.j) && p.r > 0.0) {
+            return;
+        }
+        // `d` is the vector from j to i.
+        for (k, other, sign) in [(p.i, p.j, -1.0), (p.j, p.i, 1.0)] {
+            let Some(list) = found.get_mut(&k) else { continue };
+            let at = list.partition_point(|(r, ..)| *r <= p.r);
+            if at < most {
+                list.insert(at, (p.r, other, p.d.map(|c| sign * c / p.r)));
+                list.truncate(most);
+            }
+        }
+    });
+    found.retain(|_, list| list.len() == most);
+    found
+}
+
+impl Order {
+    /// Takes a sample; `moves` tells mobile particles from frozen ones, which do not count.
+    pub fn sample(&mut self, sight: &Sight, moves: impl Fn(usize) -> bool) {
+        self.samples = self.samples.saturating_add(1);
+        if !self.samples.is_power_of_two() {
+            return;
+        }
+        let rho = density_of_densest_tenth(sight.x, sight.domain, sight.dimensions, sight.range, &moves);
+        let mut reach = reach(sight.dimensions, rho);
+        if !(rho > 0.0 && reach.is_finite()) {
+            return;
+        }
+        // No image of an image is needed.
+        let widths = (0..sight.dimensions).map(|k| sight.domain.height(k));
+        reach = widths.fold(reach, f64::min);
+        if self.samples == 1 {
+            self.begin(sight, &moves, reach);
+        }
+        if let Some(look) = self.look(sight, &moves, reach) {
+            if self.looks.len() > 1 {
+                self.looks.remove(0);
+            }
+            self.looks.push(look);
+        }
+    }
+
+    fn begin(&mut self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) {
+        self.start = sight.time;
+        let mut mobile: Vec<usize> = (0..sight.x.len()).filter(|k| moves(*k)).collect();
+        mobile.sort_unstable_by_key(|k| sight.tags[*k]);
+        let chosen = mobile.iter().copied().step_by(mobile.len().div_ceil(PROBES).max(1));
+        let mut found: Vec<_> = nearest(sight, chosen, moves, reach).into_iter().collect();
+        found.sort_unstable_by_key(|(k, _)| sight.tags[*k]);
+        let probe = |(k, list): (usize, Vec<Near>)| {
+            let neighbour = |&(distance, j, e): &Near| {
+                let apart = apart(sight, k, j);
+                let image = std::array::from_fn(|c| distance * e[c] - apart[c]);
+                Neighbour { tag: sight.tags[j], image, distance }
+            };
+            Probe { tag: sight.tags[k], neighbours: list.iter().map(neighbour).collect() }
+        };
+        self.probes = found.into_iter().map(probe).collect();
+    }
+
+    fn look(&self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) -> Option<Look> {
+        let dimensions = sight.dimensions;
+        let needed = self.probes.iter().flat_map(|p| p.neighbours.iter().map(|n| n.tag).chain([p.tag]));
+        let mut index: HashMap<i32, usize> = needed.map(|tag| (tag, usize::MAX)).collect();
+        for (k, tag) in sight.tags.iter().enumerate() {
+            index.entry(*tag).and_modify(|at| *at = k);
+        }
+        let at = |tag: &i32| index.get(tag).copied().filter(|k| *k < sight.x.len());
+        let of_probes = nearest(sight, self.probes.iter().filter_map(|p| at(&p.tag)), moves, reach);
+        let beside = of_probes.values().flatten().map(|n| n.1).chain(of_probes.keys().copied());
+        let all = nearest(sight, beside, moves, reach);
+        let product = |a: usize, b: usize| {
+            let (a, b) = (all.get(&a)?, all.get(&b)?);
+            let each = |(_, _, e): &Near| {
+                b.iter()
+                    .map(|(_, _, f)| sixfold(e[0] * f[0] + e[1] * f[1] + e[2] * f[2], dimensions))
+                    .sum::<f64>()
+            };
+            Some(a.iter().map(each).sum::<f64>())
+        };
+        let own: HashMap<usize, f64> = all.keys().filter_map(|k| Some((*k, product(*k, *k)?))).collect();
+        let (mut ordered, mut square, mut spacing) = (0.0, 0.0, 0.0);
+        for probe in &self.probes {
+            let Some((k, list)) = at(&probe.tag).and_then(|k| Some((k, of_probes.get(&k)?))) else {
+                continue;
+            };
+            let share = |j: usize| Some(product(k, j)? / (own.get(&k)? * own.get(&j)?).sqrt());
+            let c = list.iter().filter_map(|n| share(n.1)).sum::<f64>() / list.len() as f64;
+            let stretched = |n: &Neighbour| {
+                let d = apart(sight, k, at(&n.tag)?);
+                let r = (0..dimensions).map(|c| (d[c] + n.image[c]).powi(2)).sum::<f64>().sqrt();
+                Some((r - n.distance).powi(2))
+            };
+            let squares: Vec<f64> = probe.neighbours.iter().filter_map(stretched).collect();
+            let distance = list.iter().map(|n| n.0).sum::<f64>() / list.len() as f64;
+            if c > ORDERED {
+                ordered += 1.0;
+                spacing += distance;
+                square += squares.iter().sum::<f64>() / squares.len() as f64 / (distance * distance);
+            }
+        }
+        let share = ordered / self.probes.len() as f64;
+        let look = Look {
+            time: sight.time - self.start,
+            ordered: share,
+            square: square / ordered,
+            flight: spacing / ordered / sight.speed,
+        };
+        (ordered > 0.0 && [look.time, look.square, look.flight].iter().all(|x| x.is_finite())).then_some(look)
+    }
+
+    /// The crystal, if the run is one and was long enough to tell.
+    pub fn crystal(&self) -> Option<Crystal> {
+        let [before, last] = self.looks[..] else { return None };
+        let resolved = self.samples >= LEAST_SAMPLES && last.time >= LEAST_FLIGHTS * last.flight;
+        let stays = last.square.sqrt() <= CAGE && last.square <= GROWTH * before.square;
+        (resolved && stays && last.ordered >= SHARE).then_some(Crystal {
+            ordered: last.ordered,
+            displacement: last.square.sqrt(),
+            time: last.time,
+        })
+    }
+}
+
+/// The difference of the unwrapped positions of two particles.
+fn apart(sight: &Sight, from: usize, to: usize) -> [f64; 3] {
+    let edges = [0, 1, 2].map(|e| sight.domain.edge(e));
+    let images = [from, to].map(|k| sight.images[k].map(f64::from));
+    std::array::from_fn(|c| {
+        let boxes = (0..3).map(|e| (images[1][e] - images[0][e]) * edges[e][c]).sum::<f64>();
+        sight.x[to][c] - sight.x[from][c] + boxes
+    })
+}
+
+#[cfg(test)]
+mod tests;
