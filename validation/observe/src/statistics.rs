@@ -11,10 +11,10 @@ pub const MINIMUM_SAMPLES: usize = 8;
 const LONGEST: usize = 16_384;
 
 /// The longest blocks to which autoregressions are fitted have 2 to this power samples.
-const BLOCKINGS: usize = 4;
+const BLOCKINGS: usize = 5;
 
 /// The smallest number of blocks for a fit.
-const FEWEST_BLOCKS: usize = 24;
+const FEWEST_BLOCKS: usize = 15;
 
 /// With more degrees of freedom Student's t equals the normal distribution to more digits than an error bar has.
 const NORMAL_DEGREES: f64 = 1e5;
@@ -51,7 +51,7 @@ impl Estimate {
 ///
 /// The criterion measures the prediction of the next sample. A slow mode with a small share of the variance contributes
 /// little to the prediction, but much to the error of the mean. Its share is larger in means of blocks. So the variance
-/// is averaged over fits to the samples and to blocks of 2, 4, 8 and 16 samples, as long as there are 24 blocks.
+/// is averaged over fits to the samples and to blocks of 2, 4, 8, 16 and 32 samples, as long as there are 15 blocks.
 ///
 /// No estimate detects a correlation time that exceeds the length of the series. No error is below s/N.
 pub fn estimate(series: &[f64]) -> Result<Estimate, ObserveError> {
@@ -186,7 +186,8 @@ fn autoregression(x: &[f64]) -> f64 {
     let scaled = |x: &f64| (x - mean) / largest;
     let (mut forward, mut backward): (Vec<f64>, Vec<f64>) = x.iter().map(|x| (scaled(x), scaled(x))).unzip();
     let highest = (count / 4).min((10.0 * n.log10()) as usize);
-    let mut residue = sum_of_squares(&forward) / n;
+    let total = sum_of_squares(&forward) / n;
+    let mut residue = total;
     let mut coefficients: Vec<f64> = Vec::with_capacity(highest);
     // The criterion of each order, and the variance of the mean.
     let mut orders: Vec<(f64, f64)> = Vec::with_capacity(highest + 1);
@@ -215,8 +216,10 @@ fn autoregression(x: &[f64]) -> f64 {
         let parameters = (order + 1) as f64;
         let criterion = n * residue.ln() + 2.0 * parameters * n / (n - parameters - 1.0).max(1.0);
         let gain = 1.0 + coefficients.iter().sum::<f64>();
-        // The mean and the coefficients are fitted, so the sample size is reduced by their number.
+        // The mean and the coefficients are fitted, so the sample size is reduced by their number. Deviations from the mean of the
+        // samples are smaller than those from the true mean, by the variance of the mean.
         let variance = residue * (1.0 + parameters / n) / n / (gain * gain);
+        let variance = variance * (1.0 + (variance / total).min(1.0));
         if criterion.is_finite() && variance.is_finite() {
             orders.push((criterion, variance));
         }
@@ -304,8 +307,8 @@ mod tests {
     }
 
     /// The spread of means divided by the reported errors, for short series and for series of the length that observables
-    /// keep, within the bounds that hold for observables. The spread of 400 means is known to 4 %, so a ratio crosses the
-    /// bound 1.15 by chance less than once in 50 runs. The seed is fixed.
+    /// keep, within the bounds that hold for observables. The true ratios are 0.95 to 1.13. The spread of 1600 means is known to
+    /// 1.8 %, so one of the 22 crosses the bound 1.15 by chance once in five sets of seeds. The seed is fixed.
     #[test]
     fn errors_are_the_spread_of_means() {
         let mut rng = StdRng::seed_from_u64(23);
@@ -345,15 +348,20 @@ mod tests {
                 sum(autoregressive(0.0, n, rng), autoregressive((-32.0 / n as f64).exp(), n, rng), 0.33)
             }),
         ];
+        let mut outside = Vec::new();
         for (name, make) in cases {
             for n in [100, 511] {
-                let found: Vec<Estimate> = (0..400).map(|_| estimate(&make(n, &mut rng)).unwrap()).collect();
-                let spread = (found.iter().map(|e| e.mean * e.mean).sum::<f64>() / 400.0).sqrt();
-                let reported = found.iter().map(|e| e.error).sum::<f64>() / 400.0;
+                let found: Vec<Estimate> = (0..1600).map(|_| estimate(&make(n, &mut rng)).unwrap()).collect();
+                let spread = (found.iter().map(|e| e.mean * e.mean).sum::<f64>() / 1600.0).sqrt();
+                let reported = found.iter().map(|e| e.error).sum::<f64>() / 1600.0;
                 let ratio = spread / reported;
-                assert!((0.8..1.25).contains(&ratio), "{name}, {n} samples: {ratio}");
+                println!("{name}, {n} samples: {ratio:.3}");
+                outside.extend(
+                    (!(0.85..1.15).contains(&ratio)).then(|| format!("{name}, {n} samples: {ratio}")),
+                );
             }
         }
+        assert!(outside.is_empty(), "{outside:?}");
     }
 
     #[test]

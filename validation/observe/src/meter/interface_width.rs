@@ -18,7 +18,7 @@ impl Meter for InterfaceWidth {
                 proportion to their noise. `width`, `thickness` (2 z₀). `liquid` and `vapour` are not those of the fit, \
                 which averages over the layers near the surface: they are means of the profile over its plateaus, \
                 farther from each interface than four times `width_10_90`. Where less than a fifth such distance is \
-                left, a note says so and the error is larger. Where the interface is no tanh \
+                left, a note says by how much its layers may change a density; errors are those of chance alone. Where the interface is no tanh \
                 the fit misleads, so the profile's own widths are given too: `width_10_90`, between the places where \
                 10 and 90 % of the way between the plateaus are made (1.10 w of a tanh), and `width_slope`, w with the \
                 slope of a straight line through three tenths of the interface. If nothing can be fitted `width` has no \
@@ -26,6 +26,8 @@ impl Meter for InterfaceWidth {
         keys: &[AXIS, BINS],
         ..PLAIN
     };
+
+    const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<InterfaceWidth, FileError> {
         let across = Across::read(options, true)?;
@@ -50,7 +52,7 @@ impl Meter for InterfaceWidth {
         let profile = |means: &[f64]| -> Vec<(f64, f64)> {
             centres.iter().zip(means).map(|(z, n)| (*z, n / volume)).collect()
         };
-        let mut fit = self.series.jackknife(|means| {
+        let fit = self.series.jackknife(|means| {
             let profile = profile(means);
             let found = slab_edges(&profile)?;
             let fit = interface(&profile);
@@ -61,21 +63,18 @@ impl Meter for InterfaceWidth {
             true => [0.0; 2],
             false => slab_edges(&profile(&self.series.means())).map_or([0.0; 2], |found| found.doubt),
         };
-        for (measured, doubt) in fit.iter_mut().skip(1).zip(doubt) {
-            measured.error = measured.error.hypot(doubt);
-        }
-        let narrow: Vec<&str> = ["liquid", "vapour"]
+        let narrow: Vec<String> = ["liquid", "vapour"]
             .into_iter()
             .zip(doubt)
             .filter(|(_, doubt)| *doubt > 0.0)
-            .map(|d| d.0)
+            .map(|(name, doubt)| format!("that of the {name} by {doubt:.4}"))
             .collect();
         let note = match (fit.is_empty(), narrow.is_empty()) {
             (true, _) => "The profile is not that of a slab.".into(),
             (_, true) => String::new(),
             _ => format!(
-                "The plateau of the {} is narrow: its density may be off by layers of the surface, as its error says.",
-                narrow.join(" and of the ")
+                "Plateaus are narrow: layers of the surface may change a density, {}, which is not in its error.",
+                narrow.join(" and ")
             ),
         };
         let at = |k: usize| [fit.get(k).copied().unwrap_or(Measured::NONE)];
