@@ -27,8 +27,9 @@ const PROBES: usize = 1000;
 /// A particle with a larger c is ordered.
 const ORDERED: f64 = 0.5;
 
-/// The smallest share of ordered particles in a crystal; half of the particles of a small drop are at its surface.
-const SHARE: f64 = 0.3;
+/// The smallest share of ordered particles in a crystal, in two and in three dimensions: half of the particles of a small drop are at
+/// its surface. In liquids just above melting less than 1 % are ordered in space, in the plane an eighth and more.
+const SHARE: [f64; 2] = [0.5, 0.3];
 
 /// The largest root mean square displacement in a crystal, in distances of neighbours: twice that of vibrations by Lindemann's rule at
 /// melting, as it is a difference of four positions.
@@ -62,6 +63,7 @@ pub struct Sight<'a> {
 pub struct Order {
     samples: u64,
     start: f64,
+    dimensions: usize,
     probes: Vec<Probe>,
     /// The last two looks, at times one of which is twice the other.
     looks: Vec<Look>,
@@ -196,7 +198,7 @@ impl Order {
     }
 
     fn begin(&mut self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) {
-        self.start = sight.time;
+        (self.start, self.dimensions) = (sight.time, sight.dimensions);
         let mut mobile: Vec<usize> = (0..sight.x.len()).filter(|k| moves(*k)).collect();
         mobile.sort_unstable_by_key(|k| sight.tags[*k]);
         let chosen = mobile.iter().copied().step_by(mobile.len().div_ceil(PROBES).max(1));
@@ -269,7 +271,7 @@ impl Order {
         let [before, last] = self.looks[..] else { return None };
         let resolved = self.samples >= LEAST_SAMPLES && last.time >= LEAST_FLIGHTS * last.flight;
         let stays = last.square.sqrt() <= CAGE && last.square <= GROWTH * before.square;
-        (resolved && stays && last.ordered >= SHARE).then_some(Crystal {
+        (resolved && stays && last.ordered >= SHARE[usize::from(self.dimensions > 2)]).then_some(Crystal {
             ordered: last.ordered,
             displacement: last.square.sqrt(),
             time: last.time,
