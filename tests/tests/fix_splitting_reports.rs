@@ -105,7 +105,7 @@ fn the_drag_on_a_held_atom_is_reported() {
 
 /// A liquid that a force drives along two walls: what `fix setforce` reports of the walls is, in the mean, the momentum that the
 /// liquid loses, with walls in the group of the fix and outside, whether they are at rest or slide, and whether energies are asked
-/// for at each timestep or not. Drag and noise are a fifth of it. What is left at the two ends of the run is some ten units of
+/// for at each timestep or not. What is left at the two ends of the run is some ten units of
 /// momentum, of some two thousand.
 #[test]
 fn the_force_on_walls_balances_the_drive() {
