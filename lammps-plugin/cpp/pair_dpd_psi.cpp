@@ -63,7 +63,8 @@ class PairDPDPsi : public PairPsi {
   void set_names(const std::vector<std::string> &given)
   {
     names.clear();
-    for (const auto &name : given) names.push_back(name);
+    // A name that is not UTF-8 is that of no species, and the model says so.
+    for (const auto &name : given) names.push_back(rust::String::lossy(name));
     for (int i = 1; i <= atom->ntypes; i++)
       for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = given[i - 1] != "NULL" && given[j - 1] != "NULL";
   }
@@ -91,9 +92,10 @@ void PairDPDPsi::coeff(int narg, char **arg)
   if (path.empty()) path = arg[2];
   set_names({arg + 3, arg + narg});
   attempt<true>([&] {
-    const std::string read(read_model(path));
-    style_from_text(path, read, update->unit_style, kt(), names, domain->dimension);
-    source = path;
+    const std::string read(read_model({reinterpret_cast<const uint8_t *>(path.data()), path.size()}));
+    const std::string shown(rust::String::lossy(path));
+    style_from_text(shown, read, update->unit_style, kt(), names, domain->dimension);
+    source = shown;
     text = read;
   });
   given = true;

@@ -5,6 +5,8 @@ use crate::style::{Style, guard};
 use psidpd_core::document::Document;
 use psidpd_core::engine::{Mark, Path, SpecialPair, Surroundings, Want};
 use psidpd_core::model::{DragWeight, SplinePair, WarrenPair};
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 
 #[cxx::bridge(namespace = "psidpd")]
 mod ffi {
@@ -149,7 +151,8 @@ mod ffi {
         type Style;
 
         /// The text of a model file.
-        fn read_model(path: &str) -> Result<String>;
+        /// The path is bytes, which need not be UTF-8.
+        fn read_model(path: &[u8]) -> Result<String>;
         fn style_from_text(
             source: &str,
             text: &str,
@@ -272,8 +275,8 @@ mod ffi {
 
 pub use ffi::{Atoms, Effort, Extent, Heat, Listed, Movers, Request, Round, Totals, Wants};
 
-pub fn read_model(path: &str) -> Result<String, StyleError> {
-    guard(|| Ok(Document::open(path.as_ref())?.source.text().to_owned()))
+pub fn read_model(path: &[u8]) -> Result<String, StyleError> {
+    guard(|| Ok(Document::open(OsStr::from_bytes(path).as_ref())?.source.text().to_owned()))
 }
 
 #[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.

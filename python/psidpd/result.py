@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import tempfile
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _psidpd
 from .errors import InputError
+from .files import read
 from .scenes import AnyPath, AnyScene, opened, toml
 
 if TYPE_CHECKING:
@@ -90,7 +92,7 @@ def sweep(
 
     axes = [(key, [value if isinstance(value, str) else toml(value) for value in values]) for key, values in over.items()]
     _psidpd.sweep(os.fspath(scene), axes, os.fspath(out), jobs, threads, overwrite)
-    return pandas.read_csv(Path(out) / "sweep.csv")
+    return pandas.read_csv(io.StringIO(read(Path(out) / "sweep.csv")))
 
 
 class Result:
@@ -106,8 +108,8 @@ class Result:
         return f"<psidpd.Result of {self.about['title']!r} in {str(self.folder)!r}>"
 
     def _json(self, name: str) -> Any:
-        path = self.folder / name
-        return json.loads(path.read_text()) if path.is_file() else None
+        text = read(self.folder / name)
+        return None if text is None else json.loads(text)
 
     @property
     def about(self) -> dict[str, Any]:
@@ -145,7 +147,7 @@ class Result:
         Raises InputError for a run that is not finished.
         """
         path = self.folder / "final.data"
-        if not path.is_file():
+        if path.is_symlink() or not path.is_file():
             raise InputError(f"{self.folder} has no final.data: the run is not finished")
         return _psidpd.read_positions(path)
 
@@ -154,7 +156,10 @@ class Result:
         """The totals of thermo.csv, a DataFrame with one row for every `thermo` steps. Units are in `.attrs["units"]`."""
         import pandas
 
-        table = pandas.read_csv(self.folder / "thermo.csv")
+        text = read(self.folder / "thermo.csv")
+        if text is None:
+            raise InputError(f"{self.folder} has no thermo.csv: the scene asks for none")
+        table = pandas.read_csv(io.StringIO(text))
         table.attrs["units"] = {column["name"]: column["unit"] for column in self.about["thermo"]}
         return table
 

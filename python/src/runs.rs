@@ -3,6 +3,7 @@ use crate::errors::{RunStoppedError, exception, wrong};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use psidpd::experiments::sweep::{self as sweeps, Axis, Options};
 use psidpd::formats::Configuration;
+use psidpd::formats::files::Existing;
 use psidpd::observe;
 use psidpd::report::{headline, write_run_report};
 use psidpd::run::{Begin, Outcome, Runner};
@@ -91,7 +92,7 @@ pub fn run_scene(
         });
         if report && outcome.as_ref().err().is_none_or(psidpd::run::RunError::is_stop) {
             // If both fail, the error of the run is more informative than the error of the page.
-            let page = write_run_report(&out);
+            let page = write_run_report(&out, Existing::Keep);
             if outcome.is_ok() {
                 page?;
             }
@@ -173,8 +174,7 @@ pub fn sweep(
             (runs.join(), raised)
         })
     });
-    let points = ended.map_err(|_| RunStoppedError::new_err("the sweep failed"))?.map_err(exception)?;
-    sweeps::write(&options, &points).map_err(exception)?;
+    ended.map_err(|_| RunStoppedError::new_err("the sweep failed"))?.map_err(exception)?;
     raised.map_or(Ok(()), Err)
 }
 

@@ -16,7 +16,7 @@ const STAMP: &str = "psidpd-installed.txt";
 pub fn python() -> &'static PathBuf {
     static PYTHON: OnceLock<PathBuf> = OnceLock::new();
     PYTHON.get_or_init(|| {
-        let base = base_dir();
+        let base = base_dir().expect("there is a folder for environments");
         std::fs::create_dir_all(&base).expect("the folder for environments can be made");
         // Other tests may do this at the same time; the lock ends with this process at the latest.
         let lock = std::fs::File::create(base.join("readers.lock")).expect("the lock can be made");
@@ -32,10 +32,10 @@ pub fn python() -> &'static PathBuf {
         let system = std::env::var_os("PSIDPD_PYTHON").unwrap_or_else(|| "python3".into());
         let list = base.join("readers.txt");
         std::fs::write(&list, REQUIREMENTS).expect("the list of packages can be written");
-        run(Command::new(system).args(["-m", "venv"]).arg(&venv), "Debian: apt install python3-venv");
+        run(Command::new(system).args(["-Im", "venv"]).arg(&venv), "Debian: apt install python3-venv");
         run(
             Command::new(&python)
-                .args(["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"])
+                .args(["-Im", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"])
                 .args(["--require-hashes", "--only-binary=:all:", "-r"])
                 .arg(&list),
             "the versions in tests/python/requirements.txt are for Python 3.10 to 3.13, from PyPI; PSIDPD_PYTHON \

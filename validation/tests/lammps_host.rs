@@ -331,7 +331,7 @@ fn eam_tables_give_the_model_they_were_made_from() {
         density: &w,
         pair: &phi,
     }
-    .write(&dir.path().join("test.eam"))
+    .write(&dir.path().join("test.eam"), psidpd::formats::files::Existing::Keep)
     .unwrap();
     let l = Lammps::open(&host(), &[]).unwrap();
     let text = FLUID

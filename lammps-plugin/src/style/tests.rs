@@ -89,7 +89,7 @@ fn densities_of_one_step_leave_later_steps_to_the_sweep() {
 fn mistakes_are_named() {
     assert!(style(&["C"], 3).unwrap_err().to_string().contains("no species \"C\"; the model has A, B"));
     assert!(style(&["A"], 2).unwrap_err().to_string().contains("dimensions = 3, the simulation has 2"));
-    let missing = crate::bridge::read_model("nowhere.toml").unwrap_err();
+    let missing = crate::bridge::read_model(b"nowhere.toml").unwrap_err();
     assert!(missing.to_string().contains("nowhere.toml: cannot be read"), "{missing}");
 }
 

@@ -5,6 +5,7 @@ use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Begin, RunError, Runner};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::PathError;
+use psidpd_formats::files::read_json_if_there;
 use psidpd_observe::{Measured, Observation};
 use psidpd_report::Progress;
 use std::fmt::Write;
@@ -102,8 +103,8 @@ pub struct Observed(pub Vec<Observation>);
 impl Observed {
     pub fn read(folder: &Path) -> Result<Observed, RunError> {
         let path = folder.join("observables.json");
-        let read = || -> std::io::Result<_> { Ok(serde_json::from_str(&std::fs::read_to_string(&path)?)?) };
-        Ok(Observed(read().map_err(PathError::at("read", &path))?))
+        let missing = || PathError::at("read", &path)(std::io::ErrorKind::NotFound.into());
+        Ok(Observed(read_json_if_there(&path)?.ok_or_else(missing)?))
     }
 
     pub fn get(&self, name: &str) -> Option<&Observation> {

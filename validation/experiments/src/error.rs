@@ -76,8 +76,6 @@ pub enum ExperimentError {
         model.display()
     )]
     NoCorrection { model: PathBuf, low: f64, high: f64, failed: String },
-    #[error("cannot make a folder for the runs: {0}")]
-    Folder(std::io::Error),
     #[error("{points} runs are more than the {most} that a sweep may have: use fewer values")]
     TooManyRuns { points: usize, most: usize },
     #[error(

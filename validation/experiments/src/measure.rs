@@ -4,7 +4,7 @@ use crate::bulk::{Bulk, Sampling};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, run_scene};
 use psidpd_dynamics::scene::Scene;
-use psidpd_formats::PathError;
+use psidpd_formats::files::temporary_folder;
 use psidpd_report::{Headline, headline};
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -56,7 +56,7 @@ pub fn slab(model: &Model, file: &Path, kt: f64, liquid: f64, effort: Effort) ->
 }
 
 fn in_a_folder(scene: &Scene) -> Result<Headline, RunError> {
-    let folder = tempfile::tempdir().map_err(PathError::at("create", &std::env::temp_dir()))?;
+    let folder = temporary_folder()?;
     run_scene(scene, folder.path(), &mut |_| ())?;
     Ok(headline(folder.path()))
 }

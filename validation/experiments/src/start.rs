@@ -7,6 +7,7 @@ use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Want};
 use psidpd_core::model::Model;
 use psidpd_dynamics::particles::maxwell;
 use psidpd_dynamics::run::{Integrator, RunError, Simulation, State};
+use psidpd_formats::files::{Existing, read_inside, work_folder, write_bytes};
 use rand::{RngExt, SeedableRng};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -107,12 +108,12 @@ const STEPS: u64 = 300;
 
 /// A full cube of the fluid in equilibrium: made once, then from `folder`.
 pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, ExperimentError> {
-    std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
+    work_folder(folder)?;
     // The state depends on model, seed and length of the run.
     let key = crc32fast::hash(format!("{} {SEED} {STEPS}", subject.text).as_bytes());
     let file = |end: &str| folder.join(format!("{}-{size}-{key:08x}.{end}", subject.name));
     let (kept, data, data_mdpd) = (file("state"), file("data"), file("mdpd.data"));
-    let found = std::fs::read(&kept).ok().and_then(|bytes| postcard::from_bytes::<State>(&bytes).ok());
+    let found = read_inside(&kept).ok().and_then(|bytes| postcard::from_bytes::<State>(&bytes).ok());
     if let Some(state) = found.filter(|_| data.is_file() && data_mdpd.is_file()) {
         return Ok(Start { state, data, data_mdpd });
     }
@@ -122,7 +123,7 @@ pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, Expe
     text.write_mdpd(&data_mdpd)?;
     // Written last: its presence shows that the others are complete.
     let bytes = postcard::to_stdvec(&state).map_err(ExperimentError::at(&kept))?;
-    psidpd_formats::files::write_atomically(&kept, &bytes)?;
+    write_bytes(&kept, Existing::Keep, &bytes)?;
     Ok(Start { state, data, data_mdpd })
 }
 

@@ -1,7 +1,7 @@
 //! `about.json`: a description of a run, and of the columns of its series.
 
 use super::FormatError;
-use crate::files::{read_json_if_there, write_json};
+use crate::files::{PathError, read_json_if_there, replace_inside};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -101,8 +101,12 @@ pub const THERMO: [(&str, &str, &str); 12] = [
 pub const UNITS: &str = "reduced: length, energy and mass are those of the model file";
 
 impl About {
+    pub const NAME: &str = "about.json";
+
     pub fn write(&self, folder: &Path) -> Result<(), FormatError> {
-        Ok(write_json(&folder.join("about.json"), self)?)
+        let path = folder.join(About::NAME);
+        let text = serde_json::to_string_pretty(self).map_err(|e| PathError::at("write", &path)(e.into()))?;
+        Ok(replace_inside(&path, (text + "\n").as_bytes(), true)?)
     }
 
     /// The first value that no run can have, for another program may have written the file.
@@ -131,7 +135,7 @@ impl About {
 
     /// Reads `about.json` of a folder; `None` if the file does not exist.
     pub fn read(folder: &Path) -> Result<Option<About>, FormatError> {
-        let path = folder.join("about.json");
+        let path = folder.join(About::NAME);
         let Some(about) = read_json_if_there::<About>(&path)? else { return Ok(None) };
         match about.fault() {
             Some(message) => Err(FormatError::content(&path)(message)),

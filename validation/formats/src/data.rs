@@ -4,8 +4,9 @@ use std::collections::{HashMap, HashSet};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
+use super::FormatError;
+use super::files::{Existing, PathError, write_result};
 use super::text::{Problem, TextError, finite, out_of_range, shown, whole};
-use super::{FormatError, PathError};
 
 /// This text precedes the periodic directions in a title.
 const BOUNDARY: &str = "; boundary ";
@@ -58,16 +59,20 @@ const XYZ: [&str; 3] = ["x", "y", "z"];
 
 impl DataFile {
     pub fn read(path: &Path) -> Result<DataFile, FormatError> {
+        DataFile::parse(&DataFile::text(path)?).map_err(FormatError::content(path))
+    }
+
+    fn text(path: &Path) -> Result<String, PathError> {
         let mut bytes = Vec::new();
         psidpd_core::document::open_regular(path)
             .and_then(|mut file| file.read_to_end(&mut bytes))
             .map_err(PathError::at("read", path))?;
-        DataFile::parse(&String::from_utf8_lossy(&bytes)).map_err(FormatError::content(path))
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
     /// The line of an atom in a file, counted from 1, for messages.
     pub fn line_of(path: &Path, id: u32) -> Option<usize> {
-        let text = String::from_utf8_lossy(&std::fs::read(path).ok()?).into_owned();
+        let text = DataFile::text(path).ok()?;
         let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
         let atoms = text.lines().position(|line| first(line).as_deref() == Some("Atoms"))?;
         let line =
@@ -87,19 +92,19 @@ impl DataFile {
         Ok(data)
     }
 
-    pub fn write(&self, path: &Path) -> Result<(), FormatError> {
-        self.save(path, Style::Atomic)
+    /// Writes a file that must not exist, except in a folder of psidpd's own work.
+    pub fn write(&self, path: &Path) -> Result<(), PathError> {
+        self.write_over(path, Existing::Keep)
+    }
+
+    /// Writes a file as the user says.
+    pub fn write_over(&self, path: &Path, existing: Existing) -> Result<(), PathError> {
+        write_result(path, existing, |mut out| self.print(&mut out, Style::Atomic))
     }
 
     /// Writes a file of `atom_style mdpd`, with densities of zero, which that style computes anew.
-    pub fn write_mdpd(&self, path: &Path) -> Result<(), FormatError> {
-        self.save(path, Style::Mdpd)
-    }
-
-    fn save(&self, path: &Path, style: Style) -> Result<(), FormatError> {
-        let file = std::fs::File::create(path).map_err(PathError::at("write", path))?;
-        let mut out = io::BufWriter::new(file);
-        Ok(self.print(&mut out, style).and_then(|()| out.flush()).map_err(PathError::at("write", path))?)
+    pub fn write_mdpd(&self, path: &Path) -> Result<(), PathError> {
+        write_result(path, Existing::Keep, |mut out| self.print(&mut out, Style::Mdpd))
     }
 
     /// The periodic directions, if the title has them as [`DataFile::with_boundary`] writes them.

@@ -6,6 +6,7 @@
 //! origin, so positions are shifted by the middle of the box.
 
 use super::Frame;
+use super::files::{create_inside, open_inside_to_write};
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::FileExt;
@@ -83,9 +84,9 @@ pub struct GsdFile {
 }
 
 impl GsdFile {
-    /// Creates a file without frames and with room for `most` of them.
+    /// Creates a file in the folder of a run, which must not exist, without frames and with room for `most` of them.
     pub fn create(path: &Path, most: u64) -> io::Result<GsdFile> {
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(path)?;
+        let file = create_inside(path)?;
         let end = INDEX + ENTRY * entries(most);
         let mut head = Vec::new();
         for number in [MAGIC, INDEX, entries(most), HEADER, NAMES.len() as u64] {
@@ -109,7 +110,7 @@ impl GsdFile {
     /// Opens a file to continue it after its first `frames` frames, and removes the others.
     pub fn reopen(path: &Path, frames: u64) -> io::Result<GsdFile> {
         let wrong = |what: &str| io::Error::new(ErrorKind::InvalidData, what.to_owned());
-        let file = File::options().read(true).write(true).open(path)?;
+        let file = open_inside_to_write(path)?;
         let number = |at: u64| -> io::Result<u64> {
             let mut bytes = [0; 8];
             file.read_exact_at(&mut bytes, at)?;
@@ -135,8 +136,18 @@ impl GsdFile {
                 None => return Err(wrong(&format!("it has fewer than {frames} frames"))),
             }
         }
-        let rest = room.saturating_sub(kept) * ENTRY;
-        file.write_all_at(&vec![0; rest as usize], INDEX + ENTRY * kept)?;
+        // Entries follow each other, and no entry is zero: behind a block of zeros there are no more.
+        let (mut at, index_end) = (INDEX + ENTRY * kept, INDEX + ENTRY * room);
+        while at < index_end {
+            let mut block = vec![0; (index_end - at).min(1 << 16) as usize];
+            file.read_exact_at(&mut block, at)?;
+            if block.iter().all(|byte| *byte == 0) {
+                break;
+            }
+            block.fill(0);
+            file.write_all_at(&block, at)?;
+            at += block.len() as u64;
+        }
         file.set_len(end)?;
         let most = (room + LATER).saturating_sub(NAMES.len() as u64) / LATER;
         Ok(GsdFile { file, frames, most, end })
@@ -249,6 +260,7 @@ mod tests {
             std::fs::write(&path, &whole[..length as usize - 1]).unwrap();
             assert!(GsdFile::reopen(&path, kept).is_err(), "{kept}");
         }
+        std::fs::remove_file(&path).unwrap();
         let mut file = GsdFile::create(&path, 4).unwrap();
         write(&mut file, 0..2);
         assert!(GsdFile::reopen(&path, 3).is_err() && GsdFile::reopen(&path, 5).is_err());

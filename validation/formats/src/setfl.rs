@@ -6,7 +6,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::{FormatError, PathError};
+use super::files::{Existing, PathError, write_result};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
@@ -43,10 +43,8 @@ pub struct Setfl<'a> {
 }
 
 impl Setfl<'_> {
-    pub fn write(&self, path: &Path) -> Result<(), FormatError> {
-        let mut text = Vec::new();
-        let made = self.write_to(&mut text).and_then(|()| std::fs::write(path, text));
-        Ok(made.map_err(PathError::at("write", path))?)
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<(), PathError> {
+        write_result(path, existing, |mut out| self.write_to(&mut out))
     }
 
     /// Writes the table with 17 significant digits. Values that LAMMPS cannot use are an error of kind `InvalidInput`.

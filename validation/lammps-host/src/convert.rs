@@ -18,7 +18,7 @@ mod tests;
 use super::error::LammpsError;
 use data::{DataFile, data_file};
 use psidpd_core::document::open_regular;
-use psidpd_formats::files::write_atomically;
+use psidpd_formats::files::{Existing, may_replace, protect, write_bytes};
 use psidpd_formats::{FormatError, PathError};
 use std::path::{Path, PathBuf};
 use work::script;
@@ -67,7 +67,7 @@ pub fn files(
     law: Law,
     plugin: Option<&str>,
     out: Option<&Path>,
-    overwrite: bool,
+    existing: Existing,
 ) -> Result<(Vec<PathBuf>, Converted), LammpsError> {
     let read = |path: &Path| {
         open_regular(path).and_then(std::io::read_to_string).map_err(PathError::at("read", path))
@@ -99,6 +99,7 @@ pub fn files(
             None => new.left.push(Note { text: format!("{name} {without_out}"), ..note.clone() }),
         }
     }
+<<<<<<< HEAD
     for (k, (note, text)) in std::mem::take(&mut new.models).into_iter().enumerate() {
         let nearest = match out {
             Some(path) => {
@@ -113,15 +114,14 @@ pub fn files(
         };
         new.by_hand.push(Note { text: note.text.replace("NEAREST", &nearest), ..note });
     }
+=======
+    let named = new.included.iter().map(|(name, _)| name).chain(new.data.iter().map(|data| &data.name));
+    let _inputs = protect(named.map(|name| beside(old, name)).chain([old.to_owned()]));
+>>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
     // No file is written unless all can be: existing files may be somebody's work.
-    if let Some((path, _)) = results.iter().find(|(path, _)| !overwrite && path.is_file()) {
-        let path = path.display();
-        return Err(LammpsError::Request(format!(
-            "{path} already exists: replace it with --overwrite, or choose another --out"
-        )));
-    }
+    results.iter().try_for_each(|(path, _)| may_replace(path, existing))?;
     for (path, text) in &results {
-        write_atomically(path, text.as_bytes())?;
+        write_bytes(path, existing, text.as_bytes())?;
     }
     Ok((results.into_iter().map(|(path, _)| path).collect(), new))
 }

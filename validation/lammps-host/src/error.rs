@@ -83,8 +83,17 @@ pub enum LammpsError {
     NoHeader { header: &'static str, include: PathBuf, package: &'static str },
     #[error("no C++ compiler ({compiler} does not run): install one (Debian: apt install g++) or set CXX")]
     NoCompiler { compiler: String },
-    #[error("the plugin is built from the psidpd sources, but {} does not exist: run from a checkout", path.display())]
-    NoSources { path: PathBuf },
+    #[error(
+        "the plugin is built from the psidpd sources: run from a checkout the program that was built in it"
+    )]
+    NoSources,
+    #[error(
+        "{} {why}, and what others can change is not executed: correct its owner and its mode, or name a folder by \
+         PSIDPD_LAMMPS_DIR", path.display()
+    )]
+    Untrusted { path: PathBuf, why: String },
+    #[error("there is no place for LAMMPS, because the user has no home: set PSIDPD_LAMMPS_DIR to a folder")]
+    NoHome,
     #[error("building the plugin failed:\n{output}")]
     Build { output: String },
     #[error("cannot tell which LAMMPS {} was built for ({reason}): build it again with `psidpd lammps plugin`", plugin.display())]

@@ -14,6 +14,7 @@ use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 use super::error::{LammpsError, PathError, tail};
 use super::mpi::{self, Mpi};
+use psidpd_formats::files::remove_if_there;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostKind {
@@ -394,7 +395,7 @@ fn run_limited(
     let elapsed = start.elapsed();
     if status.is_some_and(|s| !s.success()) {
         // MPICH leaves this file when a program on one rank aborts; under a launcher it removes its files itself.
-        let _ = fs::remove_file(format!("/dev/shm/mpich_shm_{:x}_0", child.id()));
+        let _ = remove_if_there(Path::new(&format!("/dev/shm/mpich_shm_{:x}_0", child.id())));
     }
     // Both pipes end with the processes; the wait is short because a stray process may keep one open.
     for _ in 0..2 {
@@ -436,7 +437,7 @@ fn stop(child: &mut Child) {
     let _ = child.wait();
     // MPICH removes these files when a run ends normally.
     for path in shared {
-        let _ = fs::remove_file(path);
+        let _ = remove_if_there(&path);
     }
 }
 

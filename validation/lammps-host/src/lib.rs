@@ -19,6 +19,7 @@ mod made_from;
 mod mpi;
 pub mod plugin;
 mod record;
+mod trust;
 
 pub use error::LammpsError;
 pub use host::{Host, HostKind, HostVersion, RunOutput};

@@ -1,7 +1,7 @@
 //! Builds psidpd's pair styles as a plugin for a host, and reads for which LAMMPS a plugin was built.
 
 use std::ffi::OsString;
-use std::fs;
+use std::fs::{self, create_dir_all};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{LammpsError, PathError, tail};
 use super::host::{Host, HostKind, HostVersion};
-use super::install::{Lock, base_dir, checkout, venv_dir};
+use super::install::{Lock, base_dir, check_own, venv_dir};
 use super::made_from;
-use psidpd_formats::files::remove_if_there;
+use super::trust::checkout;
+use psidpd_formats::files::{copy_program, read_inside, remove_if_there, replace_inside};
 
 /// The file that [`build`] makes for LAMMPS's `plugin load`.
 pub const FILE_NAME: &str = "psidpdplugin.so";
@@ -74,7 +75,9 @@ impl BuiltFor {
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
     let version = host.version()?;
     let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
+    let own = base_dir()?;
     let base = match host.kind {
+<<<<<<< HEAD
         HostKind::Environment if host.root == venv_dir() => base_dir(),
         // Wheels of one version differ by their update.
         HostKind::Environment => {
@@ -85,7 +88,16 @@ pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsErro
         }
         HostKind::Prefix => base_dir().join(name),
         HostKind::Source => base_dir().join(name + "-source"),
+=======
+        HostKind::Environment if host.root == venv_dir()? => own,
+        HostKind::Environment => own.join(name + "-wheel"),
+        HostKind::Prefix => own.join(name),
+        HostKind::Source => own.join(name + "-source"),
+>>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
     };
+    if base.exists() {
+        check_own(&base)?;
+    }
     build_for(host, &version, &base, progress)
 }
 
@@ -97,15 +109,8 @@ pub fn launcher(plugin: &Path) -> Option<PathBuf> {
 /// Installs LAMMPS as [`install`](super::install()) does, after a check that the plugin can be built, so that
 /// nothing is downloaded in vain.
 pub fn install_to_build(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
-    sources()?;
+    checkout()?;
     super::install(progress)
-}
-
-/// The checkout, with the sources of the plugin.
-fn sources() -> Result<PathBuf, LammpsError> {
-    let root = checkout().unwrap_or_else(|| PathBuf::from("."));
-    let manifest = root.join("lammps-plugin").join("Cargo.toml");
-    if manifest.is_file() { Ok(root) } else { Err(LammpsError::NoSources { path: manifest }) }
 }
 
 /// Builds the plugin in the folder `base` against the headers of `host`, for a LAMMPS of the given version,
@@ -116,7 +121,7 @@ pub fn build_for(
     base: &Path,
     progress: &dyn Fn(&str),
 ) -> Result<PathBuf, LammpsError> {
-    let root = sources()?;
+    let root = checkout()?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     build_with(host, version, base, &builds_dir(&root), &root, &cargo, progress)
 }
@@ -162,7 +167,7 @@ fn build_with(
 
     let waiting = || progress("waiting for another process that is building the plugin");
     for folder in [base, builds] {
-        fs::create_dir_all(folder).map_err(PathError::at("create", folder))?;
+        create_dir_all(folder).map_err(PathError::at("create", folder))?;
     }
     let _lock = Lock::new(&base.join("plugin.lock"), waiting)?;
     let (plugin, styles, launcher) = (base.join(FILE_NAME), base.join(STYLES), base.join(LAUNCHER));
@@ -212,11 +217,10 @@ fn build_with(
 
     // Renaming keeps a loaded plugin intact and shows only complete files to others. A plugin without its
     // note is refused, so an interruption cannot leave a plugin with a wrong note.
-    let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
+    let note = note_of(&plugin);
     remove_if_there(&note).map_err(PathError::at("remove", &note))?;
     for (from, to) in built {
-        fs::copy(&from, &temp).map_err(PathError::at("copy", &from))?;
-        fs::rename(&temp, to).map_err(PathError::at("write", to))?;
+        copy_program(&from, to)?;
     }
     drop(shared);
     built_for.sizes = sizes();
@@ -227,8 +231,7 @@ fn build_with(
     } else {
         build_launcher(host, &compiler, root, &launcher)?;
     }
-    fs::write(&temp, text).map_err(PathError::at("write", &temp))?;
-    fs::rename(&temp, &note).map_err(PathError::at("write", &note))?;
+    replace_inside(&note, text.as_bytes(), true)?;
     progress("the plugin is built");
     Ok(plugin)
 }
@@ -293,7 +296,8 @@ fn compiler() -> Result<Vec<String>, LammpsError> {
 /// Compiles the launcher, which finds the plugin in its own folder.
 fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path) -> Result<(), LammpsError> {
     let folder = launcher.parent().unwrap_or(Path::new("."));
-    let temp = launcher.with_extension("tmp");
+    let made = tempfile::tempdir_in(folder).map_err(PathError::at("write", launcher))?;
+    let temp = made.path().join(LAUNCHER);
     let source = root.join("lammps-plugin/launcher/main.cpp");
     let mut command = Command::new(&compiler[0]);
     command.args(&compiler[1..]).args(["-std=c++17", "-O2"]);
@@ -315,7 +319,7 @@ fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path
     if !out.status.success() {
         return Err(LammpsError::Build { output: tail(&String::from_utf8_lossy(&out.stderr), 30) });
     }
-    Ok(fs::rename(&temp, launcher).map_err(PathError::at("write", launcher))?)
+    Ok(copy_program(&temp, launcher)?)
 }
 
 /// The shared library of a target in cargo's messages.
@@ -345,8 +349,8 @@ pub fn built_for(plugin: &Path) -> Result<BuiltFor, LammpsError> {
         return Err(unknown("the file does not exist".into()));
     }
     let note = note_of(plugin);
-    let text = fs::read_to_string(&note).map_err(|e| unknown(format!("{}: {e}", note.display())))?;
-    serde_json::from_str(&text).map_err(|e| unknown(format!("{}: {e}", note.display())))
+    let text = read_inside(&note).map_err(|e| unknown(e.to_string()))?;
+    serde_json::from_slice(&text).map_err(|e| unknown(format!("{}: {e}", note.display())))
 }
 
 /// Refuses a plugin built for another LAMMPS or by another psidpd.

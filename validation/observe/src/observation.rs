@@ -2,8 +2,7 @@
 
 use super::series::{Measured, Series};
 use serde::{Deserialize, Serialize};
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::io::Write;
 
 /// The form of an observation on a plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -129,7 +128,8 @@ impl Observation {
         }
     }
 
-    fn csv(&self, to: &mut impl Write) -> std::io::Result<()> {
+    /// Writes the table: the abscissa, then each column with its error. Unknown values are empty fields.
+    pub fn csv(&self, to: &mut impl Write) -> std::io::Result<()> {
         let mut header: Vec<String> = self.x.iter().map(|x| x.name.clone()).collect();
         for c in &self.columns {
             header.extend([c.name.clone(), format!("{}_error", c.name)]);
@@ -146,19 +146,6 @@ impl Observation {
         }
         Ok(())
     }
-}
-
-/// Writes each observation as a CSV file into `folder`, which is created if it does not exist. The columns are the
-/// abscissa, then each column with its error. Unknown values are empty fields.
-pub fn write_csv(folder: &Path, observations: &[Observation]) -> std::io::Result<()> {
-    std::fs::create_dir_all(folder)?;
-    for observation in observations {
-        let mut file =
-            BufWriter::new(std::fs::File::create(folder.join(observation.file_name(observations)))?);
-        observation.csv(&mut file)?;
-        file.flush()?;
-    }
-    Ok(())
 }
 
 fn text_or_null<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
@@ -214,14 +201,13 @@ mod tests {
 
     #[test]
     fn csv_files_are_named_by_stage_only_if_need_be() {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("observables");
-        write_csv(&out, &[example("a")]).unwrap();
-        let text = std::fs::read_to_string(out.join("rdf.csv")).unwrap();
-        assert_eq!(text, "r,g,g_error\n0.5,1.0,0.25\n1.5,,\n");
-        write_csv(&out, &[example("cold"), example("hot/1"), example("hot 1")]).unwrap();
-        for name in ["rdf-cold.csv", "rdf-hot_1-2.csv", "rdf-hot_1-3.csv"] {
-            assert!(out.join(name).exists(), "{name}");
+        let mut text = Vec::new();
+        example("a").csv(&mut text).unwrap();
+        assert_eq!(String::from_utf8(text).unwrap(), "r,g,g_error\n0.5,1.0,0.25\n1.5,,\n");
+        assert_eq!(example("a").file_name(&[example("a")]), "rdf.csv");
+        let all = [example("cold"), example("hot/1"), example("hot 1")];
+        for (observation, name) in all.iter().zip(["rdf-cold.csv", "rdf-hot_1-2.csv", "rdf-hot_1-3.csv"]) {
+            assert_eq!(observation.file_name(&all), name);
         }
     }
 }

@@ -1,6 +1,7 @@
 use super::Image;
 use super::snapshot::{SNAPSHOTS, snapshots, step_of};
-use psidpd_formats::{FormatError, PathError};
+use psidpd_formats::FormatError;
+use psidpd_formats::files::read_inside;
 use std::path::Path;
 
 /// The largest number of frames of an animation. Longer series are thinned to every second, third, … frame.
@@ -17,7 +18,7 @@ pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
     let stride = all.len().div_ceil(MOST);
     let mut images = Vec::new();
     for path in all.iter().rev().step_by(stride) {
-        let bytes = std::fs::read(path).map_err(PathError::at("read", path))?;
+        let bytes = read_inside(path)?;
         let mut image = Image::from_png(&bytes).map_err(FormatError::content(path))?.reduced(2);
         if let Some(step) = step_of(path) {
             image.stamp(&format!("step {step}"));

@@ -2,9 +2,9 @@
 
 use super::FieldOptions;
 use psidpd_core::model::kernel::Kernel;
-use psidpd_formats::files::{PathError, replace_through};
+use psidpd_formats::files::{PathError, folder_inside, names_inside, remove_if_there, replace_inside};
 use psidpd_formats::{FormatError, Frame, Grid, write_vti, write_vtp};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The folder of these files in that of a run.
 pub const VTK: &str = "vtk";
@@ -83,31 +83,34 @@ pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
 /// created if it does not exist. A box with edges that are not along the axes gets no density.
 pub fn write_vtk(folder: &Path, frame: &Frame, kernel: Option<Kernel>) -> Result<(), FormatError> {
     let folder = folder.join(VTK);
-    std::fs::create_dir_all(&folder).map_err(PathError::at("write", &folder))?;
+    folder_inside(&folder).map_err(PathError::at("write", &folder))?;
     // The resumed run makes the same step.
-    let new = folder.join("unfinished.new");
     let mut bytes = Vec::new();
     write_vtp(frame, &mut bytes).map_err(PathError::at("write", &folder))?;
-    replace_through(&new, &folder.join(format!("particles-{:010}.vtp", frame.step)), &bytes)?;
+    replace_inside(&folder.join(format!("particles-{:010}.vtp", frame.step)), &bytes, false)?;
     if let Some(grid) = density_grid(frame, kernel) {
         bytes.clear();
         write_vti(&grid, frame, &mut bytes).map_err(PathError::at("write", &folder))?;
-        replace_through(&new, &folder.join(format!("density-{:010}.vti", frame.step)), &bytes)?;
+        replace_inside(&folder.join(format!("density-{:010}.vti", frame.step)), &bytes, false)?;
     }
     Ok(())
 }
 
 /// Removes VTK's files of an earlier run from the folder of a run.
 pub fn remove_vtk(folder: &Path) -> Result<(), FormatError> {
-    let Ok(entries) = std::fs::read_dir(folder.join(VTK)) else { return Ok(()) };
-    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
-        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
-        let own = [("particles-", ".vtp"), ("density-", ".vti"), ("unfinished", ".new")];
-        if own.iter().any(|(start, end)| name.starts_with(start) && name.ends_with(end)) {
-            std::fs::remove_file(&path).map_err(PathError::at("write", &path))?;
-        }
+    for path in vtk_files(folder) {
+        remove_if_there(&path).map_err(PathError::at("write", &path))?;
     }
     Ok(())
+}
+
+/// VTK's files in the folder of a run.
+pub fn vtk_files(folder: &Path) -> Vec<PathBuf> {
+    let own = [("particles-", ".vtp"), ("density-", ".vti"), ("unfinished", ".new")];
+    let is_own = |name: &str| own.iter().any(|(start, end)| name.starts_with(start) && name.ends_with(end));
+    let folder = folder.join(VTK);
+    let names = names_inside(&folder).into_iter().filter(|name| name.to_str().is_some_and(is_own));
+    names.map(|name| folder.join(name)).collect()
 }
 
 #[cfg(test)]

@@ -15,8 +15,8 @@ pub mod snapshot;
 
 pub use animation::animate;
 pub use field::{Field, FieldOptions, paint_field};
-pub use grid::{VTK, density_grid, remove_vtk, write_vtk};
+pub use grid::{VTK, density_grid, remove_vtk, vtk_files, write_vtk};
 pub use image::{Image, data_url};
 pub use particles::{ParticleOptions, draw_coloured, draw_particles};
 pub use projection::View;
-pub use snapshot::{remove_snapshots, write_snapshot};
+pub use snapshot::{remove_snapshots, snapshots, write_snapshot};

@@ -1,5 +1,5 @@
 use super::{ParticleOptions, draw_particles};
-use psidpd_formats::files::{PathError, replace_through};
+use psidpd_formats::files::{PathError, folder_inside, names_inside, remove_if_there, replace_inside};
 use psidpd_formats::{FormatError, Frame};
 use std::path::{Path, PathBuf};
 
@@ -19,27 +19,27 @@ pub(super) fn step_of(path: &Path) -> Option<u64> {
 /// The folder is created if it does not exist.
 pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatError> {
     let snapshots = folder.join(SNAPSHOTS);
-    std::fs::create_dir_all(&snapshots).map_err(PathError::at("write", &snapshots))?;
+    folder_inside(&snapshots).map_err(PathError::at("write", &snapshots))?;
     let path = snapshots.join(snapshot_name(frame.step));
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
     let png = image.to_png().map_err(FormatError::content(&path))?;
     // The resumed run makes the same step.
-    replace_through(&path.with_extension("png.new"), &path, &png)?;
+    replace_inside(&path, &png, false)?;
     Ok(path)
 }
 
 /// Removes the snapshots of an earlier run from the folder of a run.
 pub fn remove_snapshots(folder: &Path) -> Result<(), FormatError> {
     for path in snapshots(folder) {
-        std::fs::remove_file(&path).map_err(PathError::at("write", &path))?;
+        remove_if_there(&path).map_err(PathError::at("write", &path))?;
     }
     Ok(())
 }
 
 /// The snapshots in the folder of a run, in the order of their steps.
-pub(super) fn snapshots(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder.join(SNAPSHOTS)) else { return Vec::new() };
-    let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+pub fn snapshots(folder: &Path) -> Vec<PathBuf> {
+    let folder = folder.join(SNAPSHOTS);
+    let mut paths: Vec<PathBuf> = names_inside(&folder).iter().map(|name| folder.join(name)).collect();
     paths.retain(|p| {
         let name = p.file_name().and_then(|n| n.to_str()).unwrap_or("");
         name.starts_with("particles-") && name.ends_with(".png")

@@ -1,5 +1,6 @@
 //! The self-contained HTML report.
 
+use psidpd_formats::files::PAGE;
 use std::fmt::Display;
 
 use super::table::{Table, verdict};
@@ -72,7 +73,7 @@ impl Report {
             format!("<section>\n<h2>{}</h2>\n{items}</section>", escape(&section.heading))
         });
         format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n{PAGE}\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
              <meta name=\"color-scheme\" content=\"light dark\"/>\n\
              <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\

@@ -57,6 +57,12 @@ pub struct Arguments {
     measure_memory: Option<usize>,
 }
 
+impl Arguments {
+    pub fn files(&self) -> Files {
+        Files::default().writes(["bench.json", "report.html"].map(|name| self.out.join(name)))
+    }
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err("a positive number of seconds".into()) }
@@ -66,14 +72,14 @@ fn or_default(given: &[NonZeroUsize], default: &[usize]) -> Vec<usize> {
     if given.is_empty() { default.to_vec() } else { given.iter().map(|n| n.get()).collect() }
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     if let Some(particles) = arguments.measure_memory {
         let child = memory::child(particles)?;
         say!("{}", serde_json::to_string(&child)?);
         return Ok(Verdict::Good);
     }
     if let Some(device) = arguments.device.filter(|device| *device != Device::Cpu) {
-        return time_device(device, arguments, json);
+        return time_device(device, arguments, told);
     }
     let full = arguments.full;
     let sizes = if full { &SIZES[..] } else { &SIZES[..2] };
@@ -100,6 +106,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         words: arguments.psi.clone(),
         lammps: arguments.lammps.clone(),
         out: arguments.out.clone(),
+        existing: told.existing,
     };
     let program = super::program()?;
     let outcome = measure(&options, &program, &Progress::new())?;
@@ -128,17 +135,17 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         say!("the machine was busy before (load {load:.1}): do not trust these figures\n");
     }
     say!("report: {}", arguments.out.join("report.html").display());
-    conclude(json, &outcome, true)
+    conclude(told, &outcome, true)
 }
 
 #[cfg(not(feature = "gpu"))]
-fn time_device(_: Device, _: &Arguments, _: Option<&Path>) -> Result<Verdict, Failure> {
+fn time_device(_: Device, _: &Arguments, _: Told) -> Result<Verdict, Failure> {
     use psidpd_dynamics::{device::DeviceError, run::RunError};
     Err(RunError::from(DeviceError::NotBuilt).into())
 }
 
 #[cfg(feature = "gpu")]
-fn time_device(device: Device, arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+fn time_device(device: Device, arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     use psidpd_experiments::bench::device::{Options, run};
     let options = Options {
         device,
@@ -153,5 +160,5 @@ fn time_device(device: Device, arguments: &Arguments, json: Option<&Path>) -> Re
     say::table(&outcome.table());
     say!("nanoseconds per particle and step, by the clock of the device:");
     say::table(&outcome.kernels());
-    conclude(json, &outcome, true)
+    conclude(told, &outcome, true)
 }

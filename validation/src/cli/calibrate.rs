@@ -83,7 +83,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let a = arguments;
     let bad = |message: String| Failure::from(ExperimentError::Conditions(message));
     if !(a.tolerance > 0.0 && a.runs.dt > 0.0 && a.tolerance.is_finite() && a.runs.dt.is_finite()) {
@@ -104,7 +104,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         sampling: a.runs.sampling(a.particles as usize, a.equilibrate, a.steps),
     };
     let found = calibrate(&a.model, &options, &command(a), &mut |line| say!("{line}"))?;
-    write_atomically(&a.out, found.text.as_bytes())?;
+    write_bytes(&a.out, told.existing, found.text.as_bytes())?;
     let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
     let pm = |v: &psidpd_observe::Measured| format!("{:.5} ± {:.5}", v.value, v.error);
     for r in &found.residuals {
@@ -155,7 +155,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         );
     }
     say!("written to {}", a.out.display());
-    conclude(json, &found, found.converged)
+    conclude(told, &found, found.converged)
 }
 
 /// The command line that repeats the calibration.

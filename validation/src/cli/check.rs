@@ -45,7 +45,7 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
     }
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
     let (mut too_far, mut too_large) = (None, None);
     let mut mixtures = Vec::new();
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         findings.warnings.insert(0, Warning { id, severity: Severity::Error, message });
     }
     print(&findings, model.species());
-    conclude(json, &findings, findings.works())
+    conclude(told, &findings, findings.works())
 }
 
 fn duration(seconds: f64) -> String {

@@ -14,12 +14,12 @@ struct Report<'a> {
     devices: &'a [Found],
 }
 
-pub fn run(_: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(_: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let devices = device::gpus().map_err(RunError::from)?;
     let mut table = Table::new(["device", "name", "kind", "interface", "driver"]);
     for Found { device, name, kind, interface, driver } in &devices {
         table.push([device, name, kind, interface, driver]);
     }
     say::table(&table);
-    conclude(json, &Report { devices: &devices }, true)
+    conclude(told, &Report { devices: &devices }, true)
 }

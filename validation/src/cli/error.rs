@@ -9,6 +9,8 @@ pub enum CliError {
     /// The state in a data file does not fit the model.
     #[error("{}{}: {error}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
     NoState { path: PathBuf, line: Option<usize>, error: StateError },
+    #[error(transparent)]
+    Path(#[from] PathError),
     #[error("there is no case {0}: psidpd reproduce --list shows all")]
     UnknownCase(String),
     /// The results of a finished run cannot be written.

@@ -49,8 +49,9 @@ impl EamArguments {
     /// The file for the table.
     fn table(&self) -> PathBuf {
         self.out.clone().unwrap_or_else(|| {
-            let stem = self.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            PathBuf::from(format!("{stem}.eam.alloy"))
+            let mut name = self.model.file_stem().unwrap_or_default().to_owned();
+            name.push(".eam.alloy");
+            PathBuf::from(name)
         })
     }
 }
@@ -58,34 +59,40 @@ impl EamArguments {
 impl Verb {
     pub fn files(&self) -> Files {
         match self {
-            Verb::Eam(a) => Files::reads([&a.model]).writes([a.table()]),
-            Verb::Lammps(a) => Files::reads([&a.scene]).writes(deck::FILES.map(|name| a.out.join(name))),
+            Verb::Eam(a) => Files::reads([&a.model]).edits(&a.settings.edits).writes([a.table()]),
+            Verb::Lammps(a) => Files::reads([&a.scene])
+                .edits(&a.settings.edits)
+                .makes(deck::FILES.map(|name| a.out.join(name))),
         }
     }
 }
 
-pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
     match verb {
-        Verb::Eam(a) => run_eam(a, json),
-        Verb::Lammps(a) => run_lammps(a, json),
+        Verb::Eam(a) => run_eam(a, told),
+        Verb::Lammps(a) => run_lammps(a, told),
     }
 }
 
-fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+fn run_lammps(a: &LammpsArguments, told: Told) -> Result<Verdict, Failure> {
     let scene = a.settings.scene(&a.scene)?;
-    let files = deck::write(&scene, &a.out)?;
+    let files = deck::write(&scene, &a.out, told.existing)?;
     say!("written to {}; run it there:", a.out.display());
     say!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
-    conclude(json, &json!({"folder": a.out, "files": files}), true)
+    conclude(
+        told,
+        &json!({"folder": shown(&a.out), "files": files.iter().map(shown).collect::<Vec<_>>()}),
+        true,
+    )
 }
 
-fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+fn run_eam(a: &EamArguments, told: Told) -> Result<Verdict, Failure> {
     let (model, kt) = a.settings.model(&a.model)?;
     let fluid = model.at(kt.unwrap_or(a.kt))?;
     let out = a.table();
     let grid = Grid { spacing: a.spacing, largest_density: a.largest_density, densities: a.densities };
-    eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out)?;
+    eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out, told.existing)?;
     say!("{}", out.display());
     say!("pair_style eam/alloy\npair_coeff * * {} {}", out.display(), fluid.species.join(" "));
-    conclude(json, &json!({"table": out, "species": fluid.species}), true)
+    conclude(told, &json!({"table": shown(&out), "species": fluid.species}), true)
 }

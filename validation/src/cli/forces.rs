@@ -36,7 +36,7 @@ struct Forces {
     forces: Vec<[f64; 3]>,
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let (model, kt) = arguments.settings.model(&arguments.model)?;
     let mut data = DataFile::read(&arguments.data)?;
     data.sort_by_id();
@@ -68,5 +68,5 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     table.push(["root mean square force".to_owned(), format!("{:.12e}", size.sqrt())]);
     say::table(&table);
-    conclude(json, &forces, true)
+    conclude(told, &forces, true)
 }

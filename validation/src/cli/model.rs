@@ -42,7 +42,14 @@ pub struct FromEos {
     out: PathBuf,
 }
 
-pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+impl Verb {
+    pub fn files(&self) -> Files {
+        let Verb::FromEos(a) = self;
+        Files::default().writes([a.out.clone()])
+    }
+}
+
+pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
     let Verb::FromEos(a) = verb;
     let numbers = [a.temperature, a.molecules, a.density, a.tolerance, a.runs.dt, a.range, 1.0 - a.range];
     if !numbers.into_iter().all(|x| x > 0.0 && x.is_finite()) {
@@ -72,7 +79,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     );
     let substance = Substance::find(&a.substance)?;
     let found = from_eos(&substance, &options, &command, &mut |line| say!("{line}"))?;
-    write_atomically(&a.out, found.text.as_bytes())?;
+    write_bytes(&a.out, told.existing, found.text.as_bytes())?;
     let mut table = Table::new(["", "equation of state", "model"]);
     for c in &found.compared {
         table.push([
@@ -87,5 +94,5 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         say!("the tolerance of {:.1} % is not met", 100.0 * a.tolerance);
     }
     say!("written to {}", a.out.display());
-    conclude(json, &found, found.converged)
+    conclude(told, &found, found.converged)
 }

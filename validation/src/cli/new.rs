@@ -22,12 +22,12 @@ fn templates() -> String {
     format!("Templates:\n{}", lines.collect::<String>())
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let chosen: Option<&Template> = TEMPLATES.iter().find(|t| t.name == arguments.template);
     let template = chosen.unwrap_or(&TEMPLATES[0]);
-    let [scene, model] = template.write(&arguments.name)?;
+    let [scene, model] = template.write(&arguments.name, told.existing)?;
     say!("{}: {}", scene.display(), template.about);
     say!("{}: its model", model.display());
     say!("run it: psidpd run {} --out {}", scene.display(), scene.with_extension("").display());
-    conclude(json, &json!({"scene": scene, "model": model, "template": template.name}), true)
+    conclude(told, &json!({"scene": shown(&scene), "model": shown(&model), "template": template.name}), true)
 }

@@ -43,11 +43,13 @@ fn minutes(text: &str) -> Result<f64, String> {
 
 impl Arguments {
     pub fn files(&self) -> Files {
-        Files::reads([&self.scene]).writes(["pareto.json", "pareto.html"].map(|name| self.out.join(name)))
+        Files::reads([&self.scene])
+            .edits(&self.settings.edits)
+            .writes(["pareto.json", "pareto.html"].map(|name| self.out.join(name)))
     }
 }
 
-pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let scene = a.settings.scene(&a.scene)?;
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let usual = [Some(NonZeroUsize::MIN), NonZeroUsize::new(2).filter(|_| cores > 1)];
@@ -65,6 +67,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         lammps: !a.without_lammps,
         fixed: a.samples.map(|n| (Effort::Samples(n), Pace { rounds: 5, seconds: 0.2 })),
         out: a.out.clone(),
+        existing: told.existing,
     };
     let outcome = pareto::run(&scene, &options, &Progress::new())?;
     say::table(&page::table(&outcome));
@@ -76,5 +79,5 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     }
     say!("{}", page::recommendation(&outcome));
     say!("report: {}", a.out.join("pareto.html").display());
-    conclude(json, &outcome, true)
+    conclude(told, &outcome, true)
 }

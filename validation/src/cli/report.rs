@@ -11,12 +11,25 @@ pub struct Arguments {
 
 impl Arguments {
     pub fn files(&self) -> Files {
-        Files::reads(&["about.json", "thermo.csv", "observables.json"].map(|name| self.folder.join(name)))
+        Files::reads(
+            &[
+                "about.json",
+                "thermo.csv",
+                "observables.json",
+                "summary.json",
+                "timing.json",
+                "final.data",
+                "last-good.data",
+                "dump.lammpstrj",
+                "trajectory.xyz",
+            ]
+            .map(|name| self.folder.join(name)),
+        )
     }
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let page = write_run_report(&arguments.folder)?;
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
+    let page = write_run_report(&arguments.folder, told.existing)?;
     say!("{}", page.display());
-    conclude(json, &json!({"report": page}), true)
+    conclude(told, &json!({"report": shown(&page)}), true)
 }

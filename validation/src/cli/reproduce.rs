@@ -1,6 +1,11 @@
 use super::run::threads_at_once;
 use super::*;
+<<<<<<< HEAD
 use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, Source, cases};
+=======
+use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, cases};
+use psidpd_formats::files::work_folder;
+>>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
 use serde_json::Value;
 
 /// Figures and tables of the papers: measured, and compared with what is published.
@@ -30,14 +35,14 @@ pub struct Arguments {
     pub(super) fault: Option<Fault>,
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let chosen = choose(&arguments.ids)?;
     if arguments.list {
         let mut table = Table::new(["id", "what"]);
         chosen.iter().for_each(|case| table.push([&case.id, case.what]));
         say::table(&table);
         let entry = |case: &Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
-        return conclude(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }), true);
+        return conclude(told, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }), true);
     }
     let size = if arguments.full { Size::Full } else { Size::Quick };
     let mut results = Vec::new();
@@ -72,8 +77,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         results.push(result);
     }
     match &results[..] {
-        [one] => conclude(json, one, good),
-        all => conclude(json, &json!({ "cases": all, "pass": good }), good),
+        [one] => conclude(told, one, good),
+        all => conclude(told, &json!({ "cases": all, "pass": good }), good),
     }
 }
 
@@ -143,8 +148,8 @@ fn show(outcome: &Reproduction) {
 fn write_plots(outcome: &Reproduction, folder: &Path) -> Result<(), Failure> {
     for (name, plot) in &outcome.plots {
         let svg = plot.render()?;
-        std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
-        write_atomically(folder.join(format!("{name}.svg")), svg.as_bytes())?;
+        work_folder(folder)?;
+        write_bytes(&folder.join(format!("{name}.svg")), Existing::Keep, svg.as_bytes())?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use psidpd_dynamics::device::Device;
 use psidpd_dynamics::run::{Advice, Begin, FILES, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::uncalibrated;
 use psidpd_report::{Headline, headline, write_run_report};
-use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::ffi::OsStr;
 use std::sync::Arc;
@@ -25,9 +25,6 @@ pub struct Arguments {
     /// first step if there is none.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// Start over in a folder that holds a run, finished or not; what it left is deleted.
-    #[arg(long)]
-    overwrite: bool,
     /// Threads that share the work; what a run writes does not depend on their number.
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
@@ -68,7 +65,7 @@ impl Arguments {
 
 impl Arguments {
     pub fn files(&self) -> Files {
-        Files::reads([&self.scene]).writes(FILES.map(|name| self.out.join(name)))
+        Files::reads([&self.scene]).edits(&self.settings.edits).makes(FILES.map(|name| self.out.join(name)))
     }
 }
 
@@ -108,18 +105,17 @@ struct Report<'a> {
     advice: Option<&'a Advice>,
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let Arguments { scene: path, out, resume, overwrite, threads, precision, device, report, settings } =
-        arguments;
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
+    let Arguments { scene: path, out, resume, threads, precision, device, report, settings } = arguments;
     let mut scene = settings.scene(path)?;
     scene.precision = precision.or(scene.precision);
     scene.device = device.unwrap_or(scene.device);
     if let Some(warning) = uncalibrated(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
     }
-    let begin = match (resume, overwrite) {
+    let begin = match (resume, told.existing) {
         (true, _) => Begin::Resume,
-        (_, true) => Begin::Overwrite,
+        (_, Existing::Replace) => Begin::Overwrite,
         _ => Begin::New,
     };
     let mut runner = Runner::begin(&scene, out, begin)?;
@@ -138,7 +134,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     // A failure to write the page does not change the outcome of the run.
     if *report
         && outcome.as_ref().err().is_none_or(|e| e.is_stop())
-        && let Err(error) = write_run_report(out)
+        && let Err(error) = write_run_report(out, Existing::Keep)
     {
         warn(&format!("the run has no page: {error}; to make it: psidpd report"));
     }
@@ -180,12 +176,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             say(&format!("written to {}", out.display()));
             let results =
                 Report { summary: &summary, timing: &timing, headline: &found, advice: advice.as_ref() };
-            write_json(json, &results).map_err(|cause| CliError::Unwritten { folder: out.clone(), cause })?;
+            write_json(told, &results).map_err(|cause| CliError::Unwritten { folder: out.clone(), cause })?;
             Ok(Verdict::Good)
         }
         Outcome::Interrupted { stop, step, steps } => {
             let command =
-                arguments.to_resume(json).map_or(String::new(), |line| format!("; to go on: {line}"));
+                arguments.to_resume(told.json).map_or(String::new(), |line| format!("; to go on: {line}"));
             say(&format!("stopped after step {step} of {steps}{command}"));
             Ok(Verdict::Interrupted(u8::try_from(stop).unwrap_or(0)))
         }
@@ -241,8 +237,6 @@ pub fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
         flag::register(signal, stopping.clone())?;
         flag::register_usize(signal, stop.clone(), signal as usize)?;
     }
-    // Without this handler, a file beyond the size limit would kill the program instead of failing as on a full disk.
-    flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     Ok(stop)
 }
 

@@ -26,7 +26,7 @@ impl Settings {
         let of_model: Vec<Edit> = of_model.into_iter().cloned().collect();
         let document = Document::open(path)?;
         let text = edit_model(document.source.text(), &of_model)?;
-        let model = Model::parse(&path.display().to_string(), &text)?;
+        let model = Model::parse_in(path, &text)?;
         let wrong = |e: &&Edit| {
             let source = Arc::new(Source::new("--set", ""));
             FileError::new(&source, 0..0, "kT", format!("{e} of --set: {POSITIVE}"))

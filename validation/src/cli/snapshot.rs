@@ -92,7 +92,7 @@ impl Arguments {
 /// The time in centiseconds for which a film shows each frame.
 const DELAY: u16 = 12;
 
-pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let out = a.picture();
     let kind = out.extension().and_then(|e| e.to_str()).unwrap_or("");
     if !["svg", "png", "gif"].contains(&kind) {
@@ -135,9 +135,9 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
                 Ok(image)
             })
             .collect::<Result<Vec<_>, Failure>>()?;
-        write_atomically(&out, &Image::to_gif(&images, DELAY).map_err(request)?)?;
+        write_bytes(&out, told.existing, &Image::to_gif(&images, DELAY).map_err(request)?)?;
         say!("{}", out.display());
-        return conclude(json, &json!({"film": out, "frames": images.len(), "colours": ends}), true);
+        return conclude(told, &json!({"film": shown(&out), "frames": images.len(), "colours": ends}), true);
     }
     let configuration = open(a.frame)?;
     let values = values(a, model.as_ref(), &configuration)?;
@@ -145,13 +145,12 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
     let bytes =
         if kind == "svg" { figure.render()?.into_bytes() } else { figure.with_scale_bar().to_png()? };
-    write_atomically(&out, &bytes)?;
+    write_bytes(&out, told.existing, &bytes)?;
     say!("{}", out.display());
     let particles = configuration.x.len();
     let colours = values.map(|_| ends);
-    let told =
-        json!({"picture": out, "particles": particles, "step": configuration.step, "colours": colours});
-    conclude(json, &told, true)
+    let results = json!({"picture": shown(&out), "particles": particles, "step": configuration.step, "colours": colours});
+    conclude(told, &results, true)
 }
 
 /// The values that the colours of particles show; `None` for species.

@@ -23,20 +23,21 @@ pub struct Arguments {
     /// Threads of each run.
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
-    /// Start over in folders that hold runs, finished or not.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
     settings: Settings,
 }
 
 impl Arguments {
     pub fn files(&self) -> Files {
-        Files::reads([&self.scene]).writes(["sweep.csv", "report.html"].map(|name| self.out.join(name)))
+        {
+            let edits = self.settings.edits.iter().chain(self.over.iter().flat_map(|axis| &axis.edits));
+            let made = ["sweep.csv", "report.html"].map(|name| self.out.join(name));
+            Files::reads([&self.scene]).edits(edits).makes(made)
+        }
     }
 }
 
-pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let options = Options {
         scene: a.scene.clone(),
         edits: a.settings.edits.clone(),
@@ -44,7 +45,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         out: a.out.clone(),
         jobs: a.jobs,
         threads: a.threads,
-        overwrite: a.overwrite,
+        overwrite: told.existing == Existing::Replace,
     };
     let total: usize = a.over.iter().map(|axis| axis.edits.len()).product();
     let stop = watch_signals()?;
@@ -53,16 +54,15 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let what = point.error.as_ref().map_or(String::new(), |e| format!(": {e}"));
         say!("{ended} of {total}: {}{what}", edits.join(", "));
     })?;
-    sweep::write(&options, &points)?;
     say!("");
     say::table(&sweep::table(&a.over, &points));
     say!("written to {}", a.out.join("sweep.csv").display());
     say!("report: {}", a.out.join("report.html").display());
-    write_json(json, &points)?;
+    write_json(told, &points)?;
     let signal = stop.load(Ordering::Relaxed);
     if signal != 0 {
         let finished = points.iter().filter(|p| p.finished).count();
-        let command = a.to_go_on(json).map_or(String::new(), |line| format!("; to go on: {line}"));
+        let command = a.to_go_on(told.json).map_or(String::new(), |line| format!("; to go on: {line}"));
         say!("stopped with {finished} of {total} runs finished{command}");
         return Ok(Verdict::Interrupted(u8::try_from(signal).unwrap_or(0)));
     }

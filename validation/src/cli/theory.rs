@@ -106,7 +106,7 @@ fn answer<T>(
     (name, value)
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let (model, set) = arguments.settings.model(&arguments.model)?;
     let kts = set.map_or_else(|| arguments.kt.clone(), |kt| vec![kt]);
     let (mut all, mut defined) = (Vec::new(), true);
@@ -127,12 +127,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     if let Some(path) = &arguments.report {
         let page = theory_page::page(&model, &scope)?.render();
-        psidpd_formats::files::write_atomically(path, page.as_bytes())?;
+        write_bytes(path, told.existing, page.as_bytes())?;
         say!("report: {}", path.display());
     }
     match all.as_slice() {
-        [single] => conclude(json, single, defined),
-        several => conclude(json, &json!({"title": model.title, "temperatures": several}), defined),
+        [single] => conclude(told, single, defined),
+        several => conclude(told, &json!({"title": model.title, "temperatures": several}), defined),
     }
 }
 

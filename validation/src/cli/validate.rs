@@ -18,10 +18,16 @@ pub struct Arguments {
     pub(super) fault: Option<Fault>,
 }
 
-pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+impl Arguments {
+    pub fn files(&self) -> Files {
+        Files::default().writes(["results.json", "report.html"].map(|name| self.out.join(name)))
+    }
+}
+
+pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let progress = Progress::new();
     let Arguments { full, ref out, only, fault } = *arguments;
-    let options = Options { full, out: out.clone(), only, fault };
+    let options = Options { full, out: out.clone(), existing: told.existing, only, fault };
     let outcome = validate(&options, &progress)?;
     let results = &outcome.results;
     say::table(&check_table(results));
@@ -31,5 +37,5 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         results.failed_count(),
         outcome.report.display()
     );
-    conclude(json, results, results.passed)
+    conclude(told, results, results.passed)
 }

@@ -30,7 +30,7 @@ pub struct Document {
 /// Largest size of a file, in bytes: far above any real file, and small enough to read.
 const LARGEST: u64 = 16 << 20;
 
-/// Deepest nesting of brackets; the TOML reader recurses.
+/// Deepest nesting of brackets and of the parts of keys.
 const DEEPEST: usize = 64;
 
 impl Document {
@@ -44,7 +44,15 @@ impl Document {
             FileError::new(&Arc::new(Source::new(&name, "")), 0..0, "", FileErrorKind::Unreadable(message))
         };
         let text = columns::read_text(path, LARGEST).map_err(unreadable)?;
-        let mut document = Document::parse(&name, &text)?;
+        Document::parse_in(path, &text)
+    }
+
+    /// Reads a text as the content of the file at `path`, whose name may be no valid text.
+    ///
+    /// # Errors
+    /// Fails as [`Document::parse`].
+    pub fn parse_in(path: &Path, text: &str) -> Result<Document, FileError> {
+        let mut document = Document::parse(&path.display().to_string(), text)?;
         document.directory = path.parent().unwrap_or(Path::new("")).to_owned();
         Ok(document)
     }
@@ -79,21 +87,98 @@ impl Document {
     }
 }
 
-/// The offset where brackets or dotted keys first nest deeper than allowed, counting those in strings
-/// and comments too: this bounds the recursion of the TOML reader, and is no grammar.
+/// The offset where brackets or the parts of a dotted key first nest deeper than allowed: the TOML reader recurses.
+/// Strings and comments may hold any number of both.
 fn too_deep(text: &str) -> Option<usize> {
-    let (mut depth, mut dots) = (0usize, 0usize);
-    for (at, byte) in text.bytes().enumerate() {
+    let bytes = text.as_bytes();
+    // The levels of each open bracket, with the parts of the key before it; parts of the present key, and of the last one.
+    let (mut open, mut depth) = (Vec::new(), 0usize);
+    let (mut parts, mut key, mut at) = (0usize, 0usize, 0);
+    while let Some(byte) = bytes.get(at) {
         match byte {
-            b'[' | b'{' => depth += 1,
-            b']' | b'}' => depth = depth.saturating_sub(1),
-            b'\n' => dots = 0,
-            b'.' => dots += 1,
+            b'#' => {
+                at += bytes[at..].iter().take_while(|byte| **byte != b'\n').count();
+                continue;
+            }
+            b'"' | b'\'' => {
+                at = end_of_string(bytes, at);
+                continue;
+            }
+            b'[' | b'{' => {
+                open.push(1 + key);
+                depth += 1 + key;
+                (parts, key) = (0, 0);
+            }
+            b']' | b'}' => {
+                depth -= open.pop().unwrap_or(0);
+                (parts, key) = (0, 0);
+            }
+            b'=' => (parts, key) = (0, parts),
+            b',' | b'\n' => (parts, key) = (0, 0),
+            b'.' => parts += 1,
             _ => {}
         }
-        if depth > DEEPEST || dots > 4 * DEEPEST {
+        if depth + parts > DEEPEST {
             return Some(at);
         }
+        at += 1;
     }
     None
+}
+
+/// The offset behind the string that begins at `start`; one that is not closed ends with its line, or with the text if it may
+/// have several lines.
+fn end_of_string(bytes: &[u8], start: usize) -> usize {
+    let quote = bytes[start];
+    let long = bytes[start..].starts_with(&[quote; 3]);
+    let width = if long { 3 } else { 1 };
+    let mut at = start + width;
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'\\' if quote == b'"' => at += 1,
+            b'\n' if !long => return at,
+            byte if *byte == quote && (!long || bytes[at..].starts_with(&[quote; 3])) => {
+                // One or two quotes may stand before the closing ones.
+                let more = bytes[at + width..].iter().take(2).take_while(|byte| long && **byte == quote);
+                return at + width + more.count();
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+    bytes.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Only what nests counts: not brackets and dots in comments and strings, nor the points of numbers.
+    #[test]
+    fn strings_and_comments_do_not_nest() {
+        let many = "[".repeat(100) + &"{a.".repeat(300);
+        let numbers = format!("x = [{}]", "0.5, ".repeat(400));
+        for text in [
+            format!("# {many}\nx = 1"),
+            format!("x = \"{many} \\\" {many}\""),
+            format!("x = '{many} # '"),
+            format!("x = \"\"\"\n{many} \"\" \\\"\"\"\n\"\"\"\"\""),
+            format!("x = '''\n{many} \\'''"),
+            numbers,
+        ] {
+            assert_eq!(too_deep(&text), None, "{text}");
+            Document::parse("t", &text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        }
+        let open = "x = \"no end\ny = ".to_owned() + &"[".repeat(100);
+        for text in [open, format!("x = '''a''' \ny={many}"), format!("x = \"\"\ny = {many}"), many] {
+            assert!(too_deep(&text).is_some(), "{text}");
+        }
+        // Keys with many parts nest within each other: as deep as allowed is no overflow of the stack.
+        let key = ["a"; 8].join(".");
+        for levels in [7, 64] {
+            let text = format!("{}{key} = 1{}", format!("{key} = {{").repeat(levels), "}".repeat(levels));
+            assert_eq!(too_deep(&text).is_some(), levels > 7);
+            let _ = Document::parse("t", &text);
+        }
+    }
 }

@@ -99,6 +99,13 @@ impl<'a> Section<'a> {
         self.table.entries.iter().map(located).collect()
     }
 
+    /// All strings in the section and what it holds, such as names of files.
+    pub fn strings(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        self.entries().iter().for_each(|(_, value)| value.add_strings(&mut all));
+        all
+    }
+
     /// Fails if the section has a key that is not in this list.
     pub fn only<'k>(&self, known: impl IntoIterator<Item = &'k str>) -> Result<(), FileError> {
         let mut known: Vec<&str> = known.into_iter().collect();
@@ -113,6 +120,12 @@ impl<'a> Section<'a> {
 }
 
 impl<'a> Value<'a> {
+    fn add_strings(&self, all: &mut Vec<String>) {
+        all.extend(self.as_str().map(str::to_owned));
+        self.as_array().unwrap_or_default().iter().for_each(|item| item.add_strings(all));
+        self.as_section().iter().for_each(|section| all.extend(section.strings()));
+    }
+
     /// An error about this value.
     pub fn error(&self, kind: impl Into<FileErrorKind>) -> FileError {
         self.place.error(kind)

@@ -62,6 +62,14 @@ impl Model {
         Model::read(&Document::parse(name, text)?)
     }
 
+    /// Reads a model from a text as the content of the file at `path`, whose name may be no valid text.
+    ///
+    /// # Errors
+    /// Fails as [`Model::open`].
+    pub fn parse_in(path: &Path, text: &str) -> Result<Model, FileError> {
+        Model::read(&Document::parse_in(path, text)?)
+    }
+
     fn read(document: &Document) -> Result<Model, FileError> {
         read_known(&document.root(), crate::keys::TABLES, &[], || Model::of(document))
             .map_err(|error| no_model(&document.root()).unwrap_or(error))

@@ -1,7 +1,9 @@
 //! The conversion of a checkpoint to bytes and back.
 
 use super::{Checkpoint, CheckpointError, Written};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use psidpd_formats::memory;
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// The version grows whenever [`Checkpoint`] or anything that it holds changes.
@@ -54,9 +56,15 @@ impl<W: Write> Write for Payload<W> {
     }
 }
 
-pub fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
-    let bytes = std::fs::read(path).map_err(CheckpointError::unreadable(path))?;
-    parse(&bytes, path)
+pub fn read(mut file: File, path: &Path) -> Result<Checkpoint, CheckpointError> {
+    let mut read = || {
+        let length = file.metadata()?.len();
+        // The content is about as large as the particles that it becomes.
+        memory::fits(2.0 * length as f64, || "reading it needs".to_owned()).map_err(io::Error::other)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map(|_| bytes)
+    };
+    parse(&read().map_err(CheckpointError::unreadable(path))?, path)
 }
 
 /// Reads a checkpoint from memory; messages name `path` as its file.

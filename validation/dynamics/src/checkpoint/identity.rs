@@ -1,6 +1,7 @@
 //! What tells one run from another: the keys of its scene and of its model.
 
 use super::Written;
+use psidpd_core::document::open_regular;
 use psidpd_core::engine::Precision;
 use psidpd_core::model::Model;
 use serde::{Deserialize, Serialize};
@@ -105,6 +106,6 @@ fn written(value: &toml::Value) -> String {
 
 /// The length and checksum of a file's content; `None` if the file cannot be read.
 fn content_of(path: &Path) -> Option<String> {
-    let Written { length, checksum } = path.is_file().then(|| Written::of(path, u64::MAX).ok())??;
+    let Written { length, checksum } = Written::of(open_regular(path).ok()?, u64::MAX).ok()?;
     Some(format!("a file of {length} bytes with the CRC-32 {checksum:08x}"))
 }

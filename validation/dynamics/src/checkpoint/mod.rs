@@ -30,6 +30,7 @@ pub use totals::{Means, Sums, Thermo};
 pub use written::Written;
 
 use crate::particles::State;
+use psidpd_core::document::open_regular;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -87,7 +88,7 @@ pub fn read_state(path: &Path) -> Result<State, CheckpointError> {
     let checkpoint = if path.is_dir() {
         Store::new(path).find(|_| Ok(()))?.ok_or_else(|| CheckpointError::absent(path))?.checkpoint
     } else {
-        format::read(path)?
+        format::read(open_regular(path).map_err(CheckpointError::unreadable(path))?, path)?
     };
     Ok(checkpoint.state)
 }

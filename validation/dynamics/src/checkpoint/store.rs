@@ -1,7 +1,7 @@
 //! The checkpoints in the folder of a run.
 
 use super::{Checkpoint, CheckpointError, NEWEST, format};
-use psidpd_formats::files::{PathError, remove_all, remove_if_there};
+use psidpd_formats::files::{PathError, draft_inside, open_inside, remove_all, remove_if_there, there};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -34,33 +34,28 @@ impl Store {
     }
 
     pub fn exists(&self) -> bool {
-        [NEWEST, BEFORE].iter().any(|name| self.folder.join(name).symlink_metadata().is_ok())
+        [NEWEST, BEFORE].iter().any(|name| there(&self.folder.join(name)))
     }
 
     /// Writes a new checkpoint and keeps the newest as the previous one. If that fails, the present checkpoints stay.
     pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), PathError> {
-        let new = self.folder.join(UNFINISHED);
-        let newest = self.path();
-        self.write_new(checkpoint, &new).map_err(|cause| {
-            // A partial file only takes space, so failing to remove it is harmless.
-            let _ = std::fs::remove_file(&new);
-            PathError { action: "write", path: newest, cause }
-        })
+        self.write_new(checkpoint).map_err(PathError::at("write", &self.path()))
     }
 
-    fn write_new(&self, checkpoint: &Checkpoint, new: &Path) -> io::Result<()> {
-        let mut file = File::create(new)?;
-        format::write(checkpoint, &mut file)?;
-        file.sync_all()?;
+    fn write_new(&self, checkpoint: &Checkpoint) -> io::Result<()> {
+        let mut draft = draft_inside(&self.path())?;
+        format::write(checkpoint, &mut draft)?;
+        draft.sync()?;
         self.keep_as_before()?;
-        std::fs::rename(new, self.path())?;
+        draft.finish(false)?;
         self.sync()
     }
 
     /// Links the newest checkpoint as the previous one, so that one is always there.
     fn keep_as_before(&self) -> io::Result<()> {
         let (newest, before) = (self.path(), self.folder.join(BEFORE));
-        if !newest.exists() {
+        // A link would make the previous one lead out of the folder.
+        if !newest.symlink_metadata().is_ok_and(|about| about.is_file()) {
             return Ok(());
         }
         remove_if_there(&before)?;
@@ -75,7 +70,9 @@ impl Store {
         usable: impl Fn(&Checkpoint) -> Result<(), CheckpointError>,
     ) -> Result<Option<Found>, CheckpointError> {
         let load = |name: &str| {
-            let checkpoint = format::read(&self.folder.join(name))?;
+            let path = self.folder.join(name);
+            let file = open_inside(&path).map_err(CheckpointError::unreadable(&path))?;
+            let checkpoint = format::read(file, &path)?;
             usable(&checkpoint).map(|()| checkpoint)
         };
         let newest = match load(NEWEST) {
@@ -88,7 +85,7 @@ impl Store {
             Err(error @ CheckpointError::Foreign { .. }) => Err(error),
             Err(_) if !self.exists() => Ok(None),
             // That the newest checkpoint is missing says less than the fault of the previous one.
-            Err(error) => Err(if self.path().exists() { newest } else { error }),
+            Err(error) => Err(if there(&self.path()) { newest } else { error }),
         }
     }
 

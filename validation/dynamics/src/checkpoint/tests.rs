@@ -6,6 +6,11 @@ use std::io::{self, Cursor, Seek, SeekFrom, Write};
 /// Numbers that a conversion may get wrong.
 const HARD: [f64; 3] = [-0.0, 5e-324, 0.1 + 0.2];
 
+fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
+    let file = std::fs::File::open(path).map_err(CheckpointError::unreadable(path))?;
+    format::read(file, path)
+}
+
 fn checkpoint(step: u64) -> Checkpoint {
     Checkpoint {
         instructions: "portable".into(),
@@ -51,7 +56,7 @@ fn every_bit_comes_back() {
     let mut written = checkpoint(7);
     written.forces[0] = [f64::NAN, f64::NEG_INFINITY, 0.0];
     std::fs::write(&path, bytes_of(&written)).unwrap();
-    let read = format::read(&path).unwrap();
+    let read = read(&path).unwrap();
     let bits = |a: &[[f64; 3]]| a.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&read.forces), bits(&written.forces));
     assert_eq!(bits(&read.state.x), bits(&written.state.x));
@@ -69,7 +74,7 @@ fn no_damage_goes_unnoticed() {
     let whole = bytes_of(&checkpoint(7));
     let read = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        format::read(&path)
+        read(&path)
     };
     read(&whole).unwrap();
     for length in 0..whole.len() {
@@ -100,7 +105,7 @@ fn no_damage_goes_unnoticed() {
     assert!(matches!(read(&longer), Err(CheckpointError::Damaged { .. })));
     let text = read(b"title = \"a scene, and longer than any header\"\n").unwrap_err().to_string();
     assert!(text.ends_with("c is not a checkpoint of psidpd"), "{text}");
-    let error = format::read(&folder.path().join("none")).unwrap_err();
+    let error = read(&folder.path().join("none")).unwrap_err();
     assert!(matches!(error, CheckpointError::Unreadable { .. }), "{error}");
 }
 
@@ -123,7 +128,7 @@ fn payloads_that_are_none_are_damage() {
         bytes.extend((length as u64).to_le_bytes());
         bytes.extend(payload);
         std::fs::write(&path, bytes).unwrap();
-        assert!(matches!(format::read(&path), Err(CheckpointError::Damaged { .. })), "{length}");
+        assert!(matches!(read(&path), Err(CheckpointError::Damaged { .. })), "{length}");
     }
 }
 
@@ -210,8 +215,8 @@ fn a_checkpoint_that_cannot_be_written_leaves_what_is_there() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::new(folder.path());
     store.write(&checkpoint(1)).unwrap();
-    // A folder has the name of the new checkpoint: unlike the permissions of a folder, this stops root too.
-    std::fs::create_dir(folder.path().join("checkpoint.new")).unwrap();
+    // A folder has the name of the previous checkpoint: unlike the permissions of a folder, this stops root too.
+    std::fs::create_dir(folder.path().join("checkpoint.old")).unwrap();
     let error = store.write(&checkpoint(2)).unwrap_err();
     assert_eq!(error.path, folder.path().join("checkpoint"), "{error}");
     assert!(error.to_string().contains("cannot write"), "{error}");

@@ -79,8 +79,10 @@ pub enum RunError {
     Unfinished { folder: PathBuf, step: Option<u64> },
     #[error("{} holds a finished run{}", folder.display(), if *other { " of another scene" } else { "" })]
     Finished { folder: PathBuf, other: bool },
-    #[error("the run would replace {}, which its scene starts from", path.display())]
+    #[error("the run would replace {}, which its scene reads", path.display())]
     OwnInput { path: PathBuf },
+    #[error("{} is there, and no checkpoint tells of a run that made it", path.display())]
+    InTheWay { path: PathBuf },
     #[error(transparent)]
     Device(#[from] DeviceError),
     #[error(transparent)]
@@ -137,8 +139,10 @@ impl RunError {
                 "there is no checkpoint yet: when the cause is gone, start over".into()
             }
             RunError::Unfinished { .. } => format!("{go_on}, or {over}"),
-            RunError::Finished { .. } => format!("choose another folder, or {over}"),
-            RunError::OwnInput { .. } => "choose another folder, or start from a copy of the file".into(),
+            RunError::Finished { .. } | RunError::InTheWay { .. } => {
+                format!("choose another folder, or {over}")
+            }
+            RunError::OwnInput { .. } => "choose another folder, or take a copy of the file".into(),
             RunError::Busy { .. } => "wait for its end, or choose another folder".into(),
             RunError::Checkpoint(error) => error.help(caller),
             RunError::Device(error) => return error.help().map(str::to_owned),

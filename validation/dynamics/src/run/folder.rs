@@ -1,6 +1,6 @@
 use super::RunError;
 use psidpd_formats::PathError;
-use std::fs::{File, TryLockError};
+use std::fs::{File, TryLockError, create_dir_all};
 use std::path::{Path, PathBuf};
 
 /// The folder of a run, locked against other runs. The lock ends with the process, even if that is killed.
@@ -12,7 +12,7 @@ pub(super) struct Folder {
 impl Folder {
     /// Creates the folder if it is missing, and locks it.
     pub fn open(path: &Path) -> Result<Folder, RunError> {
-        std::fs::create_dir_all(path).map_err(PathError::at("write", path))?;
+        create_dir_all(path).map_err(PathError::at("write", path))?;
         let lock = File::open(path).map_err(PathError::at("write", path))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => Err(RunError::Busy { folder: path.to_owned() }),

@@ -1,5 +1,5 @@
 use crate::checkpoint::Written;
-use psidpd_formats::PathError;
+use psidpd_formats::files::{PathError, create_inside, open_inside_to_write};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ pub(super) struct GrowingFile {
 impl GrowingFile {
     pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, PathError> {
         let path = folder.join(name);
-        let file = File::create(&path).map_err(PathError::at("write", &path))?;
+        let file = create_inside(&path).map_err(PathError::at("write", &path))?;
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written: Written::default() })
     }
 
@@ -24,7 +24,7 @@ impl GrowingFile {
     pub fn reopen(folder: &Path, name: &'static str, written: Written) -> Result<GrowingFile, PathError> {
         let path = folder.join(name);
         let open = || {
-            let mut file = File::options().write(true).open(&path)?;
+            let mut file = open_inside_to_write(&path)?;
             file.set_len(written.length)?;
             file.seek(SeekFrom::End(0))?;
             Ok(file)

@@ -2,18 +2,23 @@
 
 use super::growing::GrowingFile;
 use super::thermo::HEADER;
-use super::{RunError, Thermo};
+use super::{RunError, Thermo, Timing};
 use crate::checkpoint::{Checkpoint, Store, Written};
 use crate::scene::{Scene, every};
 use psidpd_formats::dump::write_dump;
-use psidpd_formats::files::{PathError, remove_all, remove_if_there};
-use psidpd_formats::{Frame, GsdFile, write_xyz};
-use psidpd_observe::{Observation, write_csv};
-use psidpd_pictures::{remove_snapshots, remove_vtk, write_snapshot, write_vtk};
+use psidpd_formats::files::{
+    PathError, folder_inside, is_empty_or_missing, is_protected, names_inside, read_json_if_there,
+    remove_all, remove_folder_if_empty, remove_if_there, replace_inside, there,
+};
+use psidpd_formats::{About, Frame, GsdFile, write_xyz};
+use psidpd_observe::Observation;
+use psidpd_pictures::snapshot::SNAPSHOTS;
+use psidpd_pictures::{VTK, remove_snapshots, remove_vtk, snapshots, vtk_files, write_snapshot, write_vtk};
 use serde::Serialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, ErrorKind, Write};
+use std::ffi::OsString;
+use std::io;
 use std::path::{Path, PathBuf};
 
 const THERMO: &str = "thermo.csv";
@@ -27,12 +32,38 @@ pub const FILES: [&str; 6] = [THERMO, DUMP, XYZ, GSD, "final.data", "last-good.d
 /// Files that are written when a run ends or stops.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
 
+/// The names of all files of runs, without those in folders.
+fn names() -> impl Iterator<Item = &'static str> {
+    FILES.into_iter().chain(LAST).chain(Store::FILES).chain([About::NAME, Timing::NAME])
+}
+
 /// Whether a new run in `folder` would remove or replace `input`, which is a file or the folder of another run.
 pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
     let (Ok(folder), Ok(input)) = (folder.canonicalize(), input.canonicalize()) else { return false };
     let name = input.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let own = [&FILES[..], &LAST, &Store::FILES].concat();
-    input == folder || input.parent() == Some(&folder) && own.contains(&name)
+    input == folder || input.parent() == Some(&folder) && names().any(|own| own == name)
+}
+
+/// An input among the files that a new run in `folder` would remove or replace.
+pub(super) fn input_among(folder: &Path) -> Option<PathBuf> {
+    let named = names().map(|name| folder.join(name)).chain(named_tables(folder));
+    named.chain(snapshots(folder)).chain(vtk_files(folder)).find(|path| is_protected(path))
+}
+
+/// What is in the way of a new run: it has the name of a file of runs, and no checkpoint tells which run made it.
+pub(super) fn in_the_way(folder: &Path) -> Option<PathBuf> {
+    let folders = [TABLES, SNAPSHOTS, VTK].map(|name| folder.join(name));
+    let used = folders.into_iter().filter(|path| !is_empty_or_missing(path));
+    names().map(|name| folder.join(name)).filter(|path| there(path)).chain(used).next()
+}
+
+/// Whether a run of this scene has begun in the folder, and was killed before its first checkpoint: its description is the first
+/// file that a run writes.
+pub(super) fn has_begun(scene: &Scene, folder: &Path) -> bool {
+    let ended = LAST.iter().any(|name| there(&folder.join(name)));
+    let found: Option<Value> = read_json_if_there(&folder.join(About::NAME)).ok().flatten();
+    let same = |found| serde_json::to_value(super::about::about(scene)).is_ok_and(|own| own == found);
+    !ended && found.is_some_and(same)
 }
 
 const OBSERVABLES: &str = "observables.json";
@@ -146,40 +177,41 @@ pub(super) fn write_observations(folder: &Path, observations: &[Observation]) ->
         return Ok(());
     }
     let tables = folder.join(TABLES);
-    write_csv(&tables, observations).map_err(PathError::at("write", &tables))?;
+    folder_inside(&tables).map_err(PathError::at("write", &tables))?;
+    for observation in observations {
+        let mut text = Vec::new();
+        let path = tables.join(observation.file_name(observations));
+        observation.csv(&mut text).map_err(PathError::at("write", &path))?;
+        replace_inside(&path, &text, true)?;
+    }
     write_json(&folder.join(OBSERVABLES), &observations)
 }
 
 /// Writes a value as indented JSON and syncs the file to the disk.
 pub(super) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PathError> {
-    let write = || -> io::Result<()> {
-        let text = serde_json::to_string_pretty(value)? + "\n";
-        let mut file = File::create(path)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()
-    };
-    write().map_err(PathError::at("write", path))
+    let text = serde_json::to_string_pretty(value).map_err(|e| PathError::at("write", path)(e.into()))?;
+    replace_inside(path, (text + "\n").as_bytes(), true)
 }
 
 /// Removes the tables that `observables.json` of an earlier run names, and their folder if it is then empty.
 fn remove_tables(folder: &Path) -> Result<(), PathError> {
     let tables = folder.join(TABLES);
-    let text = std::fs::read_to_string(folder.join(OBSERVABLES)).unwrap_or_default();
-    let all: Vec<Observation> = serde_json::from_str(&text).unwrap_or_default();
     let remove = || -> io::Result<()> {
-        for observation in &all {
-            // A name in a file from elsewhere may be a path out of the folder, so only names without folders count.
-            let name = observation.file_name(&all);
-            if Path::new(&name).file_name() == Some(name.as_ref()) {
-                remove_if_there(&tables.join(name))?;
-            }
+        for table in named_tables(folder) {
+            remove_if_there(&table)?;
         }
-        std::fs::remove_dir(&tables)
+        if tables.is_symlink() { Ok(()) } else { remove_folder_if_empty(&tables) }
     };
-    match remove() {
-        Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => {
-            Err(PathError::at("write", &tables)(error))
-        }
-        _ => Ok(()),
-    }
+    remove().map_err(PathError::at("write", &tables))
+}
+
+/// The tables that `observables.json` names and that are there.
+fn named_tables(folder: &Path) -> Vec<PathBuf> {
+    let tables = folder.join(TABLES);
+    let all: Vec<Observation> =
+        read_json_if_there(&folder.join(OBSERVABLES)).ok().flatten().unwrap_or_default();
+    // A name in a file from elsewhere may be a path out of the folder, so only names of files there count.
+    let names = names_inside(&tables);
+    let is_named = |name: &&OsString| all.iter().any(|o| name.as_os_str() == o.file_name(&all).as_str());
+    names.iter().filter(is_named).map(|name| tables.join(name)).collect()
 }

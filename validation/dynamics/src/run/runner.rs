@@ -1,6 +1,6 @@
 use super::checkpoints::Checkpoints;
 use super::folder::Folder;
-use super::output::{Output, replaces};
+use super::output::{Output, has_begun, in_the_way, input_among, replaces};
 use super::timing::Clock;
 use super::watch::Watch;
 use super::{
@@ -9,7 +9,8 @@ use super::{
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
-use psidpd_formats::memory;
+use psidpd_formats::files::{Protected, open_inside, protect, there, work_folder};
+use psidpd_formats::{About, memory};
 use psidpd_observe::Observers;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -46,8 +47,10 @@ pub enum Start {
     Finished,
 }
 
-/// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see [`Runner`].
+/// Runs a scene from its first step to its last, in a folder in which psidpd may replace everything ([`work_folder`]); see
+/// [`Runner`].
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
+    work_folder(out)?;
     Runner::begin(scene, out, Begin::Overwrite)?.run_to_end(progress)
 }
 
@@ -64,6 +67,7 @@ pub struct Runner<'a> {
     start: Start,
     pub(super) scene: &'a Scene,
     pub(super) folder: Folder,
+    _inputs: Protected,
     pub(super) simulation: Simulation,
     /// The open files; `None` if the run is finished.
     pub(super) output: Option<Output>,
@@ -83,15 +87,25 @@ impl<'a> Runner<'a> {
     /// Prepares a run in the folder `out`, which is created if it is missing.
     pub fn begin(scene: &'a Scene, out: &Path, begin: Begin) -> Result<Runner<'a>, RunError> {
         let folder = Folder::open(out)?;
+        let inputs = protect(scene.inputs());
         let store = Store::new(out);
         let identity = Identity::of(scene.source.text(), &scene.folder, scene.precision(), &scene.model);
         if begin == Begin::Resume
             && let Some(found) = store.find(|checkpoint| usable(checkpoint, &identity, scene, out))?
         {
-            return Runner::resume(scene, folder, store, found);
+            return Runner::resume(scene, folder, inputs, store, found);
         }
         if begin == Begin::New {
             refuse_other_runs(&store, &identity, out)?;
+        }
+        if begin != Begin::Overwrite
+            && let Some(path) = in_the_way(out)
+            && !(begin == Begin::Resume && has_begun(scene, out))
+        {
+            return Err(RunError::InTheWay { path });
+        }
+        if let Some(path) = input_among(out) {
+            return Err(RunError::OwnInput { path });
         }
         if let Initial::File { path, .. } = &scene.initial
             && replaces(out, path)
@@ -122,10 +136,16 @@ impl<'a> Runner<'a> {
                 .to_bytes(),
         };
         let checkpoints = Checkpoints::new(store, good, None);
-        Runner::of(scene, folder, simulation, Some(output), checkpoints, Start::New)
+        Runner::of(scene, (folder, inputs), simulation, Some(output), checkpoints, Start::New)
     }
 
-    fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
+    fn resume(
+        scene: &'a Scene,
+        folder: Folder,
+        inputs: Protected,
+        store: Store,
+        found: Found,
+    ) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
         let mut simulation = scene.simulation_of_run(good.state.clone(), NonZeroUsize::MIN)?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
@@ -147,19 +167,19 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
-        if !folder.path.join("about.json").is_file() {
+        if !there(&folder.path.join(About::NAME)) {
             about::about(scene)
                 .write(&folder.path)
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
         let stored = Some(good.step);
         let checkpoints = Checkpoints::new(store, good, stored);
-        Runner::of(scene, folder, simulation, output, checkpoints, start)
+        Runner::of(scene, (folder, inputs), simulation, output, checkpoints, start)
     }
 
     fn of(
         scene: &'a Scene,
-        folder: Folder,
+        (folder, inputs): (Folder, Protected),
         simulation: Simulation,
         output: Option<Output>,
         checkpoints: Checkpoints,
@@ -177,6 +197,7 @@ impl<'a> Runner<'a> {
             start,
             scene,
             folder,
+            _inputs: inputs,
             simulation,
             output,
             position: good.position,
@@ -272,13 +293,16 @@ fn usable(
     // A finished run no longer needs its files; the user may have moved them.
     for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
         let file = out.join(name);
-        let found = file.metadata().map_or(0, |m| m.len());
+        let opened = open_inside(&file);
+        let found = opened.as_ref().ok().and_then(|file| Some(file.metadata().ok()?.len()));
+        // A file that cannot be read may still be writable; its length is known all the same.
+        let found =
+            found.or_else(|| Some(file.symlink_metadata().ok().filter(|m| m.is_file())?.len())).unwrap_or(0);
         let Written { length, .. } = *expected;
         if found < length {
             return Err(CheckpointError::File { path, file, found, expected: length });
         }
-        // A file that cannot be read may still be writable; opening it for writing decides.
-        if Written::of(&file, length).is_ok_and(|found| found != *expected) {
+        if opened.and_then(|file| Written::of(file, length)).is_ok_and(|found| found != *expected) {
             return Err(CheckpointError::Edited { path, file, length });
         }
     }

@@ -2,7 +2,7 @@
 
 use super::RunError;
 use psidpd_core::engine::thermostat::Effort;
-use psidpd_formats::files::{PathError, replace_through};
+use psidpd_formats::files::{PathError, read_json_if_there, replace_inside};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -101,13 +101,12 @@ impl Timing {
 
     /// Reads the times of earlier sessions; empty if the file cannot be read.
     pub(super) fn read(folder: &Path) -> Timing {
-        let text = std::fs::read_to_string(folder.join(Self::NAME)).ok();
-        text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
+        read_json_if_there(&folder.join(Self::NAME)).ok().flatten().unwrap_or_default()
     }
 
     pub(super) fn write(&self, folder: &Path) -> Result<(), RunError> {
-        let (path, new) = (folder.join(Self::NAME), folder.join("timing.json.new"));
+        let path = folder.join(Self::NAME);
         let text = serde_json::to_string_pretty(self).map_err(|e| PathError::at("write", &path)(e.into()))?;
-        Ok(replace_through(&new, &path, (text + "\n").as_bytes())?)
+        Ok(replace_inside(&path, (text + "\n").as_bytes(), false)?)
     }
 }

@@ -6,7 +6,8 @@ use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, 
 use crate::checkpoint::Position;
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
-use psidpd_formats::{DataFile, PathError};
+use psidpd_formats::DataFile;
+use psidpd_formats::files::{PathError, draft_inside};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -219,8 +220,7 @@ impl Runner<'_> {
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
-        let path = self.write_good("final.data")?;
-        std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(PathError::at("write", &path))?;
+        self.write_good("final.data")?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary();
         write_json(&self.folder.path.join("summary.json"), &summary)?;
@@ -239,7 +239,13 @@ impl Runner<'_> {
         let path = self.folder.path.join(name);
         let title = format!("psidpd: {}, step {}", self.scene.title, good.step);
         let data = good.state.to_data_by_tag(&title);
-        DataFile { names: self.scene.model.species().to_vec(), ..data }.write(&path)?;
+        let data = DataFile { names: self.scene.model.species().to_vec(), ..data };
+        let write = || {
+            let mut draft = draft_inside(&path)?;
+            data.write_to(&mut draft)?;
+            draft.finish(true)
+        };
+        write().map_err(PathError::at("write", &path))?;
         Ok(path)
     }
 

@@ -96,9 +96,21 @@ impl Scene {
         };
         let original = document.source.text();
         let (text, of_model) = edits::edit_scene(original, edits, &parameters)?;
-        Document::parse(&path.display().to_string(), &text)
+        Document::parse_in(path, &text)
             .and_then(|edited| Scene::read(&edited, base, &of_model))
             .map_err(|error| edits::blamed(error, original, edits))
+    }
+
+    /// The files that the scene names: its model, tables and states, and the tables that its model names.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let document = |source: &Source| Document::parse(source.name(), source.text()).ok();
+        let mut all = vec![self.model_path.clone()];
+        let beside_model = self.model_path.parent().unwrap_or(Path::new(""));
+        for (source, folder) in [(&*self.source, &*self.folder), (self.model.source(), beside_model)] {
+            let names = document(source).map(|document| document.root().strings()).unwrap_or_default();
+            all.extend(names.iter().map(|name| folder.join(name)).filter(|path| path.is_file()));
+        }
+        all
     }
 
     /// Parses a scene from a text; messages use `name` as the name of the file, and the path of the model
@@ -279,7 +291,7 @@ fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Mo
     let path = base.join(&name);
     let model = Model::open(&path).and_then(|model| match edits {
         [] => Ok(model),
-        _ => Model::parse(&path.display().to_string(), &edit_model(model.source().text(), edits)?),
+        _ => Model::parse_in(&path, &edit_model(model.source().text(), edits)?),
     });
     match model {
         Ok(model) => Ok((path, model)),

@@ -1,6 +1,10 @@
 //! Templates for `psidpd new`: a commented scene file and its model.
 
 use super::{Path, PathBuf};
+use psidpd_core::document::open_regular;
+use psidpd_formats::files::{Existing, PathError, there, write_bytes, write_new};
+use std::ffi::OsStr;
+use std::fs::create_dir_all;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Template {
@@ -37,50 +41,49 @@ pub const TEMPLATES: &[Template] = &[
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TemplateError {
-    #[error("{} already exists: choose another name, or remove it", .0.display())]
+    #[error("{} already exists: choose another name, or replace it with --overwrite", .0.display())]
     Exists(PathBuf),
-    #[error("{} cannot be written: {source}", path.display())]
-    Output { path: PathBuf, source: std::io::Error },
+    #[error("{} cannot be written: {}", .0.path.display(), .0.cause)]
+    Output(#[from] PathError),
 }
 
 impl Template {
     /// Writes the scene to `path`, with `.toml` if the path has no extension, and its model beside it, unless
     /// the same model is there. Nothing is overwritten. Returns the paths of the scene and of the model.
-    pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], TemplateError> {
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<[PathBuf; 2], TemplateError> {
         let scene = match path.extension() {
             Some(extension) if extension == "toml" => path.to_owned(),
-            _ => PathBuf::from(format!("{}.toml", path.display())),
+            _ => PathBuf::from([path.as_os_str(), ".toml".as_ref()].join(OsStr::new(""))),
         };
         let model = scene.with_file_name(self.model_name);
-        if scene.exists() || scene == model {
+        let keep = existing == Existing::Keep;
+        if scene == model || keep && there(&scene) {
             return Err(TemplateError::Exists(scene));
         }
-        let there = std::fs::read_to_string(&model).ok();
-        if there.as_deref().is_some_and(|text| text != self.model) {
+        let read = |path: &Path| open_regular(path).and_then(std::io::read_to_string).ok();
+        let same = there(&model) && read(&model).as_deref() == Some(self.model);
+        if keep && there(&model) && !same {
             return Err(TemplateError::Exists(model));
         }
         let folder = scene.parent().unwrap_or(Path::new(""));
-        std::fs::create_dir_all(folder).map_err(output(folder))?;
-        if there.is_none() {
-            create(&model, self.model)?;
+        create_dir_all(folder).map_err(PathError::at("write", folder))?;
+        if !same {
+            create(&model, self.model, keep)?;
         }
-        create(&scene, self.scene)?;
+        create(&scene, self.scene, keep)?;
         Ok([scene, model])
     }
 }
 
-/// Writes a file that must not exist.
-fn create(path: &Path, text: &str) -> Result<(), TemplateError> {
-    use std::io::Write;
-    let file = std::fs::OpenOptions::new().write(true).create_new(true).open(path);
-    file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(output(path))
-}
-
-fn output(path: &Path) -> impl FnOnce(std::io::Error) -> TemplateError + '_ {
-    move |source| match source.kind() {
-        std::io::ErrorKind::AlreadyExists => TemplateError::Exists(path.to_owned()),
-        _ => TemplateError::Output { path: path.to_owned(), source },
+/// Writes a file; if `keep` is set it must not exist.
+fn create(path: &Path, text: &str, keep: bool) -> Result<(), TemplateError> {
+    if !keep {
+        return Ok(write_bytes(path, Existing::Replace, text.as_bytes())?);
     }
+    write_new(path, text.as_bytes()).map_err(|error| match error.cause.kind() {
+        std::io::ErrorKind::AlreadyExists => TemplateError::Exists(path.to_owned()),
+        _ => error.into(),
+    })
 }
 
 #[cfg(test)]
@@ -92,7 +95,8 @@ mod tests {
     fn templates_are_written_with_their_models_and_open() {
         let folder = tempfile::tempdir().unwrap();
         for template in TEMPLATES {
-            let [scene, model] = template.write(&folder.path().join("deep").join(template.name)).unwrap();
+            let [scene, model] =
+                template.write(&folder.path().join("deep").join(template.name), Existing::Keep).unwrap();
             assert!(scene.ends_with(format!("{}.toml", template.name)) && model.is_file());
             let read = Scene::open(&scene).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(read.model_path, model);
@@ -104,17 +108,19 @@ mod tests {
     fn nothing_is_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mine.toml");
-        let [scene, model] = TEMPLATES[0].write(&path).unwrap();
+        let [scene, model] = TEMPLATES[0].write(&path, Existing::Keep).unwrap();
         assert_eq!(scene, path);
-        assert!(matches!(TEMPLATES[0].write(&path), Err(TemplateError::Exists(p)) if p == path));
+        assert!(
+            matches!(TEMPLATES[0].write(&path, Existing::Keep), Err(TemplateError::Exists(p)) if p == path)
+        );
         // Another scene uses the same model.
-        TEMPLATES[0].write(&folder.path().join("other")).unwrap();
+        TEMPLATES[0].write(&folder.path().join("other"), Existing::Keep).unwrap();
         std::fs::write(&model, "changed").unwrap();
         assert!(
-            matches!(TEMPLATES[0].write(&folder.path().join("third")), Err(TemplateError::Exists(p)) if p == model)
+            matches!(TEMPLATES[0].write(&folder.path().join("third"), Existing::Keep), Err(TemplateError::Exists(p)) if p == model)
         );
         assert!(!folder.path().join("third.toml").exists());
         let own = folder.path().join("standard-dpd");
-        assert!(matches!(TEMPLATES[0].write(&own), Err(TemplateError::Exists(_))));
+        assert!(matches!(TEMPLATES[0].write(&own, Existing::Keep), Err(TemplateError::Exists(_))));
     }
 }

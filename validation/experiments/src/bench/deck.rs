@@ -11,6 +11,7 @@ use crate::lammps::log::{Loop, timed};
 use crate::lammps::style::GRID;
 use crate::start::{SEED, Start};
 use psidpd_core::model::ForceLaw;
+use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_lammps_host::export::eam;
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -77,11 +78,11 @@ fn files(place: &Place, subject: &Subject) -> [PathBuf; 2] {
 
 /// Writes what decks of a fluid refer to.
 pub fn prepare(place: &Place, subject: &Subject, with_tables: bool) -> Result<(), ExperimentError> {
-    std::fs::create_dir_all(&place.work).map_err(ExperimentError::at(&place.work))?;
+    work_folder(&place.work)?;
     let [model, tables] = files(place, subject);
-    std::fs::write(&model, subject.text).map_err(ExperimentError::at(&model))?;
+    write_bytes(&model, Existing::Keep, subject.text.as_bytes())?;
     if with_tables {
-        eam::write(&subject.model()?.at(1.0)?, &[1.0], GRID, &tables)?;
+        eam::write(&subject.model()?.at(1.0)?, &[1.0], GRID, &tables, Existing::Keep)?;
     }
     Ok(())
 }

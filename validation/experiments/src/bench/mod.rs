@@ -36,7 +36,7 @@ use length::{FEWEST, Length};
 pub use outcome::Asked;
 use outcome::{FluidFacts, LammpsFacts, Machine, Scaling, Timed};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
-use psidpd_formats::files::{write_atomically, write_json};
+use psidpd_formats::files::{Existing, write_bytes, write_json};
 use psidpd_report::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -53,6 +53,7 @@ pub struct Options {
     /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
     pub lammps: Option<PathBuf>,
     pub out: PathBuf,
+    pub existing: Existing,
 }
 
 /// Skin of LAMMPS where none is looked for.
@@ -141,8 +142,8 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
         memory,
         equal_bits,
     };
-    write_json(&out.join("bench.json"), &outcome)?;
-    write_atomically(out.join("report.html"), page::report(&outcome)?.as_bytes())?;
+    write_json(&out.join("bench.json"), options.existing, &outcome)?;
+    write_bytes(&out.join("report.html"), options.existing, page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
 }
 

@@ -28,6 +28,7 @@ use crate::bulk::{Bulk, Sampling};
 use psidpd_core::model::{Model, Polynomial};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
+use psidpd_formats::files::temporary_folder;
 use psidpd_observe::Measured;
 use serde::Serialize;
 use std::cell::RefCell;
@@ -119,7 +120,7 @@ pub fn calibrate(
     // ψ at the bulk density itself, whatever the file has for a correction or a self term.
     let pairs = species.len() * species.len();
     let trial = with_correction(&text, &name, species, &vec![Polynomial(vec![0.0, DUMMY_SLOPE]); pairs], "")?;
-    let parse = |text: &str| Model::parse(&path.display().to_string(), text);
+    let parse = |text: &str| Model::parse_in(path, text);
     let theory = MeanField::new(&parse(&trial)?.at(options.kt)?)?;
     let per_species =
         |total: f64| -> Vec<f64> { options.composition.iter().map(|share| share * total).collect() };
@@ -140,7 +141,7 @@ pub fn calibrate(
                 .ok_or(ExperimentError::NoTarget(*total))
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let folder = tempfile::tempdir().map_err(ExperimentError::Folder)?;
+    let folder = temporary_folder()?;
     let observe = format!("local_density = {{ density = \"{name}\", bins = 1000 }}");
     let told = RefCell::new(told);
     told.borrow_mut()("measuring with rho~ = rho");

@@ -3,7 +3,8 @@
 use crate::bulk::{Bulk, Sampling};
 use psidpd_dynamics::run::{Begin, RunError, Runner, bytes_per_particle};
 use psidpd_dynamics::scene::Scene;
-use psidpd_formats::{PathError, memory};
+use psidpd_formats::files::temporary_folder;
+use psidpd_formats::memory;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -59,7 +60,7 @@ fn trial(scene: &Scene) -> Result<f64, RunError> {
     let mut scene = scene.clone();
     let last = scene.stages.len().saturating_sub(1);
     scene.stages.drain(..last);
-    let folder = tempfile::tempdir().map_err(PathError::at("create", &std::env::temp_dir()))?;
+    let folder = temporary_folder()?;
     let mut runner = Runner::begin(&scene, folder.path(), Begin::New)?;
     let stop = AtomicUsize::new(0);
     // The first step also computes the forces of the start.

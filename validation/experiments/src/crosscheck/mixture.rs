@@ -10,6 +10,7 @@ use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, State};
+use psidpd_formats::files::{Existing, work_folder};
 use psidpd_lammps_host::export::eam::{self, Grid};
 use psidpd_report::{Item, Section, Table};
 use rand::{RngExt, SeedableRng};
@@ -34,11 +35,11 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let model = Model::parse("mixture", MODEL)?;
     let state = random_state()?;
     let folder = context.work.join("mixture");
-    std::fs::create_dir_all(&folder).map_err(ExperimentError::at(&folder))?;
+    work_folder(&folder)?;
     let [data, tables] = ["start.data", "fluid.eam.alloy"].map(|name| folder.join(name));
     state.to_data("psidpd").write(&data)?;
     let grid = Grid { spacing: 1e-5, largest_density: 60.0, densities: 20_001 };
-    eam::write(&model.at(1.0)?, &state.mass, grid, &tables)?;
+    eam::write(&model.at(1.0)?, &state.mass, grid, &tables, Existing::Keep)?;
     let style =
         PairStyle::Eam { tables: tables.display().to_string(), species: "A B".to_owned(), thermostat: None };
     let deck = Deck::new(&style, SEED, data.display().to_string()).text();

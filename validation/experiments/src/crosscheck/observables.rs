@@ -10,6 +10,7 @@ use crate::lammps::frames;
 use crate::models;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
+use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_observe::{Observation, Observers};
 use psidpd_report::{Item, Section, Table};
 use serde_json::json;
@@ -30,7 +31,7 @@ const LARGEST: f64 = 1e-9;
 
 pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let folder = context.work.join("observables");
-    std::fs::create_dir_all(&folder).map_err(ExperimentError::at(&folder))?;
+    work_folder(&folder)?;
     let scene = scene(&folder)?;
     let state = scene.initial_state();
     let [g, msd] = by_lammps(context, &state, &folder)?;
@@ -66,7 +67,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
 
 fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     let model = folder.join("model.toml");
-    std::fs::write(&model, models::STANDARD).map_err(ExperimentError::at(&model))?;
+    write_bytes(&model, Existing::Keep, models::STANDARD.as_bytes())?;
     let text = format!(
         "title = \"distances and displacements\"\nmodel = \"model.toml\"\nkT = 1.0\nseed = {SEED}\nbox = [5.0, 6.0, 7.0]\n\
          density = 3.0\ndt = {DT}\nsteps = {steps}\n[observe]\nevery = {EVERY}\n\

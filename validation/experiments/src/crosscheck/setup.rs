@@ -9,6 +9,7 @@ use crate::lammps::style::GRID;
 use psidpd_core::engine::Precision;
 use psidpd_core::model::ForceLaw;
 use psidpd_dynamics::run::State;
+use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_lammps_host::export::eam::{self, Grid};
 use std::path::Path;
 
@@ -62,7 +63,7 @@ impl<'a> Setup<'a> {
         folder: &Path,
         absolute: bool,
     ) -> Result<String, ExperimentError> {
-        std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
+        work_folder(folder)?;
         let place = |name: &str| {
             if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
         };
@@ -78,15 +79,15 @@ impl<'a> Setup<'a> {
         match self.code {
             Code::Psi => {
                 let path = folder.join("model.toml");
-                std::fs::write(&path, self.set.model(self.law, self.gamma)?.source().text())
-                    .map_err(ExperimentError::at(&path))?;
+                let model = self.set.model(self.law, self.gamma)?;
+                write_bytes(&path, Existing::Keep, model.source().text().as_bytes())?;
             }
             Code::Eam => {
                 // ψ as embedding function, w as density and φ as pair potential: LAMMPS's own route to the same
                 // conservative forces.
                 let fluid = self.set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
                 let grid = Grid { spacing: self.spacing, ..GRID };
-                eam::write(&fluid, &[1.0], grid, &folder.join("fluid.eam.alloy"))?;
+                eam::write(&fluid, &[1.0], grid, &folder.join("fluid.eam.alloy"), Existing::Keep)?;
             }
             _ => {}
         }

@@ -9,6 +9,7 @@ use crate::lammps::style::PairStyle;
 use crate::start::{Filling, equilibrated, periodic};
 use psidpd_core::engine::{Precision, Step, Want};
 use psidpd_dynamics::run::State;
+use psidpd_formats::files::work_folder;
 use psidpd_observe::{Measured, threshold};
 use psidpd_report::quantity::with_error;
 use psidpd_report::{Check, Item, Section, Table};
@@ -43,7 +44,7 @@ fn deck(
     name: &str,
 ) -> Result<String, ExperimentError> {
     let folder = context.work.join(name);
-    std::fs::create_dir_all(&folder).map_err(ExperimentError::at(&folder))?;
+    work_folder(&folder)?;
     let data = folder.join("start.data");
     state.to_data("psidpd").write(&data)?;
     let style = PairStyle::Dpd { a: strength, gamma, rc: 1.0 };

@@ -6,7 +6,7 @@ use crate::files;
 use crate::lammps::host::PluginHost;
 use crate::machine::machine;
 use psidpd_core::engine::Fault;
-use psidpd_formats::files::{write_atomically, write_json};
+use psidpd_formats::files::{Existing, write_bytes, write_json};
 use psidpd_report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -17,6 +17,7 @@ pub struct Options {
     pub full: bool,
     /// Folder for `report.html`, `results.json` and what the runs leave.
     pub out: PathBuf,
+    pub existing: Existing,
     /// The one comparison that is made, if not all are: for tests.
     pub only: Option<&'static str>,
     /// What is wrong with the native engine: for tests that checks tell of it.
@@ -82,7 +83,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, Ex
         sections.push(part.section);
     }
     results.facts.insert("wall time".into(), format!("{:.0} s", start.elapsed().as_secs_f64()));
-    let report = write(&out, &results, sections)?;
+    let report = write(&out, options.existing, &results, sections)?;
     Ok(Validation { results, report })
 }
 
@@ -102,8 +103,13 @@ pub fn check_table(results: &Results) -> Table {
     table
 }
 
-fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<PathBuf, ExperimentError> {
-    write_json(&out.join("results.json"), results)?;
+fn write(
+    out: &Path,
+    existing: Existing,
+    results: &Results,
+    mut sections: Vec<Section>,
+) -> Result<PathBuf, ExperimentError> {
+    write_json(&out.join("results.json"), existing, results)?;
     sections.insert(0, conclusion::what_is_compared());
     sections.insert(0, conclusion::section(results));
     sections.push(Section::new("Checks", vec![Item::Table(check_table(results))]));
@@ -121,6 +127,6 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
         failed: results.failed_count(),
     };
     let path = out.join("report.html");
-    write_atomically(&path, report.render().as_bytes())?;
+    write_bytes(&path, existing, report.render().as_bytes())?;
     Ok(path)
 }

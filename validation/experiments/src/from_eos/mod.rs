@@ -24,6 +24,7 @@ use crate::calibrate::{Options as Calibrate, calibrate, spaced};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::Scene;
+use psidpd_formats::files::{Existing, temporary_folder, write_bytes};
 use psidpd_observe::Measured;
 use serde::Serialize;
 use std::path::Path;
@@ -96,14 +97,14 @@ pub fn from_eos(
         units.length * 1e9,
         1.0 / (liquid.compressibility * units.pressure * options.density),
     ));
-    let folder = tempfile::tempdir().map_err(ExperimentError::Folder)?;
+    let folder = temporary_folder()?;
     let path = folder.path().join("trial.toml");
     let mut trials: Vec<Trial> = Vec::new();
     // Between these the tension of Warren's fluids is 5 to 15.
     let mut attraction = -40.0;
     loop {
         let text = fluid::model(substance, &liquid, &units, options, attraction, command)?;
-        std::fs::write(&path, &text).map_err(ExperimentError::at(&path))?;
+        write_bytes(&path, Existing::Keep, text.as_bytes())?;
         let calibration = calibrate(
             &path,
             &Calibrate {
@@ -117,7 +118,7 @@ pub fn from_eos(
             command,
             &mut |_| {},
         )?;
-        std::fs::write(&path, &calibration.text).map_err(ExperimentError::at(&path))?;
+        write_bytes(&path, Existing::Keep, calibration.text.as_bytes())?;
         let [dense, tension] = slab(&path, options, folder.path())?;
         told(&format!(
             "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",

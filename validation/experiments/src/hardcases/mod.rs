@@ -19,6 +19,7 @@ use crate::models::SET6;
 use case::{Case, Inputs, Must, cube};
 use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
+use psidpd_formats::files::{remove_work, temporary_folder, work_folder};
 use psidpd_report::{Progress, Table};
 use serde::Serialize;
 
@@ -89,7 +90,7 @@ pub fn run(
     fault: Option<Fault>,
     progress: &Progress,
 ) -> Result<Vec<Verdict>, ExperimentError> {
-    let folder = tempfile::tempdir().map_err(ExperimentError::at(&std::env::temp_dir()))?;
+    let folder = temporary_folder()?;
     let lammps = lammps.then(|| PluginHost::find(&|line| progress.note(line))).transpose()?;
     let mut cases = cases(extent);
     let mut groups: Vec<&str> = cases.iter().map(|case| case.group).collect();
@@ -118,12 +119,12 @@ pub fn run(
     }
     let bar = (progress, "hard cases");
     let verdicts = jobs::counted(bar, runs, |(case, lammps, integrator, precision, must, place)| {
-        std::fs::create_dir_all(&place).map_err(ExperimentError::at(&place))?;
+        work_folder(&place)?;
         let (host, found) = match lammps {
             None => (Host::Native, native::carry_out(case, integrator, precision, &place, fault)?),
             Some(lammps) => (Host::Plugin, plugin::carry_out(lammps, case, precision, &place)?),
         };
-        let _ = std::fs::remove_dir_all(&place);
+        let _ = remove_work(&place);
         Ok(Verdict {
             group: case.group,
             case: case.name,

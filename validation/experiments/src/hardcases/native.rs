@@ -11,6 +11,7 @@ use psidpd_dynamics::particles::State;
 use psidpd_dynamics::run::{Begin, RunError, Runner, Simulation};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::data::DataFile;
+use psidpd_formats::files::{Existing, write_bytes};
 use std::path::Path;
 
 /// Fewer particles than these have no temperature.
@@ -28,7 +29,7 @@ pub fn scene(
 ) -> Result<Result<Scene, FileError>, ExperimentError> {
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(ExperimentError::at(&path))
+        write_bytes(&path, Existing::Keep, text.as_bytes())
     };
     write("model.toml", &run.model)?;
     if let Some(data) = &run.data {

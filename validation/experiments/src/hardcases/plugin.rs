@@ -7,6 +7,7 @@ use crate::lammps::host::PluginHost;
 use crate::lammps::log::rows;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
+use psidpd_formats::files::Existing;
 use psidpd_lammps_host::LammpsError;
 use psidpd_lammps_host::export::lammps::{self as deck, Script};
 use std::path::Path;
@@ -37,7 +38,7 @@ pub fn carry_out(
     let before_last_run =
         "compute counts all pair dpd/psi\nthermo_style custom step temp c_counts[3] c_counts[4]\nthermo 4\n";
     let script = Script { plugin: lammps.plugin.is_some(), before_last_run, ..Script::default() };
-    let written = deck::write_inputs(&scene, &scene.initial_state(), &out)
+    let written = deck::write_inputs(&scene, &scene.initial_state(), &out, Existing::Keep)
         .and_then(|_| deck::script_of(&scene, script));
     let script = match written {
         Ok(script) => script,

@@ -1,6 +1,7 @@
 //! LAMMPS with psidpd's pair styles, as a program.
 
 use crate::ExperimentError;
+use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_lammps_host::{Host, LammpsError, plugin};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -48,9 +49,9 @@ impl PluginHost {
         log: &str,
         limit: Duration,
     ) -> Result<String, ExperimentError> {
-        std::fs::create_dir_all(folder).map_err(ExperimentError::at(folder))?;
+        work_folder(folder)?;
         let path = folder.join(SCRIPT);
-        std::fs::write(&path, script).map_err(ExperimentError::at(&path))?;
+        write_bytes(&path, Existing::Keep, script.as_bytes())?;
         let plugin = self.plugin.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
         let arguments = ["-log", log, "-var", "plugin", plugin.as_str()];
         Ok(self.host.run_script(ranks, folder, &path, &arguments, limit)?.stdout)

@@ -6,6 +6,7 @@ use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::{Edit, Scene, edit_model};
+use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_observe::Measured;
 use psidpd_report::run::SeriesTable;
 use std::cell::RefCell;
@@ -66,9 +67,8 @@ impl Context {
 
     fn write(&self, name: &str, model: &str) -> Result<PathBuf, ExperimentError> {
         let path = self.folder.join(format!("{name}.model.toml"));
-        std::fs::create_dir_all(&self.folder)
-            .and_then(|()| std::fs::write(&path, model))
-            .map_err(ExperimentError::at(&path))?;
+        work_folder(&self.folder)?;
+        write_bytes(&path, Existing::Keep, model.as_bytes())?;
         Ok(path)
     }
 

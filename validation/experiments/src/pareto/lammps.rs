@@ -11,6 +11,7 @@ use crate::code::Host;
 use crate::lammps::host::PluginHost;
 use crate::lammps::style::PairStyle;
 use crate::lammps::{frames, log};
+use psidpd_formats::files::{Existing, remove_if_there, work_folder};
 use psidpd_lammps_host::export::lammps::{self as deck, Script};
 use psidpd_observe::{Observers, Series};
 use std::path::{Path, PathBuf};
@@ -83,7 +84,7 @@ impl LammpsRuns {
         let path = self.work.join(name).join("frames.lammpstrj");
         let scene = (origin.scene, origin.stage.name.as_str(), origin.stage.kt);
         frames::show(&path, scene, &origin.state, (every, origin.dt(physics)), &mut observers)?;
-        let _ = std::fs::remove_file(&path);
+        let _ = remove_if_there(&path);
         let means = [(Class::Temperature, "T_kin", mean), (Class::Pressure, "p_total", sampled.mean(1))];
         let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
         let time = sampled.samples() as f64 * physics.interval() as f64 * origin.dt(physics);
@@ -101,7 +102,8 @@ impl LammpsRuns {
     ) -> Result<String, ExperimentError> {
         let folder = self.work.join(name);
         let scene = scene_of(origin, &setting.physics, steps);
-        deck::write_inputs(&scene, &origin.state, &folder)?;
+        work_folder(&folder)?;
+        deck::write_inputs(&scene, &origin.state, &folder, Existing::Keep)?;
         let own = self.own.as_ref().filter(|_| setting.host == Host::Lammps);
         let commands = own.map(|own| (own.atom_style(), own.commands(origin.stage.kt, scene.seed)));
         if let Some(("mdpd", _)) = commands {

@@ -38,7 +38,7 @@ use own_style::is_another_law;
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::scene::Scene;
-use psidpd_formats::files::{write_atomically, write_json};
+use psidpd_formats::files::{Existing, write_bytes, write_json};
 use psidpd_report::Progress;
 use quantity::{Known, Quantities, deviations};
 use race::{Rule, contenders, race};
@@ -61,6 +61,7 @@ pub struct Options {
     /// How much of each setting is sampled, and how it is timed; by the minutes if left out.
     pub fixed: Option<(Effort, Pace)>,
     pub out: PathBuf,
+    pub existing: Existing,
 }
 
 /// Shares of the minutes. Sampling counts twice, as two runs go on at once.
@@ -197,8 +198,8 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
         recommended: None,
     };
     outcome.recommended = recommend(&origin, &outcome);
-    write_json(&out.join("pareto.json"), &outcome)?;
-    write_atomically(out.join("pareto.html"), page::report(&outcome)?.as_bytes())?;
+    write_json(&out.join("pareto.json"), options.existing, &outcome)?;
+    write_bytes(&out.join("pareto.html"), options.existing, page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
 }
 

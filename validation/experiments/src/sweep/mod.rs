@@ -11,9 +11,11 @@ use crate::jobs;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
 use psidpd_dynamics::scene::{Edit, Scene};
-use psidpd_formats::files::{PathError, write_atomically};
+use psidpd_formats::files::{Existing, PathError, may_replace, read_if_there, replace_inside};
 use psidpd_report::{Headline, headline};
 use serde::Serialize;
+use std::fs::{File, TryLockError, create_dir_all};
+use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -37,6 +39,7 @@ pub struct Options {
 pub struct Point {
     #[serde(serialize_with = "shown")]
     pub edits: Vec<Edit>,
+    #[serde(serialize_with = "psidpd_formats::files::shown")]
     pub folder: PathBuf,
     /// What it measured; nothing if it failed or was stopped.
     pub headline: Headline,
@@ -49,11 +52,12 @@ fn shown<S: serde::Serializer>(edits: &[Edit], to: S) -> Result<S::Ok, S::Error>
 }
 
 const TABLE: &str = "sweep.csv";
+const PAGE: &str = "report.html";
 
 const MOST: usize = 10_000;
 
-/// Runs all points, each in its own folder, until they are done or `stop` is set. `tell` hears of each that ended, with how
-/// many have.
+/// Runs all points, each in its own folder, until they are done or `stop` is set, and writes `sweep.csv` and `report.html`. `tell`
+/// hears of each that ended, with how many have. Of two sweeps at once in a folder the second is refused.
 ///
 /// # Errors
 /// A scene that cannot be read with the first values; a folder that cannot be written. A run that fails is a [`Point`]
@@ -66,19 +70,54 @@ pub fn run(
     let points = combinations(&options.axes)?;
     // What is wrong with the scene itself is said at once, and not once for each run.
     Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
+    let _lock = lock(&options.out)?;
     refuse_other_grid(options, &points)?;
-    std::fs::create_dir_all(&options.out).map_err(PathError::at("write", &options.out))?;
+    refuse_results(options)?;
     let ended = AtomicUsize::new(0);
     let goes_on = |_: &_| stop.load(Ordering::Relaxed) == 0;
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let at_once = options.jobs.map_or((cores / options.threads).max(1), NonZeroUsize::get);
-    Ok(jobs::on(at_once.min(points.len()), points.iter().enumerate().take_while(goes_on), |edits| {
-        let point = run_point(options, edits, stop);
-        if point.finished || point.error.is_some() {
-            tell(&point, ended.fetch_add(1, Ordering::Relaxed) + 1);
+    let points =
+        jobs::on(at_once.min(points.len()), points.iter().enumerate().take_while(goes_on), |edits| {
+            let point = run_point(options, edits, stop);
+            if point.finished || point.error.is_some() {
+                tell(&point, ended.fetch_add(1, Ordering::Relaxed) + 1);
+            }
+            point
+        });
+    write(options, &points)?;
+    Ok(points)
+}
+
+/// Creates the folder of a sweep if it is missing, and locks it against other sweeps. The lock ends with the process.
+fn lock(out: &Path) -> Result<File, ExperimentError> {
+    create_dir_all(out).map_err(PathError::at("write", out))?;
+    let lock = File::open(out).map_err(PathError::at("write", out))?;
+    match lock.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(RunError::Busy { folder: out.to_owned() }.into()),
+        // Some file systems have no locks.
+        _ => Ok(lock),
+    }
+}
+
+/// A table or a page that no sweep made is not replaced.
+fn refuse_results(options: &Options) -> Result<(), ExperimentError> {
+    let existing = Existing::from(options.overwrite);
+    for name in [TABLE, PAGE] {
+        let path = options.out.join(name);
+        // A link is no file of anybody's, and is replaced itself. Every row of the table is known to be of this sweep.
+        let is_file = path.symlink_metadata().is_ok_and(|about| about.is_file());
+        if is_file && !(name == TABLE && is_table(&path)) {
+            may_replace(&path, existing)?;
         }
-        point
-    }))
+    }
+    Ok(())
+}
+
+/// Whether a file is a table of a sweep, by the names of its last columns.
+fn is_table(path: &Path) -> bool {
+    let text = read_if_there(path).ok().flatten().unwrap_or_default();
+    text.lines().next().is_some_and(|header| header.ends_with("finished,notes,folder"))
 }
 
 /// Every value of every axis with every value of the others, the last axis fastest.
@@ -102,7 +141,7 @@ fn combinations(axes: &[Axis]) -> Result<Vec<Vec<Edit>>, ExperimentError> {
 /// A table of other runs is not replaced: every row must be a point of this sweep. Rows end with their folders.
 fn refuse_other_grid(options: &Options, points: &[Vec<Edit>]) -> Result<(), ExperimentError> {
     let path = options.out.join(TABLE);
-    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(()) };
+    let Ok(Some(text)) = read_if_there(&path) else { return Ok(()) };
     let ends: Vec<String> = points.iter().map(|p| format!(",{}", page::quoted(&name(p)))).collect();
     let stranger = text.lines().skip(1).find(|row| !ends.iter().any(|end| row.ends_with(end)));
     match stranger.filter(|_| !options.overwrite) {
@@ -145,17 +184,21 @@ fn run_point(options: &Options, edits: &[Edit], stop: &AtomicUsize) -> Point {
 fn attempt(options: &Options, edits: &[Edit], folder: &Path, stop: &AtomicUsize) -> Result<bool, RunError> {
     let scene = Scene::open_with(&options.scene, edits)?;
     let begin = if options.overwrite { Begin::Overwrite } else { Begin::Resume };
+    if folder.is_symlink() {
+        let cause = io::Error::new(io::ErrorKind::NotADirectory, "not a folder");
+        return Err(PathError::at("write", folder)(cause).into());
+    }
     let mut runner = Runner::begin(&scene, folder, begin)?;
     runner.set_threads(options.threads)?;
     Ok(matches!(runner.run(stop, &mut |_| ())?, Outcome::Finished { .. }))
 }
 
 /// Writes `sweep.csv` and `report.html`.
-pub fn write(options: &Options, points: &[Point]) -> Result<(), ExperimentError> {
+fn write(options: &Options, points: &[Point]) -> Result<(), ExperimentError> {
     let title = options.scene.file_stem().map_or("sweep".into(), |name| name.to_string_lossy());
-    let to = |name: &str, text: String| write_atomically(options.out.join(name), text.as_bytes());
+    let to = |name: &str, text: String| replace_inside(&options.out.join(name), text.as_bytes(), true);
     to(TABLE, page::csv(&options.axes, points))?;
-    Ok(to("report.html", page(&title, &options.axes, points)?.render())?)
+    Ok(to(PAGE, page(&title, &options.axes, points)?.render())?)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use psidpd_core::engine::Plan;
 use psidpd_core::model::expression::Formula;
 use psidpd_core::model::pair::PairForm;
 use psidpd_core::model::{ExcessFreeEnergy, Fluid};
+use psidpd_formats::files::Existing;
 use psidpd_formats::setfl::{Element, Setfl};
 use std::path::Path;
 
@@ -33,7 +34,13 @@ impl Default for Grid {
 const MOST: u32 = 20_000_000;
 
 /// Writes the tables of `fluid`; `mass` holds the masses of its species, which become elements.
-pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(), LammpsError> {
+pub fn write(
+    fluid: &Fluid,
+    mass: &[f64],
+    grid: Grid,
+    path: &Path,
+    existing: Existing,
+) -> Result<(), LammpsError> {
     if fluid.dimensions != 3 {
         return Err(LammpsError::Flat);
     }
@@ -93,7 +100,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
             plan.linear_pair_energy(a, b, r) + acting.map(|p| p.potential.at(r).0).sum::<f64>()
         },
     };
-    Ok(table.write(path)?)
+    Ok(table.write(path, existing)?)
 }
 
 fn check_density(fluid: &Fluid, d: usize) -> Result<(), LammpsError> {
@@ -170,7 +177,7 @@ mod tests {
             );
             let fluid = Model::parse("m.toml", &text).unwrap().at(1.0).unwrap();
             let path = folder.path().join("t.eam.alloy");
-            write(&fluid, &[1.0], grid, &path).unwrap();
+            write(&fluid, &[1.0], grid, &path, Existing::Replace).unwrap();
             let text = std::fs::read_to_string(&path).unwrap();
             let values: Vec<f64> =
                 text.lines().skip(6).flat_map(str::split_whitespace).map(|x| x.parse().unwrap()).collect();

@@ -8,14 +8,16 @@ mod physics;
 
 use crate::LammpsError;
 use physics::Physics;
-use psidpd_core::document::{Document, FileError};
+use psidpd_core::document::{Document, FileError, open_regular};
 use psidpd_core::engine::noise::Law;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_dynamics::integrator::{Counterpart, Integrator};
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::scene::{Scene, Stage};
+use psidpd_formats::files::{Existing, may_replace, protect, write_bytes, write_result};
 use psidpd_formats::{PathError, memory};
 use std::fmt::Write;
+use std::fs::create_dir_all;
 use std::path::{Component, Path, PathBuf};
 
 pub const SCRIPT: &str = "in.lammps";
@@ -51,46 +53,66 @@ impl Default for Script<'_> {
 }
 
 /// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
-pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
+pub fn write(scene: &Scene, out: &Path, existing: Existing) -> Result<Vec<PathBuf>, LammpsError> {
     let script = script_of(scene, Script::default())?;
     let particles = scene.initial.parts().iter().map(|part| part.count).sum();
     memory::check(particles, memory::PARTICLE)?;
+    let _inputs = protect(scene.inputs());
+    // No file is written unless all can be: existing files may be somebody's work.
+    let (_, tables) = copy_of_model(scene)?;
+    let needless = |name: &Path| {
+        name == Path::new(MODEL_WITHOUT_THERMOSTAT) && scene.stages.iter().all(|s| s.thermostat)
+    };
+    let names = FILES.map(PathBuf::from).into_iter().filter(|name| !needless(name));
+    for path in names.map(|name| out.join(name)) {
+        may_replace(&path, existing)?;
+    }
+    for (from, to) in &tables {
+        if !is_same_file(from, &out.join(to)) {
+            may_replace(&out.join(to), existing)?;
+        }
+    }
     let mut files = vec![PathBuf::from(SCRIPT)];
-    files.extend(write_inputs(scene, &scene.initial_state(), out)?);
-    save(&out.join(SCRIPT), &script)?;
+    files.extend(write_inputs(scene, &scene.initial_state(), out, existing)?);
+    write_bytes(&out.join(SCRIPT), existing, script.as_bytes())?;
     Ok(files)
 }
 
 /// Writes what the script of a scene reads, with `state` as its start, and returns the names of the files.
-pub fn write_inputs(scene: &Scene, state: &State, out: &Path) -> Result<Vec<PathBuf>, LammpsError> {
-    std::fs::create_dir_all(out).map_err(PathError::at("write", out))?;
+pub fn write_inputs(
+    scene: &Scene,
+    state: &State,
+    out: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, LammpsError> {
+    create_dir_all(out).map_err(PathError::at("write", out))?;
     let mut files = vec![PathBuf::from(START), PathBuf::from(MODEL)];
     let (text, tables) = copy_of_model(scene)?;
     for (from, to) in tables {
         let path = out.join(&to);
         if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(PathError::at("write", parent))?;
+            create_dir_all(parent).map_err(PathError::at("write", parent))?;
         }
-        // Copying a file onto itself would empty it.
-        if !path.canonicalize().is_ok_and(|there| from.canonicalize().is_ok_and(|here| here == there)) {
-            std::fs::copy(&from, &path).map_err(PathError::at("write", &path))?;
+        if !is_same_file(&from, &path) {
+            let mut table = open_regular(&from).map_err(PathError::at("read", &from))?;
+            write_result(&path, existing, |out| std::io::copy(&mut table, out).map(drop))?;
         }
         files.push(to);
     }
-    save(&out.join(MODEL), &text)?;
+    write_bytes(&out.join(MODEL), existing, text.as_bytes())?;
     compare(scene, &out.join(MODEL), true).and_then(|same| {
         if same { Ok(()) } else { Err(LammpsError::Copy { model: scene.model_path.clone() }) }
     })?;
     if scene.stages.iter().any(|s| !s.thermostat) {
         let path = out.join(MODEL_WITHOUT_THERMOSTAT);
-        save(&path, &without_thermostat(&text))?;
+        write_bytes(&path, existing, without_thermostat(&text).as_bytes())?;
         if !compare(scene, &path, false).unwrap_or(false) {
             return Err(LammpsError::Thermostat { model: scene.model_path.clone() });
         }
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
 
-    write_start(scene, state, &out.join(START))?;
+    write_start(scene, state, &out.join(START), existing)?;
     Ok(files)
 }
 
@@ -214,7 +236,11 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, LammpsE
     Ok(true)
 }
 
-fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), LammpsError> {
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    other.canonicalize().is_ok_and(|there| one.canonicalize().is_ok_and(|here| here == there))
+}
+
+fn write_start(scene: &Scene, state: &State, path: &Path, existing: Existing) -> Result<(), LammpsError> {
     let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
     if scene.model.dimensions() == 2 {
@@ -225,7 +251,7 @@ fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), LammpsEr
             (atom.x[2], atom.image[2]) = (0.0, 0);
         }
     }
-    data.write(path).map_err(|e| LammpsError::Native(e.into()))
+    Ok(data.write_over(path, existing)?)
 }
 
 pub fn script_of(scene: &Scene, script: Script) -> Result<String, LammpsError> {
@@ -347,10 +373,6 @@ fn one_line(text: &str) -> String {
         c => c,
     };
     text.chars().map(plain).collect()
-}
-
-fn save(path: &Path, text: &str) -> Result<(), PathError> {
-    std::fs::write(path, text).map_err(PathError::at("write", path))
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ mod state;
 
 use super::{Item, Report, ReportError, Section};
 use crate::quantity::with_error;
-use psidpd_formats::files::{read_json_if_there, write_atomically};
+use psidpd_formats::files::{Existing, may_replace, read_json_if_there, replace_inside};
 use psidpd_formats::{About, FormatError};
 use psidpd_observe::Observation;
 use serde_json::Value;
@@ -38,10 +38,14 @@ const FILES: [(&str, &str); 12] = [
 
 /// Makes `report.html` from the files in the folder of a run, and returns its path. A file with invalid content is not an
 /// error: the page says what is wrong with it.
-pub fn write_run_report(folder: &Path) -> Result<PathBuf, ReportError> {
-    let page = run_report(folder)?.render();
+pub fn write_run_report(folder: &Path, existing: Existing) -> Result<PathBuf, ReportError> {
     let path = folder.join("report.html");
-    write_atomically(&path, page.as_bytes())?;
+    // A link is no file of anybody's, and is replaced itself.
+    if path.symlink_metadata().is_ok_and(|about| about.is_file()) {
+        may_replace(&path, existing)?;
+    }
+    let page = run_report(folder)?.render();
+    replace_inside(&path, page.as_bytes(), true)?;
     Ok(path)
 }
 
@@ -104,10 +108,10 @@ fn files_section(folder: &Path) -> Section {
     let mut missing = Vec::new();
     for (name, what) in FILES {
         let path = folder.join(name);
-        match std::fs::metadata(&path) {
+        match path.symlink_metadata() {
             Ok(data) if data.is_file() => table.push([name.to_owned(), what.into(), size(data.len())]),
-            Ok(_) => table.push([format!("{name}/"), what.into(), String::new()]),
-            Err(_) => missing.push(format!("{name} ({what})")),
+            Ok(data) if data.is_dir() => table.push([format!("{name}/"), what.into(), String::new()]),
+            _ => missing.push(format!("{name} ({what})")),
         }
     }
     let mut items = vec![Item::Table(table)];

@@ -4,6 +4,7 @@ use super::super::figure::Figure;
 use super::super::text::escape;
 use super::{About, Item, Path, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
+use psidpd_formats::files::{PathError, open_inside, there};
 use psidpd_formats::{Configuration, memory};
 use psidpd_pictures::{FieldOptions, ParticleOptions, View, animate, data_url};
 
@@ -17,7 +18,12 @@ impl State {
     pub fn find(folder: &Path, about: Option<&About>, notes: &mut Vec<String>) -> Option<State> {
         for file in ["final.data", "last-good.data", "dump.lammpstrj", "trajectory.xyz"] {
             let path = folder.join(file);
-            if !path.is_file() {
+            if !there(&path) {
+                continue;
+            }
+            // It is opened by its path, which must not lead elsewhere.
+            if let Err(error) = open_inside(&path).map_err(PathError::at("read", &path)) {
+                notes.push(error.to_string());
                 continue;
             }
             // A line of a data file becomes several numbers in memory. Frames of a dump are as large, and their number is not

@@ -85,7 +85,7 @@ fn texts(page: &str) -> Vec<String> {
 }
 
 fn page(folder: &Path) -> (Vec<String>, String) {
-    let path = write_run_report(folder).unwrap();
+    let path = write_run_report(folder, Existing::Keep).unwrap();
     let page = std::fs::read_to_string(path).unwrap();
     (texts(&page), page)
 }
@@ -154,8 +154,8 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
 #[test]
 fn what_is_not_there_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(write_run_report(folder.path()), Err(ReportError::NoRun { .. })));
-    assert!(write_run_report(&folder.path().join("none")).is_err());
+    assert!(matches!(write_run_report(folder.path(), Existing::Keep), Err(ReportError::NoRun { .. })));
+    assert!(write_run_report(&folder.path().join("none"), Existing::Keep).is_err());
     std::fs::write(folder.path().join("final.data"), DATA).unwrap();
     let (texts, _) = page(folder.path());
     let all = texts.join("\n");
