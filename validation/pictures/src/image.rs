@@ -1,5 +1,6 @@
 use super::colour::{Rgb, mix};
 use base64::Engine as _;
+use psidpd_formats::files::SOFTWARE;
 
 /// Pixels are stored row after row from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -79,6 +80,8 @@ impl Image {
             encoder.set_animated(images.len() as u32, 0)?;
             encoder.set_frame_delay(1, per_second.max(1))?;
         }
+        let [keyword, text] = SOFTWARE.map(str::to_owned);
+        encoder.add_text_chunk(keyword, text)?;
         let mut writer = encoder.write_header()?;
         for image in images {
             writer.write_image_data(image.pixels.as_flattened())?;
@@ -95,6 +98,8 @@ impl Image {
         let mut bytes = Vec::new();
         let mut encoder = gif::Encoder::new(&mut bytes, width, height, &[]).map_err(|e| e.to_string())?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| e.to_string())?;
+        let comment = gif::AnyExtension(gif::Extension::Comment as u8);
+        encoder.write_raw_extension(comment, &[SOFTWARE[1].as_bytes()]).map_err(|e| e.to_string())?;
         for image in images {
             // Each frame has its own palette, from a tenth of its pixels.
             let mut frame = gif::Frame::from_rgb_speed(width, height, image.pixels.as_flattened(), 10);

@@ -50,6 +50,12 @@ impl Files {
         self
     }
 
+    /// Adds input files that the user did not name.
+    pub fn also_reads(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Files {
+        self.reads.extend(paths);
+        self
+    }
+
     /// Keeps the inputs as they are while the verb works.
     pub fn protect(&self) -> Protected {
         protect(&self.reads)

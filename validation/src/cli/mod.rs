@@ -164,7 +164,9 @@ fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 fn survive_size_limits() {
     static HANDLER: std::sync::Once = std::sync::Once::new();
     // A system that refuses the handler has no such limits.
-    HANDLER.call_once(|| _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false))));
+    HANDLER.call_once(|| {
+        _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))
+    });
 }
 
 /// The file that starts this program.

@@ -1,4 +1,5 @@
 use super::*;
+use psidpd_dynamics::run::FILES;
 use psidpd_report::write_run_report;
 
 /// Make report.html of a run again.
@@ -11,20 +12,10 @@ pub struct Arguments {
 
 impl Arguments {
     pub fn files(&self) -> Files {
-        Files::reads(
-            &[
-                "about.json",
-                "thermo.csv",
-                "observables.json",
-                "summary.json",
-                "timing.json",
-                "final.data",
-                "last-good.data",
-                "dump.lammpstrj",
-                "trajectory.xyz",
-            ]
-            .map(|name| self.folder.join(name)),
-        )
+        let others =
+            ["summary.json", "timing.json"].into_iter().chain(FILES).map(|name| self.folder.join(name));
+        Files::reads(&["about.json", "thermo.csv", "observables.json"].map(|name| self.folder.join(name)))
+            .also_reads(others)
     }
 }
 

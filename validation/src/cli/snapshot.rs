@@ -3,6 +3,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use psidpd_core::engine::check_reach;
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
+use psidpd_formats::files::SVG;
 use psidpd_formats::{Configuration, FormatError, Frame};
 use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
 use psidpd_report::{Figure, extremes};
@@ -143,8 +144,11 @@ pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let values = values(a, model.as_ref(), &configuration)?;
     let ends = extremes(values.iter().flatten().copied());
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
-    let bytes =
-        if kind == "svg" { figure.render()?.into_bytes() } else { figure.with_scale_bar().to_png()? };
+    let bytes = if kind == "svg" {
+        (figure.render()? + SVG).into_bytes()
+    } else {
+        figure.with_scale_bar().to_png()?
+    };
     write_bytes(&out, told.existing, &bytes)?;
     say!("{}", out.display());
     let particles = configuration.x.len();

@@ -136,7 +136,7 @@ impl RunError {
                 format!("the checkpoint of step {step} is good: when the cause is gone, {go_on}")
             }
             RunError::Halted { checkpoint: None, .. } => {
-                "there is no checkpoint yet: when the cause is gone, start over".into()
+                format!("there is no checkpoint yet: when the cause is gone, {over}")
             }
             RunError::Unfinished { .. } => format!("{go_on}, or {over}"),
             RunError::Finished { .. } | RunError::InTheWay { .. } => {

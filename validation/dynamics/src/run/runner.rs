@@ -9,7 +9,7 @@ use super::{
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
-use psidpd_formats::files::{Protected, open_inside, protect, there, work_folder};
+use psidpd_formats::files::{Protected, open_inside, protect, there};
 use psidpd_formats::{About, memory};
 use psidpd_observe::Observers;
 use std::num::NonZeroUsize;
@@ -47,10 +47,8 @@ pub enum Start {
     Finished,
 }
 
-/// Runs a scene from its first step to its last, in a folder in which psidpd may replace everything ([`work_folder`]); see
-/// [`Runner`].
+/// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see [`Runner`].
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
-    work_folder(out)?;
     Runner::begin(scene, out, Begin::Overwrite)?.run_to_end(progress)
 }
 

@@ -23,7 +23,7 @@ pub use inside::{
     open_inside_to_write, read_if_there, read_inside, read_json_if_there, remove_all, remove_folder_if_empty,
     remove_if_there, replace_inside, there,
 };
-pub use own::{PAGE, json_text, remove_tree, remove_work, temporary_folder, work_folder};
+pub use own::{PAGE, SOFTWARE, SVG, json_text, remove_tree, remove_work, temporary_folder, work_folder};
 pub use result::{Existing, may_replace, open_lock, write_bytes, write_json, write_new, write_result};
 
 use std::io::{self, ErrorKind};

@@ -11,6 +11,10 @@ use tempfile::TempDir;
 /// Marks a page, near its beginning.
 pub const PAGE: &str = "<meta name=\"generator\" content=\"psidpd\"/>";
 
+/// Marks a picture: the end of an SVG, a text at the beginning of a PNG, a comment at the beginning of a GIF.
+pub const SVG: &str = "<!-- psidpd -->\n";
+pub const SOFTWARE: [&str; 2] = ["Software", "psidpd"];
+
 /// JSON has no comments: a blank before the last line break marks results.
 const JSON: [&[u8]; 2] = [b"} \n", b"] \n"];
 
@@ -22,22 +26,26 @@ pub fn json_text(value: &impl Serialize) -> serde_json::Result<String> {
     Ok(serde_json::to_string_pretty(value)? + " \n")
 }
 
-/// Whether a file is empty, or a page or JSON of psidpd.
+/// Whether a file is empty, or a page, a picture or JSON of psidpd.
 pub(super) fn is_made_here(path: &Path) -> io::Result<bool> {
     let mut file = open_regular(path)?;
     let mut start = vec![0; 1024];
     let length = file.metadata()?.len();
     start.truncate(length.min(1024) as usize);
     file.read_exact(&mut start)?;
-    let mut end = [0; 3];
-    if length >= 3 {
-        file.seek(SeekFrom::End(-3))?;
-        file.read_exact(&mut end)?;
-    }
-    let is_page =
-        start.starts_with(b"<!DOCTYPE html>") && start.windows(PAGE.len()).any(|w| w == PAGE.as_bytes());
-    let is_json = matches!(start.first(), Some(b'{' | b'[')) && JSON.contains(&&end[..]);
-    Ok(length == 0 || is_page || is_json)
+    let mut end = Vec::new();
+    file.seek(SeekFrom::Start(length.saturating_sub(SVG.len() as u64)))?;
+    file.take(SVG.len() as u64).read_to_end(&mut end)?;
+    let has = |text: &str| start.windows(text.len()).any(|w| w == text.as_bytes());
+    Ok(match &start[..] {
+        [] => true,
+        [b'{' | b'[', ..] => JSON.iter().any(|mark| end.ends_with(mark)),
+        page if page.starts_with(b"<!DOCTYPE html>") => has(PAGE),
+        svg if svg.starts_with(b"<svg") => end == SVG.as_bytes(),
+        png if png.starts_with(b"\x89PNG") => has(&SOFTWARE.join("\0")),
+        gif if gif.starts_with(b"GIF89a") => has(SOFTWARE[1]),
+        _ => false,
+    })
 }
 
 /// Whether the path lies in a folder that [`work_folder`] has made.
