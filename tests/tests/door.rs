@@ -114,8 +114,7 @@ fn nothing_is_written_or_read_beside_the_door() {
         }
         let allowed = ALLOWED.iter().find(|(file, _, _)| *file == name).map_or(&[][..], |(_, uses, _)| uses);
         let text = code(&std::fs::read_to_string(&path).unwrap());
-        for word in WRITES.iter().chain(READS).filter(|word| uses(&text, word) && !allowed.contains(word))
-        {
+        for word in WRITES.iter().chain(READS).filter(|word| uses(&text, word) && !allowed.contains(word)) {
             found.push(format!("{name}: {word}"));
         }
     }

@@ -99,7 +99,6 @@ pub fn files(
             None => new.left.push(Note { text: format!("{name} {without_out}"), ..note.clone() }),
         }
     }
-<<<<<<< HEAD
     for (k, (note, text)) in std::mem::take(&mut new.models).into_iter().enumerate() {
         let nearest = match out {
             Some(path) => {
@@ -114,10 +113,8 @@ pub fn files(
         };
         new.by_hand.push(Note { text: note.text.replace("NEAREST", &nearest), ..note });
     }
-=======
     let named = new.included.iter().map(|(name, _)| name).chain(new.data.iter().map(|data| &data.name));
     let _inputs = protect(named.map(|name| beside(old, name)).chain([old.to_owned()]));
->>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
     // No file is written unless all can be: existing files may be somebody's work.
     results.iter().try_for_each(|(path, _)| may_replace(path, existing))?;
     for (path, text) in &results {

@@ -77,23 +77,16 @@ pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsErro
     let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
     let own = base_dir()?;
     let base = match host.kind {
-<<<<<<< HEAD
-        HostKind::Environment if host.root == venv_dir() => base_dir(),
+        HostKind::Environment if host.root == venv_dir()? => own,
         // Wheels of one version differ by their update.
         HostKind::Environment => {
             let update = version.name.split_once(" - ").map_or("", |(_, update)| update);
             let update: String = update.chars().filter(char::is_ascii_alphanumeric).collect();
             let update = if update.is_empty() { update } else { format!("-{}", update.to_lowercase()) };
-            base_dir().join(format!("{name}{update}-wheel"))
+            own.join(format!("{name}{update}-wheel"))
         }
-        HostKind::Prefix => base_dir().join(name),
-        HostKind::Source => base_dir().join(name + "-source"),
-=======
-        HostKind::Environment if host.root == venv_dir()? => own,
-        HostKind::Environment => own.join(name + "-wheel"),
         HostKind::Prefix => own.join(name),
         HostKind::Source => own.join(name + "-source"),
->>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
     };
     if base.exists() {
         check_own(&base)?;

