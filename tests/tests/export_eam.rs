@@ -2,6 +2,7 @@
 //! model: the test compares one configuration in one LAMMPS.
 
 use psidpd::export::eam::{Grid, write};
+use psidpd::formats::files::Existing;
 use psidpd::lammps::Lammps;
 use psidpd::lammps::LammpsError;
 use psidpd_core::maximum::largest;
@@ -41,7 +42,7 @@ fn compare(text: &str, kt: f64, density: f64, grid: Grid) {
     let cold = text.split("[[thermostat]]").next().unwrap();
     std::fs::write(place("cold.toml"), cold).unwrap();
     let masses = vec![1.0; fluid.species.len()];
-    write(&fluid, &masses, grid, Path::new(&place("fluid.eam.alloy"))).unwrap();
+    write(&fluid, &masses, grid, Path::new(&place("fluid.eam.alloy")), Existing::Keep).unwrap();
 
     let (host, plugin) = lammps();
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -115,7 +116,7 @@ fn fluids_beyond_a_table_are_refused() {
     let refusal = |text: &str, kt: f64| {
         let fluid = fluid(text, kt);
         let masses = vec![1.0; fluid.species.len()];
-        write(&fluid, &masses, Grid::default(), &folder.path().join("fluid")).unwrap_err()
+        write(&fluid, &masses, Grid::default(), &folder.path().join("fluid"), Existing::Keep).unwrap_err()
     };
     assert!(matches!(refusal(&text("van-der-waals-2d"), 1.0), LammpsError::Flat));
     assert!(matches!(refusal(&text("van-der-waals-3d"), 2.5), LammpsError::Bounds(_)));

@@ -105,7 +105,7 @@ fn no_damage_goes_unnoticed() {
     assert!(matches!(read(&longer), Err(CheckpointError::Damaged { .. })));
     let text = read(b"title = \"a scene, and longer than any header\"\n").unwrap_err().to_string();
     assert!(text.ends_with("c is not a checkpoint of psidpd"), "{text}");
-    let error = read(&folder.path().join("none")).unwrap_err();
+    let error = self::read(&folder.path().join("none")).unwrap_err();
     assert!(matches!(error, CheckpointError::Unreadable { .. }), "{error}");
 }
 

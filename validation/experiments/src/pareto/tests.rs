@@ -17,6 +17,7 @@ fn options(folder: &Path, tolerances: &[&str]) -> Options {
         lammps: false,
         fixed: Some((Effort::Samples(60), Pace { rounds: 2, seconds: 0.01 })),
         out: folder.join("out"),
+        existing: Default::default(),
     }
 }
 
