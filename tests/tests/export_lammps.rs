@@ -130,8 +130,8 @@ range = 1.0
 "#;
 
 /// A box of walls with a frozen floor and a frozen block, gravity on one part, a uniform force on one species
-/// of the other, a ramp, and stages with and without thermostat and body forces. The fluid is so hot that
-/// many particles reach the walls.
+/// of the other, a ramp, and stages with and without thermostat and body forces. A single particle meets two faces. Nothing else
+/// does: under a force the native run bounces on the exact path, and LAMMPS mirrors.
 const WALLS: &str = r#"
 title = "walls"
 model = "mixture.toml"
@@ -140,7 +140,7 @@ seed  = 14
 precision = "double"
 dt    = 0.01
 [box]
-lengths  = [5.0, 6.0, 7.0]
+lengths  = [24.0, 6.0, 26.0]
 boundary = ["reflecting", "periodic", "reflecting"]
 [masses]
 B = 2.0
@@ -154,22 +154,29 @@ frozen    = true
 [[part]]
 name    = "lower"
 shape   = "box"
-low     = [0.0, 0.0, 1.5]
-high    = [5.0, 6.0, 4.0]
+low     = [10.0, 0.0, 10.0]
+high    = [14.0, 6.0, 12.5]
 density = 3.0
 [[part]]
 shape   = "sphere"
 radius  = 0.5
-center  = [2.5, 3.0, 4.5]
+center  = [12.0, 3.0, 13.0]
 count   = 5
 frozen  = true
 [[part]]
 name    = "upper"
 shape   = "box"
-low     = [0.0, 0.0, 5.0]
+low     = [10.0, 0.0, 13.5]
+high    = [14.0, 6.0, 15.5]
 density = 3.0
 min_distance = 0.3
 velocity = [1.0, 0.0, 0.5]
+[[part]]
+shape    = "sphere"
+radius   = 0.2
+center   = [2.0, 3.0, 20.0]
+count    = 1
+velocity = [-15.0, 0.0, 20.0]
 [[body_force]]
 acceleration = [0.3, -0.2, -0.5]
 parts        = ["upper"]
@@ -205,7 +212,7 @@ thermo = 5
 dump   = 5
 "#;
 
-/// Opposite flows between two walls in two dimensions.
+/// Opposite flows in a slab between two walls in two dimensions.
 const CHANNELS: &str = r#"
 title = "channels"
 model = "flat.toml"
@@ -215,12 +222,12 @@ precision = "double"
 steps = 60
 dt    = 0.01
 [box]
-lengths  = [7.0, 9.0]
+lengths  = [7.0, 17.0]
 boundary = ["periodic", "reflecting"]
 [initial]
-kind    = "lattice"
-lattice = "hexagonal"
-density = 12.0
+kind      = "slab"
+thickness = 4.5
+density   = 12.0
 [[body_force]]
 acceleration   = [0.5, 0.0]
 reversed_along = "y"
@@ -475,7 +482,7 @@ fn a_splitting_in_two_dimensions() {
     }
 }
 
-/// Particles are reflected after each drift, and frozen particles exert drag.
+/// A particle is reflected after each drift, and frozen particles exert drag.
 #[test]
 fn splittings_between_walls() {
     // The test has few steps, because rounding grows fast among fast particles. A lost pair would change forces by 10⁻².

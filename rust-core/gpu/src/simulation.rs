@@ -165,9 +165,6 @@ impl GpuSimulation {
             if every == 0 {
                 return Err(GpuError::Host("the thermostat must act every step, or every n-th"));
             }
-            if gradient != 0.0 && self.geometry.walls() != [0; 3] {
-                return Err(Unsupported { what: "displaced forces between walls".into() }.into());
-            }
             if self.heats(rule) || gradient != 0.0 {
                 self.allocate(true)?;
             }

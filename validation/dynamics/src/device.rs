@@ -113,8 +113,8 @@ pub fn gpus() -> Result<Vec<Found>, DeviceError> {
     }
 }
 
-/// The part of a step that GPUs do not make, perhaps because of `walls`; `None` if they make the whole step.
-pub fn refused_step(integrator: Integrator, walls: bool) -> Option<String> {
+/// The part of a step that GPUs do not make; `None` if they make the whole step.
+pub fn refused_step(integrator: Integrator) -> Option<String> {
     match integrator {
         Integrator::VelocityVerlet => None,
         Integrator::TwoStage { coupling, .. } | Integrator::ForceGradient { coupling, .. }
@@ -126,9 +126,6 @@ pub fn refused_step(integrator: Integrator, walls: bool) -> Option<String> {
             if coupling.noise != Law::Gaussian =>
         {
             Some("noise = \"uniform\"".into())
-        }
-        Integrator::ForceGradient { gradient, .. } if walls && gradient != 0.0 => {
-            Some("integrator = \"force-gradient\" between walls".into())
         }
         Integrator::TwoStage { .. } | Integrator::ForceGradient { .. } => None,
         other => Some(format!("integrator = \"{}\"", other.name())),

@@ -1,4 +1,4 @@
-//! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`.
+//! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`; between reflecting faces with weights.
 
 use super::frame::Frame;
 use psidpd_core::engine::PeriodicBox;
@@ -26,25 +26,46 @@ pub fn missing(fluid: &Fluid, domain: &PeriodicBox) -> Option<&'static str> {
     }
 }
 
-/// `Σ F·F` and `Σ ∇²U` over the mobile particles.
+/// `Σ w F·F` and `Σ (w ∇²U − ∇w·F)` over the mobile particles, with the weights of [`weight`].
 pub fn sums(frame: &Frame) -> [f64; 2] {
     let mut sums = [0.0; 2];
     terms(frame, |_, term| (0..2).for_each(|c| sums[c] += term[c]));
     sums
 }
 
-/// Visits `F·F` and `∇²U` of each mobile particle, with its index.
+/// The weight of a particle and its gradient: 1, but near reflecting faces the distance from them in ranges of the forces.
+///
+/// `kT = ⟨w F·F⟩/⟨−∇·(w F)⟩` holds for any weight that is 0 where space ends. Without a weight a face adds `ρ F` to the divergence,
+/// with the density and the mean outward force of the particles that touch it.
+fn weight(frame: &Frame, range: f64, x: [f64; 3]) -> (f64, [f64; 3]) {
+    let domain = frame.view.domain;
+    let (mut weight, mut gradient) = (1.0, [0.0; 3]);
+    for k in (0..frame.view.dimensions).filter(|k| !domain.periodic()[*k]) {
+        let (below, length) = (x[k] - domain.origin()[k], domain.lengths()[k]);
+        let (distance, slope) = if below < 0.5 * length { (below, 1.0) } else { (length - below, -1.0) };
+        let (part, slope) = if distance < range { (distance / range, slope / range) } else { (1.0, 0.0) };
+        gradient = gradient.map(|g| g * part);
+        gradient[k] = weight * slope;
+        weight *= part;
+    }
+    (weight, gradient)
+}
+
+/// Visits `w F·F` and `w ∇²U − ∇w·F` of each mobile particle, with its index.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
     let laplacians = evaluation.laplacians(&frame.evaluator.fluid, frame.view.species);
+    let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
     for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
-            visit(k, [f.iter().map(|f| f * f).sum(), l]);
+            let (w, gradient) = weight(frame, range, frame.view.x[k]);
+            let across: f64 = gradient.iter().zip(f).map(|(g, f)| g * f).sum();
+            visit(k, [w * f.iter().map(|f| f * f).sum::<f64>(), w * l - across]);
         }
     }
 }
 
-/// `Σ F·F` and `Σ ∇²U` for each block of space. Blocks without particles are left out.
+/// The terms of [`sums`] for each block of space. Blocks without particles are left out.
 ///
 /// Blocks are wider than the range of the forces, so their values are nearly independent. The scatter of the blocks
 /// gives the error of a single configuration.

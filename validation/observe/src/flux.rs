@@ -8,7 +8,6 @@
 //! The random force transfers momentum too, but is left out: it does not depend on the positions, so its mean contribution
 //! is 0.
 
-use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::COMPONENTS;
 
 /// A straight line of momentum transport. It adds `d ⊗ f` times its fraction in a volume, divided by that volume, to the
@@ -55,16 +54,7 @@ pub struct Place {
     pub x: Vec<[f64; 3]>,
     pub species: Vec<i32>,
     /// The positions for which the forces were computed, if they were displaced.
-    pub displaced: Option<Displaced>,
-}
-
-/// Displaced positions of the same particles.
-#[derive(Debug, Clone)]
-pub struct Displaced {
-    /// Positions, not wrapped into the box.
-    pub x: Vec<[f64; 3]>,
-    /// A box that contains the positions along its directions with walls.
-    pub domain: PeriodicBox,
+    pub displaced: Option<Vec<[f64; 3]>>,
 }
 
 impl Flux {

@@ -70,9 +70,9 @@ impl<'a> Frame<'a> {
         let View { x, domain, .. } = self.view;
         let earlier = self.earlier.get_or_init(|| {
             let at = flux.forces.iter().map(|acted| acted.at.as_ref());
-            let evaluate = |place: &Place| match &place.displaced {
-                Some(to) => self.evaluator.evaluate(&to.x, &place.species, &to.domain),
-                None => self.evaluator.evaluate(&place.x, &place.species, domain),
+            let evaluate = |place: &Place| {
+                let x = place.displaced.as_ref().unwrap_or(&place.x);
+                self.evaluator.evaluate(x, &place.species, domain)
             };
             at.map(|at| at.map(evaluate)).collect()
         });
@@ -81,8 +81,10 @@ impl<'a> Frame<'a> {
             let displaced = acted.at.as_ref().and_then(|at| at.displaced.as_ref());
             for (pair, force) in earlier.as_ref().unwrap_or_else(|| self.evaluation()).pair_forces() {
                 let f = pair.d.map(|d| acted.share * force / pair.r * d);
-                let back = |k: usize, c: usize| displaced.map_or(0.0, |to| to.x[k][c] - x[k][c]);
-                let d = std::array::from_fn(|c| pair.d[c] - (back(pair.i, c) - back(pair.j, c)));
+                // A displaced particle may have crossed a face of the box.
+                let back = |k: usize| displaced.map_or([0.0; 3], |to| domain.minimum_image(to[k], x[k]));
+                let (back_i, back_j) = (back(pair.i), back(pair.j));
+                let d = std::array::from_fn(|c| pair.d[c] - (back_i[c] - back_j[c]));
                 visit(Carrier::Pair, &Line { from: x[pair.i], d, f });
             }
         }

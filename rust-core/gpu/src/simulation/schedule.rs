@@ -82,7 +82,8 @@ impl GpuSimulation {
         let single = |x: f64| x as f32;
         self.record(|runs| match rule {
             Rule::VelocityVerlet => {
-                runs.all("kick_drift", [single(0.5 * dt), single(dt), 0.0, 0.0], deferred);
+                let half = single(0.5 * dt);
+                runs.all("kick_drift", [half, single(dt), half, 0.0], deferred);
                 runs.sort();
                 runs.forces(totals, noise);
                 if ends {
@@ -90,8 +91,11 @@ impl GpuSimulation {
                 }
             }
             Rule::TwoStage { lambda, gradient, .. } => {
+                // The shares of the held kick that the velocities have, and where that puts the middle of the step.
                 let half = single(0.5 * dt);
-                runs.all("kick_drift", [single(lambda * dt), half, 0.0, 0.0], deferred);
+                let shift = single((0.5 * lambda - 0.125) * dt * dt);
+                let kicked = [lambda, 0.5 - lambda].map(|share| single(share * dt));
+                runs.all("kick_drift", [kicked[0], half, kicked[0], 0.0], deferred);
                 runs.sort();
                 runs.forces(false, None);
                 if gradient != 0.0 {
@@ -100,7 +104,8 @@ impl GpuSimulation {
                     runs.forces(false, None);
                     runs.all("step_back", [0.0; 4], 0);
                 }
-                runs.all("kick_drift", [single((1.0 - 2.0 * lambda) * dt), half, 0.0, 0.0], 0);
+                let kick = single((1.0 - 2.0 * lambda) * dt);
+                runs.all("kick_drift", [kick, half, kicked[1], shift], 0);
                 runs.sort();
                 runs.forces(totals, None);
                 if ends || heats {

@@ -1,6 +1,59 @@
 // Kick and drift, and the sort by cells that follows.
 
-// v += a F/m (twice if the last kick of the step before was deferred); x += b v. Counts the particles of each cell.
+// How long it takes to a face at a distance, and the speed there, with the speed `towards` it and the acceleration `away` from
+// it; a negative time if it is never met.
+fn meet(distance: f32, towards: f32, away: f32) -> vec2<f32> {
+    let square = towards * towards - 2.0 * away * distance;
+    if (!(square >= 0.0)) { return vec2(-1.0, 0.0); }
+    let speed = sqrt(square);
+    if (towards > 0.0) { return vec2(2.0 * distance / (towards + speed), speed); }
+    if (away < 0.0) { return vec2((speed - towards) / -away, speed); }
+    return vec2(-1.0, 0.0);
+}
+
+// Distances from both faces at the end of a path, and the velocity that the faces have given.
+struct Flight { below: f32, above: f32, given: f32, is_over: bool }
+
+// The path of a particle between two faces under a constant acceleration, as `bounce.rs` of the host has it.
+fn fly(start: vec2<f32>, velocity: f32, a: f32, time: f32) -> Flight {
+    let width = start.x + start.y;
+    var at = start;
+    var u = velocity;
+    var left = time;
+    var given = 0.0;
+    for (var n = 0u; n < 16u; n++) {
+        let low = meet(at.x, -u, a);
+        let high = meet(at.y, u, -a);
+        let is_low = low.x >= 0.0 && !(high.x >= 0.0 && high.x < low.x);
+        let met = select(high, low, is_low);
+        if (!(met.x >= 0.0 && met.x < left)) {
+            let by = left * (u + 0.5 * left * a);
+            return Flight(at.x + by, at.y - by, given, true);
+        }
+        let speed = met.y;
+        let away = select(-1.0, 1.0, is_low);
+        left -= met.x;
+        u = away * speed;
+        given += 2.0 * u;
+        at = select(vec2(width, 0.0), vec2(0.0, width), is_low);
+        let presses = -away * a;
+        if (presses > 0.0 && speed * speed <= 2.0 * presses * width) {
+            // It comes back to this face again and again, or rests there.
+            if (presses * left >= 2e6 * speed) {
+                return Flight(at.x, at.y, given + away * presses * left, true);
+            }
+            let period = 2.0 * speed / presses;
+            let hops = floor(left / period);
+            left = clamp(left - hops * period, 0.0, period);
+            let by = away * max(left * (speed - 0.5 * presses * left), 0.0);
+            return Flight(at.x + by, at.y - by, given + 2.0 * hops * u, true);
+        }
+    }
+    return Flight(0.0, 0.0, 0.0, false);
+}
+
+// v += a F/m (twice if the last kick of the step before was deferred); x += b v. Counts the particles of each cell. Particles
+// that meet a face move on the path under the present force, from the velocity v − c F/m and the place x − d F/m.
 @KERNEL kick_drift {
     if (halted() || i >= P.count) { return; }
     var v = vel[i];
@@ -28,17 +81,37 @@
         let to = s[k] + bitcast<u32>(by);
         if (P.walls[k] != 0u) {
             // Coordinates between walls have 31 bits.
-            if ((to & 0x80000000u) != 0u) {
-                u[k] = -u[k];
-                let mirrored = 0u - to;
-                if (mirrored > 0x80000000u) {
-                    atomicMin(&status.runaway, s.w);
-                    fail();
-                    return;
-                }
-                s[k] = min(mirrored, 0x7fffffffu);
-            } else {
+            let is_outside = (to & 0x80000000u) != 0u;
+            let unit = P.edge[k][k];
+            let a = inverse_mass(v) * f[k];
+            var start = vec2(f32(s[k]), f32(0x80000000u - s[k])) * unit + vec2(-I.d * a, I.d * a);
+            start = max(start, vec2(0.0));
+            let path = u[k] - I.c * a;
+            // A parabola is within the triangle of its ends and of the point where their tangents meet.
+            let middle = 0.5 * I.b * path;
+            let end = I.b * (path + 0.5 * I.b * a);
+            if (!is_outside && start.x + min(middle, end) >= 0.0 && start.y - max(middle, end) >= 0.0) {
                 s[k] = to;
+                continue;
+            }
+            let flight = fly(start, path, a, I.b);
+            if (!flight.is_over) {
+                atomicMin(&status.runaway, s.w);
+                fail();
+                return;
+            }
+            if (!is_outside && flight.given == 0.0) {
+                s[k] = to;
+                continue;
+            }
+            u[k] += flight.given;
+            let shift = (I.d + (I.c - 0.5 * I.b) * I.b) * a;
+            let below = max(flight.below + shift, 0.0) / unit;
+            let above = max(flight.above - shift, 0.0) / unit;
+            if (below < above) {
+                s[k] = min(u32(round(below)), 0x7fffffffu);
+            } else {
+                s[k] = 0x80000000u - clamp(u32(round(above)), 1u, 0x80000000u);
             }
         } else {
             boxes[k] += select(0, 1, by > 0 && to < s[k]) - select(0, 1, by < 0 && to > s[k]);
@@ -59,7 +132,7 @@
     slots[i].x = atomicAdd(&counts[cell_index(cell_of(pos[i]))], 1u);
 }
 
-// Puts particles at x + a F/m for an evaluation of forces, in a box without walls.
+// Puts particles at x + a F/m for an evaluation of forces, mirrored at faces.
 @KERNEL displace {
     if (halted() || i >= P.count) { return; }
     var s = pos[i];
@@ -72,7 +145,9 @@
             fail();
             return;
         }
-        s[k] += bitcast<u32>(i32(round(move_by)));
+        let to = s[k] + bitcast<u32>(i32(round(move_by)));
+        let is_outside = P.walls[k] != 0u && (to & 0x80000000u) != 0u;
+        s[k] = select(to, min(0u - to, 0x7fffffffu), is_outside);
     }
     pos[i] = s;
     slots[i].x = atomicAdd(&counts[cell_index(cell_of(s))], 1u);

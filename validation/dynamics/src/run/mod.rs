@@ -6,6 +6,7 @@
 
 mod about;
 mod advice;
+mod bounce;
 mod bounds;
 mod checkpoints;
 mod error;

@@ -41,9 +41,8 @@ impl Scene {
             let lacks = DeviceError::Lacks("double precision".into());
             return Err(self.located(lacks, |root| root.get("precision")));
         }
-        let walls = self.domain.periodic()[..self.model.dimensions()].contains(&false);
         let lacks = |stage: &Stage| {
-            let lacks = DeviceError::Lacks(refused_step(stage.integrator, walls)?);
+            let lacks = DeviceError::Lacks(refused_step(stage.integrator)?);
             Some(self.located(lacks, |root| place_of_integrator(root, &stage.name)))
         };
         self.stages.iter().find_map(lacks).map_or(Ok(()), Err)

@@ -163,7 +163,7 @@ impl Runner<'_> {
         good.step = self.simulation.step_number();
         good.state.copy_particles(self.simulation.state());
         good.forces.clear();
-        good.forces.extend_from_slice(self.simulation.forces());
+        good.forces.extend_from_slice(self.simulation.held_forces());
         good.max_move = self.simulation.max_move();
         good.out_of_bounds = self.simulation.out_of_bounds();
         good.observers = self.observers.to_bytes();

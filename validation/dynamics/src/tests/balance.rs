@@ -161,7 +161,7 @@ fn displaced_forces_carry_nothing_across_a_film() {
             let kick = &simulation.flux().unwrap().forces[0];
             let place = kick.at.as_ref().unwrap();
             let to = place.displaced.as_ref().unwrap();
-            let there = fluid.evaluate(&to.x, &place.species, &to.domain);
+            let there = fluid.evaluate(to, &place.species, &simulation.state().domain);
             sums[0] += carried;
             sums[1] += carried + kick.share * (there.virial[2] - kick.virial[2]) / frame.volume();
         }

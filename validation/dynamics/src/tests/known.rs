@@ -307,43 +307,6 @@ fn the_pressures_around_a_drop_have_the_trace_of_the_force() {
     }
 }
 
-/// A sample that is centred takes its lines of force along: those of a lone particle are in the middle, wherever it is.
-#[test]
-fn lines_of_force_move_with_a_centred_sample() {
-    for y in [0.3, 2.0, 4.4] {
-        let flux = Flux {
-            ways: vec![Line { from: [1.0, y, 1.0], d: [0.0, 0.02, 0.0], f: [0.0, 1.0, 0.0] }],
-            ..Flux::default()
-        };
-        let observe = "stress_profile = { axis = \"y\", bins = 5, recentre = true }";
-        let mut shown = Shown::new(IDEAL, 1.0, &[4.0, 5.0, 6.0], &[[1.0, y, 1.0]], observe);
-        shown.sample(|view| View { flux: Some(&flux), ..view });
-        let normal = shown.finish()[0].get("normal").unwrap().values.clone();
-        assert!((normal[2] - 0.02 / 24.0).abs() < 1e-14, "{y}: {normal:?}");
-        assert!([0, 1, 3, 4].iter().all(|k| normal[*k] == 0.0), "{y}: {normal:?}");
-    }
-}
-
-/// A force on a line through the centre of mass has no tangential part, also where the circular mean is another point.
-#[test]
-fn the_centre_of_a_drop_is_its_centre_of_mass() {
-    let x = [2.0, 2.1, 2.2, 2.9];
-    let centre = x.iter().sum::<f64>() / 4.0;
-    let flux = Flux {
-        drag: vec![Line { from: [centre, 3.9, 3.0], d: [0.0, 0.5, 0.0], f: [0.0, 2.0, 0.0] }],
-        ..Flux::default()
-    };
-    let observe = "drop = { distance = 0.8, range = 3.0, bins = 30 }";
-    let mut shown = Shown::new(IDEAL, 1.0, &[6.0; 3], &x.map(|x| [x, 3.0, 3.0]), observe);
-    shown.sample(|view| View { flux: Some(&flux), ..view });
-    let profile = &shown.finish()[1];
-    let (normal, tangential) = (profile.get("normal").unwrap(), profile.get("tangential").unwrap());
-    assert!(
-        normal.values.iter().any(|p| *p > 0.0) && tangential.values.iter().all(|p| p.abs() < 1e-12),
-        "{profile:?}"
-    );
-}
-
 /// The blocks whose scatter gives the error of one configuration are one and a half ranges wide; together they have every particle.
 #[test]
 fn blocks_of_a_configuration_are_wider_than_the_forces() {
@@ -411,4 +374,50 @@ fn a_hanging_drop_is_where_its_box_is() {
     let filled = z.values.iter().zip(&density.values).filter(|(_, n)| **n > 0.0);
     let heights: Vec<f64> = filled.map(|(z, _)| *z).collect();
     assert!(!heights.is_empty() && heights.iter().all(|z| (-4.5..-3.5).contains(z)), "{heights:?}");
+}
+
+/// Lines of a profile are moved with the particles: a line where all particles are is in the middle slice, wherever that is in the box.
+#[test]
+fn lines_are_centred_with_the_particles() {
+    for z in [4.5, 0.3, 5.95] {
+        let at = |z: f64| [1.0, 1.0, z.rem_euclid(6.0)];
+        let x = [at(z - 0.2), at(z), at(z + 0.2)];
+        let flux = Flux {
+            ways: vec![Line { from: at(z + 0.05), d: [0.0, 0.0, 0.1], f: [0.0, 0.0, 2.0] }],
+            ..Flux::default()
+        };
+        let observe = "stress_profile = { axis = \"z\", bins = 5, recentre = true }";
+        let mut shown = Shown::new(IDEAL, 1.0, &[4.0, 4.0, 6.0], &x, observe);
+        shown.sample(|view| View { flux: Some(&flux), ..view });
+        let normal = &shown.finish()[0].get("normal").unwrap().values.clone();
+        let expected = 0.2 / (4.0 * 4.0 * 1.2);
+        assert!(
+            (normal[2] - expected).abs() < 1e-14 && normal.iter().sum::<f64>() == normal[2],
+            "{z}: {normal:?}"
+        );
+    }
+}
+
+/// Shells of a drop lie about its centre of mass, which is not the circular mean of a drop that is longer to one side; also where it
+/// crosses faces of the box.
+#[test]
+fn shells_lie_about_the_centre_of_mass() {
+    let row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.9, 1.8, 2.7];
+    let centre = row.iter().sum::<f64>() / 8.0;
+    for low in [2.0, -0.4, 6.9] {
+        let at = |x: f64| [(low + x).rem_euclid(8.0), 3.0, 5.0];
+        let x = row.map(at);
+        let flux = Flux {
+            drag: vec![Line { from: at(centre + 1.57), d: [0.04, 0.0, 0.0], f: [3.0, 0.0, 0.0] }],
+            ..Flux::default()
+        };
+        let observe = "drop = { distance = 1.0, range = 3.0, bins = 30 }";
+        let mut shown = Shown::new(IDEAL, 1.0, &[8.0, 8.0, 8.0], &x, observe);
+        shown.sample(|view| View { flux: Some(&flux), ..view });
+        let out = shown.finish();
+        let normal = &out.iter().find(|o| o.name == "drop_profile").unwrap().get("normal").unwrap().values;
+        let volume = 4.0 / 3.0 * PI * (1.6f64.powi(3) - 1.5f64.powi(3));
+        assert!((normal[15] * volume - 0.12).abs() < 1e-12, "{low}: {normal:?}");
+        assert!(normal.iter().enumerate().all(|(k, p)| k == 15 || *p == 0.0), "{low}: {normal:?}");
+    }
 }

@@ -11,6 +11,7 @@ use psidpd_observe::*;
 use support::{IDEAL_MIXTURE, SET6};
 
 mod balance;
+mod carried;
 mod crystals;
 mod known;
 mod meters;

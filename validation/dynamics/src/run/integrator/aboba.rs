@@ -10,13 +10,13 @@
 //! that a run reports are computed again at its end, which trajectories do not depend on. T_kin is that of the
 //! velocities at the end of the step, behind a kick.
 
-use super::{Coupling, RunError, Simulation, Want};
+use super::{Coupling, Path, RunError, Simulation, Want};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want, coupling: Coupling) -> Result<(), RunError> {
-    system.drift(0.5 * dt)?;
+    system.drift(Path::first_half(dt, 0.0))?;
     coupling.announce(system, dt, want);
     system.conservative_forces(Want::FORCES)?;
     system.kick(0.5 * dt)?;
     coupling.act(system, dt, want)?;
-    system.kick_and_drift(0.5 * dt, 0.5 * dt)
+    system.kick_and_drift(0.5 * dt, Path::second_half(dt, 0.5 * dt))
 }

@@ -9,12 +9,12 @@
 //! too low by a term of second order where forces are stiff. One evaluation of forces a step; the thermostat acts at other
 //! positions and has a search of its own.
 
-use super::{Coupling, RunError, Simulation, Want};
+use super::{Coupling, Path, RunError, Simulation, Want};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want, coupling: Coupling) -> Result<(), RunError> {
-    system.kick_and_drift(0.5 * dt, 0.5 * dt)?;
+    system.kick_and_drift(0.5 * dt, Path::first_half(dt, 0.5 * dt))?;
     coupling.act(system, dt, want)?;
-    system.drift(0.5 * dt)?;
+    system.drift(Path::second_half(dt, 0.0))?;
     system.conservative_forces(want)?;
     system.defer_kick(0.5 * dt);
     Ok(())

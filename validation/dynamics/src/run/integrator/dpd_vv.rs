@@ -9,10 +9,10 @@
 //! 1 % up to Δt = 0.05 at γ = 4.5, ρ = 3, but not exactly. One evaluation of forces, one search and three passes over
 //! the pairs of the thermostat. T_kin is that of the velocities at the end of the step.
 
-use super::{Law, RunError, Simulation, Want};
+use super::{Law, Path, RunError, Simulation, Want};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want, noise: Law) -> Result<(), RunError> {
-    system.kick_and_drift(0.5 * dt, dt)?;
+    system.kick_and_drift(0.5 * dt, Path::whole(dt, 0.5 * dt))?;
     system.forces_then_noise(dt, want, noise)?;
     system.with_forces_kept(|system| {
         system.add_drag();

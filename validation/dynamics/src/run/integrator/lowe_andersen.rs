@@ -8,12 +8,12 @@
 //! limit of small Δt with continuous drag, and viscosities can be higher. The order of pairs is that of cells and
 //! tags. One evaluation of forces, one pass over pairs. T_kin is measured behind the thermostat.
 
-use super::{Law, RunError, Simulation, Want};
+use super::{Law, Path, RunError, Simulation, Want};
 use crate::run::simulation::Heat;
 use psidpd_core::engine::thermostat::{Stream, Update};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
-    system.kick_and_drift(0.5 * dt, dt)?;
+    system.kick_and_drift(0.5 * dt, Path::whole(dt, 0.5 * dt))?;
     system.conservative_forces(want)?;
     system.kick(0.5 * dt)?;
     let update = Update::LoweAndersen;

@@ -13,6 +13,7 @@ mod lowe_andersen;
 mod monte_carlo;
 pub(super) mod parts;
 mod peters;
+pub(super) mod reflection;
 mod self_consistent;
 mod shardlow;
 mod two_stage;
@@ -22,6 +23,7 @@ use super::{Integrator, RunError, Simulation};
 use crate::integrator::Coupling;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::noise::Law;
+use reflection::Path;
 
 impl Integrator {
     /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.

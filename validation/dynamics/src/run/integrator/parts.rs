@@ -1,6 +1,7 @@
 //! Loops over particles, each thread its part of them: a particle's coordinates depend on nothing but its own
 //! arrays, so that the results are the same for any number of parts.
 
+use super::reflection::{Before, Beyond, Bounce, Faces, Leg};
 use crate::run::bounds::Bounds;
 use psidpd_core::engine::vectors::{self, Loop};
 use psidpd_core::engine::{PeriodicBox, Pool, part};
@@ -41,7 +42,7 @@ pub struct Kept {
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     pub domain: &'a PeriodicBox,
-    pub bounds: &'a Bounds,
+    pub faces: Faces<'a>,
     /// The square of the highest velocity that leads nowhere beyond the box.
     pub limit: f64,
 }
@@ -66,6 +67,18 @@ pub struct Part<'a> {
     image: &'a mut [[i32; 3]],
     pub kept: [&'a mut [[f64; 3]]; 2],
     faults: Faults,
+    /// The ways of particles that met faces, if ways are recorded.
+    legs: Vec<Leg>,
+    beyond: Vec<Beyond>,
+}
+
+/// What a loop over particles has found.
+#[derive(Debug, Default)]
+pub struct Moved {
+    pub faults: Faults,
+    /// The ways of particles that met faces, in the order of particles.
+    pub legs: Vec<Leg>,
+    pub beyond: Vec<Beyond>,
 }
 
 /// Does `work` with all particles of `moving`, and `factor` over the mass of each species; with what is kept, if the step
@@ -76,7 +89,7 @@ pub fn share<'a>(
     keeps: bool,
     pool: &Pool,
     work: impl Fn(&mut Part, &[f64]) + Sync,
-) -> Faults {
+) -> Moved {
     let Moving { mut x, mut v, mut f, mut species, mut image, mass, kept } = moving;
     // A division for each species, not for each particle.
     kept.over_mass.clear();
@@ -107,27 +120,65 @@ pub fn share<'a>(
                 kept_f.split_off_mut(..of_kept).unwrap_or_default(),
             ],
             faults: Faults::default(),
+            legs: Vec::new(),
+            beyond: Vec::new(),
         });
     }
     let over_mass = &kept.over_mass[..];
     pool.each(&mut shares, |share| work(share, over_mass));
     // Parts are in the order of particles: the first fault is that of the first part which has one.
-    let mut faults = Faults::default();
-    for share in &shares {
+    let Moved { mut faults, mut legs, mut beyond } = Moved::default();
+    for share in &mut shares {
+        legs.append(&mut share.legs);
+        beyond.append(&mut share.beyond);
         faults.fast = faults.fast.or(share.faults.fast);
         faults.escaped = faults.escaped.or(share.faults.escaped);
         faults.uncounted = faults.uncounted.or(share.faults.uncounted);
     }
-    faults
+    Moved { faults, legs, beyond }
 }
 
 /// Moves particles by `rule`, which makes position and velocity of position, velocity, force, and a number of
-/// the species; then reflects and wraps those that left the bounds.
+/// the species, and wraps those that left the bounds; particles that meet a face of the box are reflected.
 pub fn drift<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
 where
-    R: Fn(f64, f64, f64, f64) -> (f64, f64),
+    R: Fn(f64, f64, f64, f64) -> (f64, f64) + Copy,
 {
+    let before = Before { first: part.first, x: part.x, v: part.v, f: part.f, species: part.species };
+    let bounces = around.faces.met(before, over_mass, rule);
     vectors::run_best(Drift { part, over_mass, around, rule });
+    if !bounces.is_empty() {
+        reflect(part, around, &bounces);
+    }
+}
+
+fn reflect(part: &mut Part, around: Surroundings, bounces: &[Bounce]) {
+    let faces = around.faces;
+    part.beyond = faces.left(bounces, part.first);
+    for bounces in bounces.chunk_by(|a, b| a.particle == b.particle) {
+        let k = bounces[0].particle;
+        for bounce in bounces {
+            let c = bounce.direction;
+            let Some([x, v, u]) = bounce.end else {
+                let first = part.first + k;
+                part.faults.escaped = Some(part.faults.escaped.map_or(first, |other| other.min(first)));
+                continue;
+            };
+            (part.x[k][c], part.v[k][c]) = (x, v);
+            // What the step ends with is the velocity of the path and the new force.
+            if let [kept_v, kept_f] = &mut part.kept
+                && let (Some(kept_v), Some(kept_f)) = (kept_v.get_mut(k), kept_f.get_mut(k))
+            {
+                (kept_v[c], kept_f[c]) = (u, -kept_f[c]);
+            }
+        }
+        if faces.records {
+            let mass = faces.mass[part.species[k] as usize];
+            let mut legs = faces.legs(bounces, part.x[k], part.v[k], part.f[k].map(|f| f / mass));
+            legs.iter_mut().for_each(|leg| leg.particle += part.first);
+            part.legs.append(&mut legs);
+        }
+    }
 }
 
 /// Changes velocities by `rule`, which makes one of velocity, force, kept velocity, kept force, and a number of
@@ -193,7 +244,7 @@ fn drift_in_groups<const ONE: bool, R>(part: &mut Part, over_mass: &[f64], aroun
 where
     R: Fn(f64, f64, f64, f64) -> (f64, f64),
 {
-    let Bounds { low, high, .. } = around.bounds;
+    let Bounds { low, high, .. } = around.faces.bounds;
     let (low, high): ([f64; LANES], [f64; LANES]) =
         (std::array::from_fn(|c| low[c % 3]), std::array::from_fn(|c| high[c % 3]));
     // Faster than this is one component of whatever is too fast.
@@ -225,7 +276,7 @@ where
         v.as_flattened_mut().copy_from_slice(&to_v);
         if out != [0; WIDTH] {
             let from = GROUP * g;
-            settle(&around, part.first, from, x, v, image, &mut part.kept, &mut part.faults);
+            settle(&around, part.first + from, x, v, image, &mut part.faults);
         }
     }
     let from = part.species.len() - species_rest.len();
@@ -234,46 +285,28 @@ where
             (x[c], v[c]) = rule(x[c], v[c], f[c], over_mass[*s as usize]);
         }
     }
-    settle(&around, part.first, from, x_rest, v_rest, image_rest, &mut part.kept, &mut part.faults);
+    settle(&around, part.first + from, x_rest, v_rest, image_rest, &mut part.faults);
 }
 
-/// Checks particles one by one, and reflects or wraps those outside.
+/// Checks particles one by one, and wraps those outside.
 #[cold]
 #[inline(never)]
-#[expect(clippy::too_many_arguments)]
 fn settle(
     around: &Surroundings,
     first: usize,
-    from: usize,
     x: &mut [[f64; 3]],
-    v: &mut [[f64; 3]],
+    v: &[[f64; 3]],
     image: &mut [[i32; 3]],
-    kept: &mut [&mut [[f64; 3]]; 2],
     faults: &mut Faults,
 ) {
-    let bounds = around.bounds;
     for (k, ((x, v), image)) in x.iter_mut().zip(v).zip(image).enumerate() {
         if is_too_fast(v, around.limit) {
-            faults.fast.get_or_insert(first + from + k);
+            faults.fast.get_or_insert(first + k);
             continue;
-        }
-        if bounds.has_walls() {
-            bounds.reflect(x, |c| {
-                v[c] = -v[c];
-                for kept in &mut *kept {
-                    if let Some(kept) = kept.get_mut(from + k) {
-                        kept[c] = -kept[c];
-                    }
-                }
-            });
-            if bounds.has_escaped(x) {
-                faults.escaped.get_or_insert(first + from + k);
-                continue;
-            }
         }
         around.domain.wrap(x, image);
         if has_stopped_counting(image) {
-            faults.uncounted.get_or_insert(first + from + k);
+            faults.uncounted.get_or_insert(first + k);
         }
     }
 }

@@ -9,12 +9,12 @@
 //! around different drags, so that the temperature is not exact: an ideal gas is within 1 % up to Δt = 0.05 at γ = 4.5,
 //! ρ = 3. T_kin is that of the velocities at the end of the step.
 
-use super::{Law, RunError, Simulation, Want};
+use super::{Law, Path, RunError, Simulation, Want};
 use crate::run::simulation::Heat;
 use psidpd_core::engine::thermostat::{Stream, Update};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want, noise: Law) -> Result<(), RunError> {
-    system.kick_and_drift(0.5 * dt, dt)?;
+    system.kick_and_drift(0.5 * dt, Path::whole(dt, 0.5 * dt))?;
     system.forces_then_noise(dt, want, noise)?;
     system.kick(0.5 * dt)?;
     let heat = Heat { update: Update::ImplicitDrag, noise, time: dt, stream: Stream(0) };

@@ -8,14 +8,14 @@
 //! S2 of second. One evaluation of forces; one and two passes over pairs, which only planes of cells share among threads. T_kin is
 //! that of the velocities at the end of the step: behind a kick in S1, behind the thermostat in S2.
 
-use super::{Law, RunError, Simulation, Want};
+use super::{Law, Path, RunError, Simulation, Want};
 use crate::run::simulation::Heat;
 use psidpd_core::engine::thermostat::{Stream, Update};
 
 pub fn first(system: &mut Simulation, dt: f64, want: Want, noise: Law) -> Result<(), RunError> {
     let update = Update::Shardlow { reversed: false };
     system.heat(Heat { update, noise, time: dt, stream: Stream(0) }, want, dt)?;
-    system.kick_and_drift(0.5 * dt, dt)?;
+    system.kick_and_drift(0.5 * dt, Path::whole(dt, 0.5 * dt))?;
     system.conservative_forces(want)?;
     system.defer_kick(0.5 * dt);
     Ok(())
@@ -27,7 +27,7 @@ pub fn second(system: &mut Simulation, dt: f64, want: Want, noise: Law) -> Resul
         Heat { update, noise, time: 0.5 * dt, stream: Stream(stream) }
     };
     system.heat(half(true, 0), want, dt)?;
-    system.kick_and_drift(0.5 * dt, dt)?;
+    system.kick_and_drift(0.5 * dt, Path::whole(dt, 0.5 * dt))?;
     system.conservative_forces(want)?;
     system.kick(0.5 * dt)?;
     system.heat(half(false, 1), want, dt)

@@ -11,7 +11,7 @@
 //! where the last forces were computed and keeps the Maxwell distribution exactly. λ = ¼ is two steps of velocity Verlet. T_kin
 //! is measured behind the thermostat.
 
-use super::{Coupling, RunError, Simulation, Want};
+use super::{Coupling, Path, RunError, Simulation, Want};
 
 pub fn step(
     system: &mut Simulation,
@@ -20,9 +20,9 @@ pub fn step(
     lambda: f64,
     coupling: Coupling,
 ) -> Result<(), RunError> {
-    system.kick_and_drift(lambda * dt, 0.5 * dt)?;
+    system.kick_and_drift(lambda * dt, Path::first_half(dt, lambda * dt))?;
     system.conservative_forces(Want::FORCES)?;
-    system.kick_and_drift((1.0 - 2.0 * lambda) * dt, 0.5 * dt)?;
+    system.kick_and_drift((1.0 - 2.0 * lambda) * dt, Path::second_half(dt, (0.5 - lambda) * dt))?;
     coupling.announce(system, dt, want);
     system.conservative_forces(want)?;
     system.defer_kick(lambda * dt);

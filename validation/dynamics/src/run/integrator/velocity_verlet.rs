@@ -10,10 +10,10 @@
 //! by 5 % at Δt = 0.05. One evaluation of forces, one search for pairs. T_kin is that of the velocities at the
 //! end of the step.
 
-use super::{RunError, Simulation, Want};
+use super::{Path, RunError, Simulation, Want};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
-    system.kick_and_drift(0.5 * dt, dt)?;
+    system.kick_and_drift(0.5 * dt, Path::whole(dt, 0.5 * dt))?;
     system.forces_with_thermostat(dt, want)?;
     system.defer_kick(0.5 * dt);
     Ok(())

@@ -62,7 +62,7 @@ fn failed(error: GpuError) -> RunError {
 }
 
 fn rule(integrator: Integrator) -> Result<Rule, RunError> {
-    match (integrator, refused_step(integrator, false)) {
+    match (integrator, refused_step(integrator)) {
         (Integrator::VelocityVerlet, None) => Ok(Rule::VelocityVerlet),
         (Integrator::TwoStage { lambda, coupling }, None) => {
             Ok(Rule::TwoStage { lambda, gradient: 0.0, every: coupling.every })

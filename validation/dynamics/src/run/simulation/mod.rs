@@ -112,7 +112,7 @@ impl Simulation {
         self.external.find_frozen(&mut self.particles);
         self.forces.earlier_out_of_bounds = out_of_bounds;
         self.thermostat.in_forces = None;
-        self.motion.deferred = None;
+        (self.motion.deferred, self.motion.held) = (None, None);
         self.number = number;
         self.stale = false;
         #[cfg(feature = "gpu")]
@@ -130,6 +130,7 @@ impl Simulation {
         self.end_step()?;
         self.thermostat.impulse_virial = [0.0; 6];
         self.stale = false;
+        self.motion.held = None;
         #[cfg(feature = "gpu")]
         if self.gpu.is_some() {
             return self.prepare_on_gpu(integrator, dt, want);
@@ -179,6 +180,9 @@ impl Simulation {
         if self.gpu.is_some() {
             return self.step_on_gpu(dt, integrator, want);
         }
+        if let Some(held) = self.motion.held.take() {
+            self.particles.replace_forces(&held);
+        }
         self.number += 1;
         self.thermostat.impulse_virial = [0.0; 6];
         self.monte_carlo.at_work = !integrator.has_time();
@@ -211,7 +215,12 @@ impl Simulation {
         }
         match self.monte_carlo.at_work {
             true => self.forces_or_infinite(want)?,
-            false => self.conservative_forces(want)?,
+            false => {
+                // Particles that meet a face in the next step do so under the forces of this one.
+                let held = self.motion.bounds.has_walls().then(|| self.particles.forces().to_vec());
+                self.conservative_forces(want)?;
+                self.motion.held = held;
+            }
         }
         self.stale = false;
         self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
@@ -221,6 +230,11 @@ impl Simulation {
     /// The time in which one thread did the work of all.
     pub fn time_of_one_thread(&self) -> std::time::Duration {
         self.forces.engine.pool().time_alone()
+    }
+
+    /// The forces with which the next step begins.
+    pub(super) fn held_forces(&self) -> &[[f64; 3]] {
+        self.motion.held.as_deref().unwrap_or(self.forces())
     }
 
     /// Sorts all particle arrays into the order of the last sweep, if there was one.

@@ -4,7 +4,8 @@
 //! makes both, with the same bits.
 
 use super::super::bounds::Bounds;
-use super::super::integrator::parts::{Faults, Kept, Moving, Part, Surroundings, drift, kick, share};
+use super::super::integrator::parts::{Faults, Kept, Moved, Moving, Part, Surroundings, drift, kick, share};
+use super::super::integrator::reflection::{Beyond, Faces, Path};
 use super::{RunError, Simulation};
 use psidpd_core::engine::PeriodicBox;
 
@@ -15,20 +16,31 @@ pub(super) struct Motion {
     kept: Kept,
     /// The duration of a deferred kick at the end of the present step.
     pub deferred: Option<f64>,
+    /// The forces that the next step holds where it begins, if others have replaced them.
+    pub held: Option<Vec<[f64; 3]>>,
+    /// What the last drift has left beyond faces.
+    beyond: Vec<Beyond>,
 }
 
 impl Motion {
     pub fn within(domain: &PeriodicBox, dimensions: usize) -> Motion {
-        Motion { bounds: Bounds::of(domain, dimensions), kept: Kept::default(), deferred: None }
+        Motion {
+            bounds: Bounds::of(domain, dimensions),
+            kept: Kept::default(),
+            deferred: None,
+            held: None,
+            beyond: Vec::new(),
+        }
     }
 }
 
 impl Simulation {
-    /// Kick and drift in one loop: `v += h f/m; x += dt v`; particles are then put back into the box.
-    pub(in crate::run) fn kick_and_drift(&mut self, h: f64, dt: f64) -> Result<(), RunError> {
+    /// Kick and drift in one loop: `v += h f/m; x += dt v` for the time `dt` of the path; particles are then put back into the box.
+    pub(in crate::run) fn kick_and_drift(&mut self, h: f64, path: Path) -> Result<(), RunError> {
+        let dt = path.time;
         let deferred = self.motion.deferred.take_if(|deferred| *deferred == h).is_some();
         self.make_deferred_kick()?;
-        let faults = self.moving(Some(dt), h, false, |part, over_mass, around| {
+        let Moved { faults, legs, .. } = self.moving(path, h, false, |part, over_mass, around| {
             if deferred {
                 drift(part, over_mass, around, |x, v, f, over_mass| {
                     let kick = over_mass * f;
@@ -42,24 +54,25 @@ impl Simulation {
                 });
             }
         });
-        self.record_ways(dt, |this, k| this.particles.now().v[k]);
+        self.record_ways(path, &legs);
         self.refuse(faults, Some(dt), deferred)
     }
 
-    /// Drift: `x += dt v`.
-    pub(in crate::run) fn drift(&mut self, dt: f64) -> Result<(), RunError> {
+    /// Drift: `x += dt v` for the time `dt` of the path.
+    pub(in crate::run) fn drift(&mut self, path: Path) -> Result<(), RunError> {
+        let dt = path.time;
         self.make_deferred_kick()?;
-        let faults = self.moving(Some(dt), 0.0, false, |part, over_mass, around| {
+        let Moved { faults, legs, .. } = self.moving(path, 0.0, false, |part, over_mass, around| {
             drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
         });
-        self.record_ways(dt, |this, k| this.particles.now().v[k]);
+        self.record_ways(path, &legs);
         self.refuse(faults, Some(dt), false)
     }
 
     /// Kick: `v += h f/m`.
     pub(in crate::run) fn kick(&mut self, h: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let faults = self.moving(None, h, false, |part, over_mass, _| {
+        let Moved { faults, .. } = self.moving(None, h, false, |part, over_mass, _| {
             kick::<false, _>(part, over_mass, |v, f, _, over_mass| v + over_mass * f);
         });
         self.refuse(faults, None, false)
@@ -78,16 +91,17 @@ impl Simulation {
         }
     }
 
-    /// Puts particles at `x + c f/m` for an evaluation of forces, without reflection;
-    /// [`Simulation::step_back`] follows.
+    /// Puts particles at `x + c f/m` for an evaluation of forces, mirrored at the faces of the box; [`Simulation::step_back`]
+    /// follows.
     pub(super) fn displace(&mut self, c: f64) {
         self.moving(None, c, true, |part, over_mass, around| {
-            let (low, high) = (around.bounds.low, around.bounds.high);
+            let bounds = around.faces.bounds;
             for (k, to) in part.kept[0].iter_mut().enumerate() {
                 let m = over_mass[part.species[k] as usize];
                 *to = std::array::from_fn(|c| part.x[k][c] + m * part.f[k][c]);
-                let inside = |c: usize| (low[c]..=high[c]).contains(&to[c]);
+                let inside = |c: usize| (bounds.low[c]..=bounds.high[c]).contains(&to[c]);
                 if !(inside(0) && inside(1) && inside(2)) {
+                    bounds.walls().for_each(|c| to[c] = bounds.fold(c, to[c]));
                     around.domain.wrap(to, &mut [0; 3]);
                 }
             }
@@ -104,42 +118,45 @@ impl Simulation {
     /// Predictor: `x += dt (v + ½dt f/m); v += λ dt f/m`; the previous velocities and forces are kept.
     pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let faults = self.moving(Some(dt), dt, true, |part, over_mass, around| {
+        let path = Path::whole(dt, lambda * dt);
+        let Moved { faults, legs, .. } = self.moving(path, dt, true, |part, over_mass, around| {
             part.kept[0].copy_from_slice(part.v);
             part.kept[1].copy_from_slice(part.f);
             drift(part, over_mass, around, |x, v, f, over_mass| {
                 (x + dt * (v + 0.5 * over_mass * f), v + lambda * over_mass * f)
             });
         });
-        self.record_ways(dt, |this, k| {
-            let back = (0.5 - lambda) * dt / this.particles.mass_of(k);
-            std::array::from_fn(|c| this.particles.now().v[k][c] + back * this.forces()[k][c])
-        });
+        self.record_ways(path, &legs);
         self.refuse(faults, Some(dt), false)
     }
 
     /// Corrector: `v = v₀ + ½dt (f₀ + f)/m` with the values that [`Simulation::predict`] has kept.
     pub(in crate::run) fn correct(&mut self, dt: f64) -> Result<(), RunError> {
-        let faults = self.moving(None, 0.5 * dt, true, |part, half, _| {
+        let Moved { faults, .. } = self.moving(None, 0.5 * dt, true, |part, half, _| {
             kick::<true, _>(part, half, |_, f, [before_v, before_f], half| before_v + half * (before_f + f));
         });
         self.refuse(faults, None, false)
     }
 
     /// Does `work` with the particles of each thread, `factor` over the mass of each species, and the box with its limits;
-    /// `dt` is the time of a drift. A step that `keeps` velocities and forces of before has room for them.
+    /// `path` is that of a drift. A step that `keeps` velocities and forces of before has room for them.
     fn moving(
         &mut self,
-        dt: Option<f64>,
+        path: impl Into<Option<Path>>,
         factor: f64,
         keeps: bool,
         work: impl Fn(&mut Part, &[f64], Surroundings) + Sync,
-    ) -> Faults {
+    ) -> Moved {
+        let (path, records) = (path.into(), self.is_recording());
         let Simulation { particles, motion, forces, .. } = self;
-        let (state, f) = particles.motion(dt.is_some());
+        let (state, f) = particles.motion(path.is_some());
         let longest: f64 = state.domain.lengths().iter().map(|l| l * l).sum();
-        let limit = dt.map_or(f64::INFINITY, |dt| longest / (dt * dt));
-        let around = Surroundings { domain: &state.domain, bounds: &motion.bounds, limit };
+        let limit = path.map_or(f64::INFINITY, |path| longest / (path.time * path.time));
+        let drifts = path.is_some();
+        let path = path.unwrap_or_default();
+        let beyond = if drifts { std::mem::take(&mut motion.beyond) } else { Vec::new() };
+        let faces = Faces { bounds: &motion.bounds, mass: &state.mass, path, records, beyond: &beyond };
+        let around = Surroundings { domain: &state.domain, faces, limit };
         let moving = Moving {
             x: &mut state.x,
             v: &mut state.v,
@@ -149,7 +166,13 @@ impl Simulation {
             mass: &state.mass,
             kept: &mut motion.kept,
         };
-        share(moving, factor, keeps, forces.engine.pool(), |part, over_mass| work(part, over_mass, around))
+        let mut moved = share(moving, factor, keeps, forces.engine.pool(), |part, over_mass| {
+            work(part, over_mass, around)
+        });
+        if drifts {
+            motion.beyond = std::mem::take(&mut moved.beyond);
+        }
+        moved
     }
 
     /// Refuses velocities that are not finite, or that lead beyond the box within `dt`. If the kick of the

@@ -4,7 +4,7 @@ use super::super::integrator::parts::has_stopped_counting;
 use super::super::reorder::Reordering;
 use super::{RunError, Simulation};
 use crate::particles::State;
-use psidpd_core::engine::{PeriodicBox, Pool};
+use psidpd_core::engine::Pool;
 use std::sync::OnceLock;
 
 #[derive(Debug, Clone)]
@@ -74,9 +74,8 @@ impl Particles {
         (&mut self.state, &self.force)
     }
 
-    /// Puts the particles into another box without wrapping, and returns the present box.
-    pub fn replace_domain(&mut self, domain: PeriodicBox) -> PeriodicBox {
-        std::mem::replace(&mut self.state.domain, domain)
+    pub fn replace_forces(&mut self, forces: &[[f64; 3]]) {
+        self.force.copy_from_slice(forces);
     }
 
     pub fn moves(&self) -> u64 {

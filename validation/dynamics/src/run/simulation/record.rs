@@ -2,8 +2,9 @@
 
 use super::{Simulation, State};
 use crate::integrator::Integrator;
+use crate::run::integrator::reflection::{Leg, Path};
 use psidpd_core::engine::thermostat::Pull;
-use psidpd_observe::flux::{Acted, Displaced, Flux, Line, Place};
+use psidpd_observe::flux::{Acted, Flux, Line, Place};
 
 /// The transport of momentum in the present step, whose length is `dt`.
 #[derive(Debug, Clone, Default)]
@@ -51,19 +52,30 @@ impl Simulation {
         }
     }
 
-    /// Records the paths of all particles to their present positions, for a time `h` with the velocities `u`.
-    pub(super) fn record_ways(&mut self, h: f64, u: impl Fn(&Simulation, usize) -> [f64; 3]) {
+    /// Records the ways of all particles to their present positions on a `path`; those that met faces went along `legs`, in the
+    /// order of particles.
+    pub(super) fn record_ways(&mut self, path: Path, legs: &[Leg]) {
         if !self.is_recording() {
             return;
         }
         let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
-        let ways: Vec<Line> = (0..self.len())
-            .map(|k| {
-                let momentum = over_dt * self.particles.mass_of(k);
-                let u = u(self, k);
-                Line { from: self.particles.now().x[k], d: u.map(|u| h * u), f: u.map(|u| momentum * u) }
-            })
-            .collect();
+        let mut ways = Vec::with_capacity(self.len() + legs.len());
+        let mut legs = legs.iter().peekable();
+        for k in 0..self.len() {
+            let mass = self.particles.mass_of(k);
+            let momentum = over_dt * mass;
+            if legs.peek().is_some_and(|leg| leg.particle == k) {
+                while let Some(Leg { to, d, u, .. }) = legs.next_if(|leg| leg.particle == k) {
+                    ways.push(Line { from: *to, d: *d, f: u.map(|u| momentum * u) });
+                }
+                continue;
+            }
+            let ahead = path.ahead / mass;
+            let (v, f) = (self.particles.now().v[k], self.forces()[k]);
+            let u: [f64; 3] = std::array::from_fn(|c| v[c] + ahead * f[c]);
+            let from = self.particles.now().x[k];
+            ways.push(Line { from, d: u.map(|u| path.time * u), f: u.map(|u| momentum * u) });
+        }
         if let Some(record) = self.record.as_deref_mut() {
             record.flux.ways.extend(ways);
         }
@@ -86,7 +98,7 @@ impl Simulation {
 
     /// Records the conservative forces on particles at the present positions, with their virial; `displaced`
     /// holds the positions of the evaluation, if they differ.
-    pub(super) fn record_forces(&mut self, virial: [f64; 6], displaced: Option<Displaced>) {
+    pub(super) fn record_forces(&mut self, virial: [f64; 6], displaced: Option<Vec<[f64; 3]>>) {
         if !self.is_recording() {
             return;
         }

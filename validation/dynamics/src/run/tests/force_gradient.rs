@@ -158,27 +158,27 @@ fn without_displacement_it_is_the_two_stage_step() {
     assert!(a == b);
 }
 
-/// A displaced evaluation uses positions beyond a wall, not at it: the forces equal those of the same
-/// particles in an open box, with a mirrored copy of the fluid moved by a box length.
+/// A displaced evaluation mirrors positions beyond a face, and has the forces there.
 #[test]
-fn particles_are_displaced_beyond_walls() {
+fn particles_are_displaced_and_mirrored_at_faces() {
     let model = Model::parse("m.toml", SMOOTH).unwrap();
     let x = vec![[0.01, 2.0, 2.0], [0.45, 2.0, 2.1], [3.99, 2.2, 2.0], [3.6, 2.0, 2.0]];
-    let state = |low: f64, length: f64| {
-        let domain =
-            PeriodicBox::orthogonal([low, 0.0, 0.0], [length, 4.0, 4.0], [false, true, true]).unwrap();
-        State::at_rest(domain, vec![1.0], x.clone())
-    };
-    let [near, far] = [state(0.0, 4.0), state(-1.0, 6.0)].map(|state| {
-        let mut run = Simulation::new(&model, 1.0, state, 7).unwrap();
-        run.prepare_for(force_gradient(1.0 / 6.0, 1.0 / 24.0), 0.1, Want::FORCES).unwrap();
-        run.displaced_forces(0.003).unwrap();
-        assert_eq!(run.state().x, x);
-        run.forces().to_vec()
-    });
+    let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [false, true, true]).unwrap();
+    let state = State::at_rest(domain, vec![1.0], x.clone());
+    let mut run = Simulation::new(&model, 1.0, state.clone(), 7).unwrap();
+    run.prepare_for(force_gradient(1.0 / 6.0, 1.0 / 24.0), 0.1, Want::FORCES).unwrap();
+    let before = run.forces().to_vec();
+    run.displaced_forces(0.003).unwrap();
+    assert_eq!(run.state().x, x);
+    let mut there = x.clone();
+    for (x, f) in there.iter_mut().zip(&before) {
+        (0..3).for_each(|c| x[c] += 0.003 * f[c]);
+    }
     // A force of at least 17 pushes the first particle out, to −0.04 or beyond.
-    assert!(near[0][0] < -1.0, "{near:?}");
-    for (a, b) in near.iter().flatten().zip(far.iter().flatten()) {
-        assert!((a - b).abs() < 1e-6 * near[0][0].abs(), "{near:?} {far:?}");
+    assert!(there[0][0] < -0.02 && there[2][0] > 4.02, "{there:?}");
+    (there[0][0], there[2][0]) = (-there[0][0], 8.0 - there[2][0]);
+    let expected = forces_at(&model, &state, there);
+    for (a, b) in run.forces().iter().flatten().zip(expected.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9 * before[0][0].abs(), "{a} {b}");
     }
 }

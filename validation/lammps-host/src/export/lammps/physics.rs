@@ -43,6 +43,10 @@ impl<'a> Physics<'a> {
             let faces = (0..3).filter(|k| self.walls[*k]).map(|k| format!("{0}lo EDGE {0}hi EDGE", AXES[k]));
             writeln!(
                 s,
+                "# wall/reflect mirrors what is outside, which heats fluid that presses on the faces; psidpd bounces on the exact path"
+            )?;
+            writeln!(
+                s,
                 "fix           walls {} wall/reflect {}",
                 self.mobile,
                 faces.collect::<Vec<_>>().join(" ")

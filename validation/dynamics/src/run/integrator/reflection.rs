@@ -1,0 +1,200 @@
+//! Particles that meet reflecting faces in a drift.
+//!
+//! A drift moves particles with the velocity of the step, which has a share of the kick by the present forces in it and lacks the
+//! rest. To mirror what is beyond a face and to reverse its velocity would be a leapfrog over the kink of the potential, which
+//! heats: each bounce would change the energy by up to `F |v| Δt`. So a particle that meets a face moves on the exact path under the
+//! force held, `x + ut + ½Ft²/m`, with its bounces. Velocity and position of the path differ from those of the step by what
+//! the step has given already, or has still to give, of the held force's kick; where no face is met both end at the same place.
+
+use crate::run::bounce::{Arc, fly};
+use crate::run::bounds::Bounds;
+
+/// The drift of a step, in which the present forces are held.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Path {
+    pub time: f64,
+    /// The velocity of the step at the start less that of the path, in units of force over mass.
+    pub kicked: f64,
+    /// The same of the positions.
+    shift: f64,
+    /// The velocity that moves the particles less that of the step, in the same units.
+    pub ahead: f64,
+}
+
+impl Path {
+    /// A drift of a whole step, whose velocity has `kicked` of the kick; the particles move with half of it.
+    pub fn whole(dt: f64, kicked: f64) -> Path {
+        Path { time: dt, kicked, shift: 0.0, ahead: 0.5 * dt - kicked }
+    }
+
+    /// The first drift of half a step.
+    pub fn first_half(dt: f64, kicked: f64) -> Path {
+        Path { time: 0.5 * dt, kicked, ..Path::default() }
+    }
+
+    /// The drift of half a step behind it.
+    pub fn second_half(dt: f64, kicked: f64) -> Path {
+        let first = Path::first_half(dt, kicked);
+        Path { shift: -first.shift_at_end(), ..first }
+    }
+
+    fn shift_at_end(&self) -> f64 {
+        self.shift + (self.kicked + self.ahead - 0.5 * self.time) * self.time
+    }
+}
+
+/// The faces around particles, and how these move.
+#[derive(Debug, Clone, Copy)]
+pub struct Faces<'a> {
+    pub bounds: &'a Bounds,
+    pub mass: &'a [f64],
+    pub path: Path,
+    /// Whether the ways of the particles are recorded.
+    pub records: bool,
+    /// What the drift before has left beyond faces.
+    pub beyond: &'a [Beyond],
+}
+
+/// A place of the step in its middle that lies beyond a face, where the particle waits: what the place of the path needs is kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beyond {
+    pub particle: usize,
+    direction: usize,
+    by: f64,
+}
+
+/// The particles of one thread before a drift.
+#[derive(Clone, Copy)]
+pub struct Before<'a> {
+    /// The number of the first.
+    pub first: usize,
+    pub x: &'a [[f64; 3]],
+    pub v: &'a [[f64; 3]],
+    pub f: &'a [[f64; 3]],
+    pub species: &'a [i32],
+}
+
+/// A particle that meets a face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounce {
+    pub particle: usize,
+    pub direction: usize,
+    /// Place and velocity of the step at the end, and the velocity of the path; `None` if it moved further than across the box.
+    pub end: Option<[f64; 3]>,
+    /// How far the place of the step would lie beyond the face.
+    beyond: f64,
+    /// Place of the step at the start.
+    start: f64,
+    /// Its way, with the places of the step at its ends and the velocities that carry momentum; empty if ways are not recorded.
+    arcs: Vec<Arc>,
+}
+
+/// A straight part of a particle's way, from `to − d`, with the velocity that carries its momentum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    pub particle: usize,
+    pub to: [f64; 3],
+    pub d: [f64; 3],
+    pub u: [f64; 3],
+}
+
+impl Faces<'_> {
+    /// The particles that meet a face if `rule` moves them, in their order. `rule` makes position and velocity of position, velocity,
+    /// force, and a number of the species.
+    pub fn met<R>(&self, before: Before, over_mass: &[f64], rule: R) -> Vec<Bounce>
+    where
+        R: Fn(f64, f64, f64, f64) -> (f64, f64),
+    {
+        let Path { time, kicked, shift, ahead } = self.path;
+        let mut bounces = Vec::new();
+        for c in self.bounds.walls() {
+            let [low, high] = [self.bounds.low[c], self.bounds.high[c]];
+            for (k, ((x, v), (f, s))) in
+                before.x.iter().zip(before.v).zip(before.f.iter().zip(before.species)).enumerate()
+            {
+                let (to, v) = rule(x[c], v[c], f[c], over_mass[*s as usize]);
+                let a = f[c] / self.mass[*s as usize];
+                let waits = x[c] <= low || x[c] >= high;
+                let beyond = if waits { self.beyond(before.first + k, c) } else { 0.0 };
+                let (from, u) = (x[c] + beyond - shift * a, v - kicked * a);
+                // A parabola is within the triangle of its ends and of the point where their tangents meet.
+                let (middle, end) = (from + 0.5 * time * u, from + time * (u + 0.5 * time * a));
+                let (least, most) = (to.min(from).min(middle).min(end), to.max(from).max(middle).max(end));
+                if least >= low && most <= high && beyond == 0.0 {
+                    continue;
+                }
+                let is_inside = (low..=high).contains(&to);
+                let mut arcs = Vec::new();
+                let show = |arc| {
+                    if self.records {
+                        arcs.push(arc)
+                    }
+                };
+                let flown = fly([from.clamp(low, high), u], a, [low, high], time, show);
+                // Beyond the mirror image of the box.
+                let escaped = !(2.0 * low - high..=2.0 * high - low).contains(&to);
+                if is_inside && beyond == 0.0 && flown.is_some_and(|end| end.given == 0.0) {
+                    continue;
+                }
+                let place = flown.map_or(to, |end| end.x + self.path.shift_at_end() * a);
+                let inside = place.clamp(low, high);
+                let end = flown.filter(|_| !escaped).map(|end| [inside, v + end.given, end.u]);
+                let beyond = place - inside;
+                for arc in &mut arcs {
+                    arc.given += v + ahead * a;
+                }
+                bounces.push(Bounce { particle: k, direction: c, end, beyond, start: x[c], arcs });
+            }
+        }
+        bounces.sort_by_key(|bounce| bounce.particle);
+        bounces
+    }
+
+    fn beyond(&self, particle: usize, direction: usize) -> f64 {
+        let left = self.beyond.iter().find(|b| b.particle == particle && b.direction == direction);
+        left.map_or(0.0, |beyond| beyond.by)
+    }
+
+    /// What `bounces` leave beyond faces for the drift behind this one, in the order of particles.
+    pub fn left(&self, bounces: &[Bounce], first: usize) -> Vec<Beyond> {
+        if self.path.shift_at_end() == 0.0 {
+            return Vec::new();
+        }
+        let left = bounces.iter().filter(|bounce| bounce.beyond != 0.0);
+        left.map(|b| Beyond { particle: first + b.particle, direction: b.direction, by: b.beyond }).collect()
+    }
+
+    /// The way of a particle that met faces in `bounces` and ended at `x` with the velocity `v` under the acceleration `a`.
+    pub fn legs(&self, bounces: &[Bounce], x: [f64; 3], v: [f64; 3], a: [f64; 3]) -> Vec<Leg> {
+        let Path { time, ahead, .. } = self.path;
+        let bounced = [0, 1, 2].map(|c| bounces.iter().find(|b| b.direction == c));
+        let mut times: Vec<f64> = bounces.iter().flat_map(|b| b.arcs.iter().map(|arc| arc.time)).collect();
+        times.push(time);
+        times.sort_by(f64::total_cmp);
+        let particle = bounces.first().map_or(0, |b| b.particle);
+        // The place and the velocity along a direction at a time between two others.
+        let along = |c: usize, at: f64, during: f64| match bounced[c] {
+            None => {
+                let u = v[c] + ahead * a[c];
+                (x[c] - (time - at) * u, u)
+            }
+            Some(Bounce { arcs, start, .. }) => {
+                let arc = arcs.iter().rev().find(|arc| arc.time <= during).unwrap_or(&arcs[0]);
+                // The ends are those of the step.
+                let place = match at {
+                    0.0 => *start,
+                    at if at == time => x[c],
+                    at => arc.place(at),
+                };
+                (place, arc.given)
+            }
+        };
+        let leg = |pair: &[f64]| {
+            let (from, to) = (pair[0], pair[1]);
+            let at = [0, 1, 2].map(|c| along(c, to, from));
+            let d = std::array::from_fn(|c| at[c].0 - along(c, from, from).0);
+            Leg { particle, to: at.map(|at| at.0), d, u: at.map(|at| at.1) }
+        };
+        times.windows(2).filter(|pair| pair[0] < pair[1]).map(leg).collect()
+    }
+}
