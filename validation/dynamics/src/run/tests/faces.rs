@@ -248,7 +248,7 @@ fn the_layer_at_a_face_is_right() {
         (Integrator::Baoab(every(1)), 0.02),
         (Integrator::VelocityVerlet, 0.02),
     ] {
-        let steps = (180.0 / dt).min(15_000.0) as u64;
+        let steps = f64::min(180.0 / dt, 15_000.0) as u64;
         let [found, kinetic, conf] = at_the_faces(integrator, dt, steps);
         println!("{} {dt}: {found:.3}, T {kinetic:.4}, T_conf {conf:.4}", integrator.name());
         assert!(dt > 0.1 || integrator == Integrator::VelocityVerlet || (found / density - 1.0).abs() < 0.02);
