@@ -5,6 +5,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use psidpd::formats::data::Atom;
+use psidpd::formats::files::Existing;
 use psidpd::formats::setfl::{Element, Setfl};
 use psidpd::formats::{DataFile, dump};
 use psidpd::lammps::{Host, Lammps, LammpsError, install};
@@ -264,7 +265,7 @@ fn lammps_reads_our_data_and_we_read_its() {
                 .collect(),
             velocities: Some(vec![[third, 0.0, -1e-7]; 4]),
         };
-        ours.write(&path("ours.data")).unwrap();
+        ours.write_over(&path("ours.data"), Existing::Replace).unwrap();
         l.commands(&format!(
             "clear\nunits lj\natom_style atomic\nread_data {}\npair_style zero 1.0\npair_coeff * *\n\
              dump d all custom 1 {} id type x y z vx vy vz\ndump_modify d format float %.17g\nrun 0 post no\nundump d\n\

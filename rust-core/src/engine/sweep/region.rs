@@ -105,7 +105,7 @@ fn grid_of(geometry: &mut BoxGeometry, cutoff: f64, count: usize) -> Option<Cell
         let (closed, open): (Vec<usize>, Vec<usize>) = axes.partition(|k| geometry.periodic[*k]);
         let narrow = closed.into_iter().any(|k| reach > (CLOSE * cutoff).max(geometry.height(k) - cutoff));
         if narrow {
-            most = 4 * most;
+            most *= 4;
             if most > MOST_CELLS {
                 return None;
             }

@@ -37,9 +37,11 @@ impl PairThermostat {
     /// Takes the pairs that the last evaluation of `engine` has listed, if it has, for the search that follows: at the
     /// same positions, with the particles in the same order.
     pub fn take(&mut self, engine: &mut Engine) {
-        self.has_pairs = false;
+        // Without listed pairs those of the last search stay.
+        let had_pairs = std::mem::replace(&mut self.has_pairs, false);
         let asker = self.from_forces.asker;
         let taken = engine.sweep_mut().take_pairs(asker, &mut self.lists, &mut self.planes);
+        self.has_pairs = had_pairs && !taken;
         let particles = self.lists.place.len();
         self.from_forces.listed =
             self.from_forces.listed.filter(|_| taken).map(|listed| Listed { particles, ..listed });
