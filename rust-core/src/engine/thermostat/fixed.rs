@@ -7,14 +7,6 @@ use super::PairThermostat;
 use super::pass::Sums;
 use crate::engine::sweep::Pool;
 
-/// The forces on particles of infinite mass, if they are asked for.
-#[derive(Debug, Default)]
-pub struct OnFixed {
-    pub is_asked: bool,
-    /// The mean force over the time of the last update on each owned particle, in the order of the host; zero for others.
-    force: Vec<[f64; 3]>,
-}
-
 impl PairThermostat {
     /// Sets whether later updates by the midpoint rule find the forces on particles of infinite mass.
     pub fn ask_for_forces_on_fixed(&mut self, on: bool) {

@@ -26,8 +26,8 @@ pub(super) const MOST: usize = 500_000;
 /// Smallest relative error that deserves advice.
 const WORTH: f64 = 0.01;
 
-/// Steps of particles that a stage must have made for a trial to take less than it, or not much more.
-const TRIAL: u64 = 300_000;
+/// Steps of particles that a stage must have made for a trial, which takes one to three seconds, to be a small part of it.
+const TRIAL: u64 = 50_000_000;
 
 /// Estimated errors and cost of a better step for a stage of velocity Verlet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -165,7 +165,7 @@ mod tests {
 
     fn advice(stage: &str) -> Option<Advice> {
         let text = format!(
-            "model = \"m.toml\"\nkT = 1.0\nseed = 7\nbox = 4.0\ndensity = 6.05\n[[stage]]\nname = \"run\"\nsteps = 1000\n{stage}"
+            "model = \"m.toml\"\nkT = 1.0\nseed = 7\nbox = 4.0\ndensity = 6.05\n[[stage]]\nname = \"run\"\nsteps = 200000\n{stage}"
         );
         let scene = support::scene(SET6, &text).unwrap();
         let mut run = scene.simulation(scene.initial_state()).unwrap();

@@ -303,7 +303,7 @@ fn one_folder_holds_one_run_at_a_time() {
     let second = Runner::begin(&scene, folder.path(), Begin::Overwrite).map(|_| ());
     assert!(matches!(second, Err(RunError::Busy { .. })), "{second:?}");
     drop(first);
-    finished(&scene, folder.path(), Begin::New);
+    finished(&scene, folder.path(), Begin::Resume);
 }
 
 /// If files lost bytes that a checkpoint records, the run continues from the previous checkpoint; if that
