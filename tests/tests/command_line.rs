@@ -560,6 +560,7 @@ fn a_calibration_survives_densities_that_run_away() {
     assert!(failed.iter().any(|f| f["density"] == 12.0 && !f["why"].as_str().unwrap().is_empty()), "{json}");
     assert!(words.contains("warning: at density 12 the run stopped"), "{words}");
     assert!(std::fs::read_to_string(here.join("c.toml")).unwrap().contains("correction = ["));
+    std::fs::remove_file(here.join("c.toml")).unwrap();
     let output = calibrate("12:15", "0.02");
     let words = said(&output).split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(output.status.code(), Some(2), "{words}");
