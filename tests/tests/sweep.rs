@@ -62,9 +62,9 @@ fn set_reaches_scene_and_model_in_every_verb() {
     good(here, &["theory", &model, "--set", "kT=0.5", "--json", "t.json"]);
     assert_eq!(json(&here.join("t.json"))["kT"], 0.5);
     for (edit, message) in [
-        ("densty=3", "--set:1: densty: unknown key"),
-        ("kT=-1", "--set:1: kT"),
-        ("output.thermoo=3", "--set:1: output.thermoo: unknown key"),
+        ("densty=3", "densty: unknown key"),
+        ("kT=-1", "--set:1:1"),
+        ("output.thermoo=3", "output.thermoo: unknown key"),
         ("stage.x.dt=1", "stage"),
         ("kT", "expected KEY=VALUE"),
     ] {
