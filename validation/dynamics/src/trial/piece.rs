@@ -76,13 +76,19 @@ impl Piece {
         let fluid = of.model.at(of.kt)?;
         let evaluator = Evaluator::new(fluid)?;
         let (mut number, mut rates) = (3, [0.0; 2]);
+        // Without forces a step is limited by the way of a particle through the range of another.
+        let lightest = of.masses.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+        let crossing = match evaluator.fluid.cutoff() {
+            range if range > 0.0 => (of.kt / lightest).sqrt() / range,
+            _ => 0.0,
+        };
         for round in 0..=ROUNDS {
             draw_velocities(&mut state, of, number);
             number += 3;
             let mut run = simulation(of.model, of.kt, state.clone(), of.seed)?;
             rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
             let [frequency, drag] = rates;
-            let fastest = frequency.max(0.1 * drag);
+            let fastest = frequency.max(0.1 * drag).max(crossing);
             if fastest <= 0.0 {
                 break;
             }
@@ -100,7 +106,7 @@ impl Piece {
             state = run.state().clone();
         }
         let mut run = simulation(of.model, of.kt, state.clone(), of.seed)?;
-        let dt = SHORT / rates[0].max(0.1 * rates[1]);
+        let dt = SHORT / rates[0].max(0.1 * rates[1]).max(crossing);
         let mut samples = Vec::new();
         if dt.is_finite() {
             rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
