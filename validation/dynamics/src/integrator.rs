@@ -266,6 +266,16 @@ impl Integrator {
         }
     }
 
+    /// At every how many steps drag and noise act.
+    pub fn thermostat_every(&self) -> u64 {
+        match self {
+            Integrator::Aboba(coupling)
+            | Integrator::TwoStage { coupling, .. }
+            | Integrator::ForceGradient { coupling, .. } => coupling.every,
+            _ => 1,
+        }
+    }
+
     pub fn has_time(&self) -> bool {
         !matches!(self, Integrator::MonteCarlo { .. })
     }

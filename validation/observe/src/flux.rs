@@ -9,10 +9,11 @@
 //! is 0.
 
 use psidpd_core::engine::pair_sums::COMPONENTS;
+use serde::{Deserialize, Serialize};
 
 /// A straight line of momentum transport. It adds `d ⊗ f` times its fraction in a volume, divided by that volume, to the
 /// mean pressure in the volume.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// The first end of the line.
     pub from: [f64; 3],

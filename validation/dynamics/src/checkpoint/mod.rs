@@ -31,6 +31,7 @@ pub use written::Written;
 
 use crate::particles::State;
 use psidpd_core::document::open_regular;
+use psidpd_observe::flux::Line;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -54,6 +55,7 @@ pub struct Checkpoint {
     pub state: State,
     /// Forces of the present step, thermostat included: the next step begins with them.
     pub forces: Vec<[f64; 3]>,
+    pub held: Held,
     /// The largest displacement of a trial move, as tuned so far; `None` without Monte Carlo.
     pub max_move: Option<f64>,
     /// Evaluations of ψ below and above the bounds of a density.
@@ -66,6 +68,15 @@ pub struct Checkpoint {
     pub files: BTreeMap<String, Written>,
     /// The accumulated data of observables, in a format of their own; empty without observables.
     pub observers: Vec<u8>,
+}
+
+/// What the thermostat did when it last acted, for steps before it acts again.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Held {
+    /// Virial of its mean force.
+    pub virial: [f64; 6],
+    /// Mean drag of the pairs; empty if nobody records it.
+    pub drag: Vec<Line>,
 }
 
 /// The place of a run in its stages.

@@ -1,6 +1,7 @@
 use super::*;
 use crate::scene::Scene;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_observe::flux::Line;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
 /// Numbers that a conversion may get wrong.
@@ -30,6 +31,7 @@ fn checkpoint(step: u64) -> Checkpoint {
             image: vec![[0, -1, i32::MIN]; 2],
         },
         forces: vec![HARD; 2],
+        held: Held { virial: [0.1; 6], drag: vec![Line { from: HARD, d: HARD, f: HARD }] },
         max_move: Some(0.1),
         out_of_bounds: [u64::MAX, 0],
         last: None,

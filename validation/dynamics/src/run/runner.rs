@@ -6,7 +6,7 @@ use super::watch::Watch;
 use super::{
     Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, about, bytes_per_particle,
 };
-use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Written};
+use crate::checkpoint::{Checkpoint, CheckpointError, Found, Held, Identity, Position, Store, Written};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::files::{Protected, open_inside, protect, there};
@@ -124,6 +124,7 @@ impl<'a> Runner<'a> {
             step: 0,
             position: Position::default(),
             forces: Vec::new(),
+            held: Held::default(),
             state,
             max_move: None,
             out_of_bounds: [0; 2],
@@ -151,6 +152,7 @@ impl<'a> Runner<'a> {
         }
         let instructions = simulation.arithmetic();
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
+        simulation.hold(&good.held);
         simulation.set_max_move(good.max_move);
         if fallback.is_some() {
             store.fall_back()?;

@@ -11,6 +11,7 @@ mod faces;
 mod force_gradient;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod held;
 mod integrators;
 mod monte_carlo;
 mod order;

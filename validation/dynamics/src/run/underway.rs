@@ -83,7 +83,13 @@ impl Runner<'_> {
         if totals {
             want = Want { energy: true, virial: true, ..want };
         }
-        self.simulation.record_flux(self.observers.wants_flux(number, &stage.name));
+        // What the thermostat does in this step is asked for up to the step before it acts again.
+        let period = stage.integrator.thermostat_every();
+        let last = if number.is_multiple_of(period) { number + period - 1 } else { number };
+        let virial = |step| self.is_row(step) || self.observers.wants(step, &stage.name).virial;
+        self.simulation.hold_impulses((number + 1..=last).any(virial));
+        let flux = (number..=last).any(|step| self.observers.wants_flux(step, &stage.name));
+        self.simulation.record_flux(flux);
         self.simulation.set_settling(self.scene.settles(self.position.stage, self.position.done));
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
@@ -164,6 +170,7 @@ impl Runner<'_> {
         good.state.copy_particles(self.simulation.state());
         good.forces.clear();
         good.forces.extend_from_slice(self.simulation.held_forces());
+        good.held = self.simulation.held();
         good.max_move = self.simulation.max_move();
         good.out_of_bounds = self.simulation.out_of_bounds();
         good.observers = self.observers.to_bytes();

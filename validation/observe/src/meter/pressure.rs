@@ -15,16 +15,16 @@ impl Meter for Pressure {
         path: "pressure",
         title: "pressure tensor",
         about: "Three tensors with the same limit as the time step goes to 0. `carried` is the flux of momentum that the \
-                integrator makes: Σ m u u with the velocities u that moved the particles in the step, and the virial \
-                Σ r_ij ⊗ F_ij of all pair forces where they acted, drag included; the random force, whose mean is 0, is \
-                left out. It is the pressure that walls feel and that balances in interfaces, at any time step. \
-                `total` is (Σ m v v + W)/V with the velocities at the end of the step and the virial of all forces, \
-                noise included, as `pressure` in `thermo.csv`, as LAMMPS's `compute pressure` and its thermo output: in \
-                velocity Verlet too low by ¼ Δt² ⟨Σ f²/m⟩/(dV), which is of first order, as the random force is. \
-                `conservative` leaves drag and noise out of W, and lacks drag as well. With \
-                `thermostat_every`, sample at steps of all phases. `configurational` is the scalar ρkT + tr W/(dV) of conservative \
-                forces with the kT of the stage: what configurations tell, without the scatter of velocities and their \
-                error at a time step, as a Monte Carlo run has it. In a dilute fluid it has much the least noise.",
+                integrator makes: Σ m u u with the velocities u that moved the particles in the step, and the virial Σ r_ij \
+                ⊗ F_ij of all pair forces where they acted, drag included; the random force, whose mean is 0, is left out. \
+                It is the pressure that walls feel and that balances in interfaces, at any time step. `total` is (Σ m v v + \
+                W)/V with the velocities at the end of the step and the virial of all forces, noise included, those of \
+                `thermostat_every` steps as a mean, as `pressure` in `thermo.csv`, as LAMMPS's `compute pressure` and its \
+                thermo output: in velocity Verlet too low by ¼ Δt² ⟨Σ f²/m⟩/(dV), which is of first order, as the random \
+                force is. `conservative` leaves drag and noise out of W, and lacks drag as well. `configurational` is the \
+                scalar ρkT + tr W/(dV) of conservative forces with the kT of the stage: what configurations tell, without \
+                the scatter of velocities and their error at a time step, as a Monte Carlo run has it. In a dilute fluid it \
+                has much the least noise.",
         ..PLAIN
     };
 

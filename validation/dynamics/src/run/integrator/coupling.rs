@@ -5,21 +5,30 @@ use psidpd_core::engine::Want;
 use psidpd_core::engine::thermostat::Stream;
 
 impl Coupling {
+    /// Its action for steps of `dt`.
+    fn action(self, dt: f64) -> Heat {
+        Heat { update: self.update, noise: self.noise, time: dt * self.every as f64, stream: Stream(0) }
+    }
+
     /// Its action in the present step of `dt`, if it is its turn.
     fn heat(self, system: &Simulation, dt: f64) -> Option<Heat> {
-        let time = dt * self.every as f64;
-        let heat = Heat { update: self.update, noise: self.noise, time, stream: Stream(0) };
-        system.step_number().is_multiple_of(self.every).then_some(heat)
+        system.step_number().is_multiple_of(self.every).then(|| self.action(dt))
+    }
+
+    /// Finds the virial that it would have at the present positions.
+    pub(super) fn rehearse(self, system: &mut Simulation, dt: f64) -> Result<(), RunError> {
+        system.rehearse(self.action(dt), dt)
     }
 
     /// Announces that it will act, if it is its turn, where the next forces are computed.
     pub(super) fn announce(self, system: &mut Simulation, dt: f64, want: Want) {
         if let Some(heat) = self.heat(system, dt) {
-            system.expect_heat(heat, want);
+            system.expect_heat(heat, system.wants_of_heat(want));
         }
     }
 
     pub(super) fn act(self, system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
+        let want = system.wants_of_heat(want);
         self.heat(system, dt).map_or(Ok(()), |heat| system.heat(heat, want, dt))
     }
 }

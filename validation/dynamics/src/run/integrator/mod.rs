@@ -26,6 +26,16 @@ use psidpd_core::engine::noise::Law;
 use reflection::Path;
 
 impl Integrator {
+    /// Adds to the virial that of the thermostat at the present positions, as `fix dpd/splitting` in LAMMPS does at setup.
+    pub(super) fn rehearse(self, system: &mut Simulation, dt: f64) -> Result<(), RunError> {
+        match self {
+            Integrator::Aboba(coupling)
+            | Integrator::TwoStage { coupling, .. }
+            | Integrator::ForceGradient { coupling, .. } => coupling.rehearse(system, dt),
+            _ => Ok(()),
+        }
+    }
+
     /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.
     pub(super) fn step(self, system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
         match self {

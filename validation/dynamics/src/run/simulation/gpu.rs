@@ -197,9 +197,16 @@ impl Simulation {
     ) -> Result<(), RunError> {
         let rule = rule(integrator)?;
         self.supply_gpu()?;
-        if self.record.is_some() {
+        // The GPU computes the thermostat's virial for steps that it acts in; that for several steps comes from the host.
+        let every = integrator.thermostat_every();
+        let acts_for_several = every > 1 && (self.number + 1).is_multiple_of(every);
+        if acts_for_several {
+            self.forget_impulses();
+        }
+        let heat = self.wants_of_heat(want).virial && acts_for_several;
+        if self.record.is_some() || heat {
             self.make_collected(false)?;
-            self.record_on_host(dt, integrator)?;
+            self.record_on_host(dt, integrator, Want { virial: heat, ..Want::FORCES })?;
         }
         let alike = |(_, before, with): &mut (u64, f64, Rule)| (*before, *with) == (dt, rule);
         if !self.gpu.as_mut().is_some_and(|gpu| gpu.collected.as_mut().is_none_or(alike)) {
@@ -215,12 +222,12 @@ impl Simulation {
         if totals || *steps >= gpu.batch { self.make_collected(totals) } else { Ok(()) }
     }
 
-    /// Makes the next step with the arrays of the host, for its record; they are fetched again after the step of the GPU.
-    fn record_on_host(&mut self, dt: f64, integrator: Integrator) -> Result<(), RunError> {
+    /// Makes the next step with the arrays of the host, for its record or its impulses; they are fetched again after the step of the GPU.
+    fn record_on_host(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         self.fetch()?;
         let gpu = self.gpu.take();
         let number = self.number;
-        let made = self.begin_step(dt, integrator, Want::FORCES).and_then(|()| self.end_step());
+        let made = self.begin_step(dt, integrator, want).and_then(|()| self.end_step());
         self.motion.deferred = None;
         self.number = number;
         self.gpu = gpu;
@@ -236,7 +243,14 @@ impl Simulation {
         let step = start.elapsed().as_secs_f64() / steps as f64;
         gpu.batch = ((BATCH.as_secs_f64() / step) as u64).clamp(1, MOST);
         made.map_err(|error| self.failure(error, dt))?;
-        if totals { self.take_totals() } else { Ok(()) }
+        if !totals {
+            return Ok(());
+        }
+        self.take_totals()?;
+        if matches!(rule, Rule::TwoStage { every, .. } if every > 1) {
+            self.forces.tally.thermostat_virial = self.thermostat.impulse_virial;
+        }
+        Ok(())
     }
 
     fn take_totals(&mut self) -> Result<(), RunError> {

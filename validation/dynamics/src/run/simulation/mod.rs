@@ -20,6 +20,7 @@ mod thermostat;
 pub(super) use thermostat::Heat;
 
 use super::{Integrator, RunError, State, reorder};
+use crate::checkpoint::Held;
 use external::External;
 use forces::Forces;
 use monte_carlo::MonteCarlo;
@@ -128,7 +129,7 @@ impl Simulation {
     /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
     pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
-        self.thermostat.impulse_virial = [0.0; 6];
+        self.forget_impulses();
         self.stale = false;
         self.motion.held = None;
         #[cfg(feature = "gpu")]
@@ -141,7 +142,8 @@ impl Simulation {
         match integrator.properties().drag_in_forces {
             true => self.forces_with_thermostat(dt, want),
             false => self.conservative_forces(want),
-        }
+        }?;
+        if want.virial { integrator.rehearse(self, dt) } else { Ok(()) }
     }
 
     /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces only.
@@ -184,7 +186,9 @@ impl Simulation {
             self.particles.replace_forces(&held);
         }
         self.number += 1;
-        self.thermostat.impulse_virial = [0.0; 6];
+        if self.number.is_multiple_of(integrator.thermostat_every()) {
+            self.forget_impulses();
+        }
         self.monte_carlo.at_work = !integrator.has_time();
         self.open_record(dt);
         integrator.step(self, dt, want)?;
@@ -197,6 +201,21 @@ impl Simulation {
             self.reorder();
         }
         Ok(())
+    }
+
+    fn forget_impulses(&mut self) {
+        self.thermostat.impulse_virial = [0.0; 6];
+        self.thermostat.held_drag.clear();
+    }
+
+    /// The virial and the drag that the thermostat holds until it acts again, for a checkpoint.
+    pub(super) fn held(&self) -> Held {
+        Held { virial: self.thermostat.impulse_virial, drag: self.thermostat.held_drag.clone() }
+    }
+
+    pub(super) fn hold(&mut self, held: &Held) {
+        self.thermostat.impulse_virial = held.virial;
+        self.thermostat.held_drag.clone_from(&held.drag);
     }
 
     /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing. On a GPU it returns the errors of

@@ -35,7 +35,16 @@ impl Simulation {
 
     pub(super) fn open_record(&mut self, dt: f64) {
         if let Some(record) = &mut self.record {
-            **record = Record { dt, flux: Flux::default(), open: true };
+            // Between two actions the drag of the last goes on.
+            let flux = Flux { drag: self.thermostat.held_drag.clone(), ..Flux::default() };
+            **record = Record { dt, flux, open: true };
+        }
+    }
+
+    /// Keeps the drag of this step for the records of the next ones.
+    pub(super) fn hold_drag(&mut self) {
+        if let Some(record) = &self.record {
+            self.thermostat.held_drag.clone_from(&record.flux.drag);
         }
     }
 

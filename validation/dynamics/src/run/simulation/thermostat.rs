@@ -7,6 +7,7 @@ use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
 use psidpd_core::engine::{Step, Want};
+use psidpd_observe::flux::Line;
 
 #[derive(Debug)]
 pub(super) struct Thermostat {
@@ -16,8 +17,12 @@ pub(super) struct Thermostat {
     effort_before: Effort,
     /// Of which positions the pairs are known, for what time, and whether with distances.
     found: Option<(u64, f64, bool)>,
-    /// Virial of the impulses in the present step.
+    /// Virial of the mean force of drag and noise since they last acted, where they are apart from the forces.
     pub impulse_virial: [f64; 6],
+    /// The mean drag of the pairs when it last acted, for records of the steps up to the next time.
+    pub held_drag: Vec<Line>,
+    /// Whether steps before it acts again ask for that virial.
+    pub is_held: bool,
     /// Whether drag and noise are among the present forces, where they act; `None` if nobody has asked for these forces.
     pub in_forces: Option<bool>,
     kept_forces: Vec<[f64; 3]>,
@@ -41,6 +46,8 @@ impl Thermostat {
             effort_before: Effort::default(),
             found: None,
             impulse_virial: [0.0; 6],
+            held_drag: Vec::new(),
+            is_held: false,
             in_forces: None,
             kept_forces: Vec::new(),
         }
@@ -144,6 +151,17 @@ impl Simulation {
         Ok(())
     }
 
+    /// Sets whether steps before the thermostat acts again ask for its virial, which then is that of its mean force since it last
+    /// acted. Trajectories do not depend on it.
+    pub fn hold_impulses(&mut self, on: bool) {
+        self.thermostat.is_held = on;
+    }
+
+    /// What is asked of an action of the thermostat in a step that asks for `want`.
+    pub(in crate::run) fn wants_of_heat(&self, want: Want) -> Want {
+        Want { virial: want.virial || self.thermostat.is_held, ..want }
+    }
+
     fn wants(&self, want: Want) -> Want {
         Want { virial: want.virial || self.is_recording(), ..want }
     }
@@ -221,9 +239,9 @@ impl Simulation {
         });
         // The drag that an implicit step ends with is a force, which `add_drag` counts.
         if heat.update != Update::ImplicitDrag {
-            // That of a mean force over the step.
+            // That of a mean force over the step, or over the steps that it acts for.
             for (sum, w) in thermostat.impulse_virial.iter_mut().zip(virial) {
-                *sum += w * heat.time / dt;
+                *sum += w * (heat.time / dt).min(1.0);
             }
         }
         if let Some(k) = not_finite(v) {
@@ -231,7 +249,19 @@ impl Simulation {
         }
         // Implicit drag ends a step: that is half of it.
         let part = if heat.update == Update::ImplicitDrag { 0.5 } else { 1.0 };
-        self.record_pulls(part * heat.time / dt, pulls);
+        self.record_pulls(part * (heat.time / dt).min(1.0), pulls);
+        if recording && heat.time > dt {
+            self.hold_drag();
+        }
+        Ok(())
+    }
+
+    /// Finds the virial of an action of the thermostat, and leaves the velocities as they are.
+    pub(in crate::run) fn rehearse(&mut self, heat: Heat, dt: f64) -> Result<(), RunError> {
+        let present = self.particles.now().v.clone();
+        self.heat(heat, Want::TOTALS, dt)?;
+        self.particles.velocities_mut().copy_from_slice(&present);
+        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
         Ok(())
     }
 

@@ -29,7 +29,7 @@ const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 
     [[body_force]]\nacceleration = [0.1, 0.0, -0.2]\n\
     [[stage]]\nname = \"cool\"\nsteps = 7\nkT = [1.5, 1.0]\nlevels = 3\nintegrator = \"groot-warren\"\n\
     [[stage]]\nname = \"alone\"\nsteps = 5\ndt = 0.005\nbody_forces = false\n\
-    [[stage]]\nname = \"run\"\nsteps = 9\n\
+    [[stage]]\nname = \"run\"\nsteps = 9\nintegrator = \"two-stage\"\nthermostat_every = 3\n\
     [output]\nthermo = 2\ndump = 3\nxyz = 4\ngsd = 2\nvtk = 7\nsnapshot = 10\ncheckpoint = 4\n\
     [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
     velocity_profile = true\npressure = true\nmsd = { every = 1, length = 4 }\nclusters = { skip = 3 }\n";
@@ -37,7 +37,7 @@ const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 
 /// Stages with one integrator after the other.
 const INTEGRATORS: &str = "\
     [[stage]]\nname = \"a\"\nsteps = 5\ndt = 0.02\nintegrator = \"aboba\"\nthermostat_every = 2\n\
-    [[stage]]\nname = \"b\"\nsteps = 4\ndt = 0.03\nintegrator = \"two-stage\"\n\
+    [[stage]]\nname = \"b\"\nsteps = 4\ndt = 0.03\nintegrator = \"two-stage\"\nthermostat_every = 3\n\
     [[stage]]\nname = \"c\"\nsteps = 3\nintegrator = \"peters\"\n\
     [[stage]]\nname = \"d\"\nsteps = 3\nintegrator = \"dpd-vv\"\n\
     [[stage]]\nname = \"e\"\nsteps = 3\nintegrator = \"baoab\"\nthermostat_step = \"pairwise\"\n\

@@ -1,0 +1,80 @@
+//! The thermostat that acts at every k-th step: pressures at the steps between.
+
+use super::*;
+use crate::integrator::Coupling;
+use psidpd_core::engine::PeriodicBox;
+
+const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n";
+
+/// Two particles so slow that they stay, and so cold that there is no noise. With D = γ (1 − ½)² and x = ½ kΔt D/μ the
+/// midpoint rule takes 2x/(1 + x) of their relative velocity u, by the mean force 2x/(1 + x) μu/(kΔt). Its virial is part of the
+/// pressure in the steps up to the next action, as the drag at the middle of the velocities is of the momentum carried.
+#[test]
+fn the_virial_is_that_of_the_mean_force_in_every_step() {
+    let along = [1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
+    let start = [3e-12, -1e-12, 2e-12];
+    let u: f64 = along.iter().zip(start).map(|(e, v)| e * v).sum();
+    let state = State {
+        domain: PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap(),
+        mass: vec![1.0, 3.0],
+        x: vec![[2.0; 3], along.map(|e| 2.0 - 0.5 * e)],
+        v: vec![start, [0.0; 3]],
+        species: vec![0, 1],
+        tag: vec![1, 2],
+        image: vec![[0; 3]; 2],
+    };
+    let model = Model::parse("m.toml", PAIR).unwrap();
+    let (dt, mu) = (0.3, 0.75);
+    for every in [1u64, 2, 3] {
+        let coupling = Coupling { every, ..Coupling::DEFAULT };
+        for integrator in [
+            Integrator::TwoStage { lambda: 0.21, coupling },
+            Integrator::ForceGradient { lambda: 1.0 / 6.0, gradient: 1.0 / 24.0, coupling },
+            Integrator::Aboba(coupling),
+        ] {
+            let mut run = Simulation::new(&model, 1e-60, state.clone(), 7).unwrap();
+            run.record_flux(true);
+            run.prepare_for(integrator, dt, Want::TOTALS).unwrap();
+            let x = 0.5 * every as f64 * dt * 1.5 / mu;
+            for step in 1..=9u64 {
+                run.step(dt, integrator, Want::TOTALS).unwrap();
+                let Some(actions) = (step / every).checked_sub(1) else { continue };
+                let before = u * ((1.0 - x) / (1.0 + x)).powi(actions as i32);
+                let force = -mu * before * 2.0 * x / (1.0 + x) / (every as f64 * dt);
+                let (total, rest) = (run.pressure_tensor(), run.conservative_pressure_tensor());
+                let drag = psidpd_observe::flux::Flux {
+                    drag: run.flux().unwrap().drag.clone(),
+                    ..Default::default()
+                };
+                for (c, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                    let expected = 0.5 * along[a] * along[b] * force;
+                    let close = |found: f64| (found / expected - 1.0).abs() < 1e-9;
+                    assert!(close(64.0 * (total[c] - rest[c])), "{integrator:?}, step {step}: {total:?}");
+                    assert!(close(drag.sum()[c]), "{integrator:?}, step {step}: {:?}", drag.sum());
+                }
+            }
+        }
+    }
+}
+
+/// Rows and observables of a step do not depend on which other steps are sampled.
+#[test]
+fn rows_do_not_depend_on_other_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |thermo: u64| {
+        let rest = format!(
+            "[[stage]]\nname = \"run\"\nsteps = 30\ndt = 0.02\nintegrator = \"two-stage\"\nthermostat_every = 4\n\
+             [output]\nthermo = {thermo}\n"
+        );
+        let scene = scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, &rest).unwrap();
+        let out = folder.path().join(thermo.to_string());
+        run_scene(&scene, &out, &mut |_| {}).unwrap();
+        std::fs::read_to_string(out.join("thermo.csv")).unwrap()
+    };
+    let all = rows(1);
+    for thermo in [3, 5] {
+        for row in rows(thermo).lines() {
+            assert!(all.lines().any(|line| line == row), "{thermo}: {row}");
+        }
+    }
+}
