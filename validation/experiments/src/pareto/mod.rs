@@ -1,7 +1,7 @@
 //! Speed against error: what a unit of simulated time costs with each setting, and how far off its results are.
 //!
 //! [`setting`] says what is tried, [`origin`] where all begin, [`sample`] runs a setting for its errors and [`time`] all of them
-//! in turn for their cost; [`quantity`] holds results against the reference, [`race`] spends the time where it decides, [`front`]
+//! in turn for their cost; [`quantity`] holds results against the reference, `race` spends the time where it decides, [`front`]
 //! and `recommend` choose.
 
 mod drift;
