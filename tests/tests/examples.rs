@@ -132,5 +132,5 @@ fn examples_of_the_manual_pages_are_accepted() {
             count += 1;
         }
     }
-    assert_eq!(count, 13);
+    assert_eq!(count, 14);
 }

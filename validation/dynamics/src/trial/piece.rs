@@ -250,6 +250,8 @@ fn start(of: &Composition) -> Result<Option<State>, RunError> {
     if volume * total > MOST {
         return Ok(None);
     }
+    // Of one species the density is exact.
+    let volume = (volume * total).round() / total;
     let length = volume.powf(1.0 / dimensions as f64);
     let lengths = [length, length, if dimensions == 2 { 1.0 } else { length }];
     let Ok(domain) = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, dimensions == 3]) else {

@@ -12,7 +12,7 @@ const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\n
 #[test]
 fn the_virial_is_that_of_the_mean_force_in_every_step() {
     let along = [1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
-    let start = [3e-12, -1e-12, 2e-12];
+    let start = [3e-15, -1e-15, 2e-15];
     let u: f64 = along.iter().zip(start).map(|(e, v)| e * v).sum();
     let state = State {
         domain: PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap(),
