@@ -6,11 +6,12 @@ use rustix::fs::{
     openat, renameat, renameat_with, statat, unlinkat,
 };
 use rustix::io::Errno;
+use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// A file without a name, in the folder that it will be in. A process that is killed leaves nothing of it; where the file
@@ -32,7 +33,7 @@ impl Draft {
         let no_name = || io::Error::new(ErrorKind::InvalidInput, "not the name of a file");
         let name = path.file_name().ok_or_else(no_name)?.to_owned();
         let folder = open_folder(path)?;
-        remove_leftovers(&folder);
+        remove_leftovers(path, &folder);
         let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
         // Its permissions are those that the user's mask leaves.
         let (file, temporary) = match openat(&folder, ".", flags, Mode::from_raw_mode(0o666)) {
@@ -178,16 +179,11 @@ fn named(folder: &OwnedFd) -> io::Result<(OwnedFd, OsString)> {
 }
 
 /// Removes the temporary files of processes that were killed, once for each folder.
-fn remove_leftovers(folder: &OwnedFd) {
-    static LOOKED: Mutex<Vec<(u64, u64)>> = Mutex::new(Vec::new());
-    let Ok(about) = fstat(folder) else { return };
-    let id = (about.st_dev, about.st_ino);
-    {
-        let mut looked = LOOKED.lock().unwrap_or_else(PoisonError::into_inner);
-        if looked.contains(&id) {
-            return;
-        }
-        looked.push(id);
+fn remove_leftovers(path: &Path, folder: &OwnedFd) {
+    static LOOKED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    let place = path.parent().unwrap_or(path).to_owned();
+    if !LOOKED.lock().unwrap_or_else(PoisonError::into_inner).insert(place) {
+        return;
     }
     let me = rustix::process::geteuid().as_raw();
     for entry in Dir::read_from(folder).into_iter().flatten().filter_map(Result::ok) {
