@@ -6,9 +6,9 @@
 //! origin, so positions are shifted by the middle of the box.
 
 use super::Frame;
-use super::files::{create_inside, open_inside_to_write};
+use super::files::{create_inside, draft_inside, open_inside_to_write};
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
@@ -107,8 +107,8 @@ impl GsdFile {
         Ok(GsdFile { file, frames: 0, most, end })
     }
 
-    /// Opens a file to continue it after its first `frames` frames, and removes the others.
-    pub fn reopen(path: &Path, frames: u64) -> io::Result<GsdFile> {
+    /// Opens a file to continue it after its first `frames` frames to `most` of them, and removes the others.
+    pub fn reopen(path: &Path, frames: u64, most: u64) -> io::Result<GsdFile> {
         let wrong = |what: &str| io::Error::new(ErrorKind::InvalidData, what.to_owned());
         let file = open_inside_to_write(path)?;
         let number = |at: u64| -> io::Result<u64> {
@@ -149,8 +149,32 @@ impl GsdFile {
             at += block.len() as u64;
         }
         file.set_len(end)?;
-        let most = (room + LATER).saturating_sub(NAMES.len() as u64) / LATER;
-        Ok(GsdFile { file, frames, most, end })
+        let found =
+            GsdFile { file, frames, most: (room + LATER).saturating_sub(NAMES.len() as u64) / LATER, end };
+        if found.most < most { found.widened(path, most) } else { Ok(found) }
+    }
+
+    /// Replaces the file by one whose index has room for more frames.
+    fn widened(self, path: &Path, most: u64) -> io::Result<GsdFile> {
+        let data = INDEX + ENTRY * entries(self.most);
+        let shift = ENTRY * (entries(most) - entries(self.most));
+        let mut head = vec![0; (INDEX + ENTRY * entries(self.frames)) as usize];
+        self.file.read_exact_at(&mut head, 0)?;
+        head[16..24].copy_from_slice(&entries(most).to_le_bytes());
+        for entry in head[INDEX as usize..].chunks_exact_mut(ENTRY as usize) {
+            let mut place = [0; 8];
+            place.copy_from_slice(&entry[16..24]);
+            entry[16..24].copy_from_slice(&(u64::from_le_bytes(place) + shift).to_le_bytes());
+        }
+        let mut draft = draft_inside(path)?;
+        draft.write_all(&head)?;
+        draft.seek(SeekFrom::Start(data + shift))?;
+        (&self.file).seek(SeekFrom::Start(data))?;
+        io::copy(&mut (&self.file).take(self.end - data), &mut draft)?;
+        draft.finish(true)?;
+        let (file, end) = (open_inside_to_write(path)?, self.end + shift);
+        file.set_len(end)?;
+        Ok(GsdFile { file, most, end, ..self })
     }
 
     /// Writes a frame, with the masses of its species. Particles keep their order. Unknown velocities are written as 0.
@@ -246,26 +270,34 @@ mod tests {
         write(&mut file, 0..4);
         assert!(file.write(&frame(4, &domain, &names, &x), &[1.0, 2.0]).is_err());
         let whole = std::fs::read(&path).unwrap();
+        // Of more frames it becomes the file that had room for them from the start.
+        let longer = folder.path().join("longer.gsd");
+        write(&mut GsdFile::create(&longer, 9).unwrap(), 0..9);
         for kept in 0..=4 {
             std::fs::write(&path, &whole).unwrap();
-            let mut file = GsdFile::reopen(&path, kept).unwrap();
+            write(&mut GsdFile::reopen(&path, kept, 9).unwrap(), kept..9);
+            assert!(std::fs::read(&path).unwrap() == std::fs::read(&longer).unwrap(), "{kept}");
+        }
+        for kept in 0..=4 {
+            std::fs::write(&path, &whole).unwrap();
+            let mut file = GsdFile::reopen(&path, kept, 4).unwrap();
             let length = std::fs::metadata(&path).unwrap().len();
             assert!(kept == 4 || length < whole.len() as u64);
             write(&mut file, kept..4);
             assert_eq!(std::fs::read(&path).unwrap(), whole);
             // The data of a frame may be cut; what is there before suffices.
             std::fs::write(&path, &whole[..length as usize]).unwrap();
-            write(&mut GsdFile::reopen(&path, kept).unwrap(), kept..4);
+            write(&mut GsdFile::reopen(&path, kept, 4).unwrap(), kept..4);
             assert_eq!(std::fs::read(&path).unwrap(), whole);
             std::fs::write(&path, &whole[..length as usize - 1]).unwrap();
-            assert!(GsdFile::reopen(&path, kept).is_err(), "{kept}");
+            assert!(GsdFile::reopen(&path, kept, 4).is_err(), "{kept}");
         }
         std::fs::remove_file(&path).unwrap();
         let mut file = GsdFile::create(&path, 4).unwrap();
         write(&mut file, 0..2);
-        assert!(GsdFile::reopen(&path, 3).is_err() && GsdFile::reopen(&path, 5).is_err());
+        assert!(GsdFile::reopen(&path, 3, 4).is_err() && GsdFile::reopen(&path, 5, 4).is_err());
         std::fs::write(&path, "not a trajectory, though as long as the header of one").unwrap();
-        assert!(GsdFile::reopen(&path, 0).is_err());
+        assert!(GsdFile::reopen(&path, 0, 4).is_err());
     }
 
     #[test]

@@ -2,7 +2,7 @@ use super::say::whoever_listens as say;
 use super::*;
 use psidpd_core::engine::{Pool, Precision, at_once};
 use psidpd_dynamics::device::Device;
-use psidpd_dynamics::run::{Advice, Begin, FILES, Outcome, Runner, Start, Summary, Timing};
+use psidpd_dynamics::run::{Advice, Begin, FILES, Length, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::uncalibrated;
 use psidpd_report::{Headline, headline, write_run_report};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -25,6 +25,10 @@ pub struct Arguments {
     /// first step if there is none.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
+    /// Prolong the run of the folder, finished or not: its last stage gets N steps, or N more. The files are those of a run that was
+    /// as long from the start.
+    #[arg(long, value_name = "N|+N", requires = "resume")]
+    steps: Option<Length>,
     /// Threads that share the work; what a run writes does not depend on their number.
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
@@ -44,9 +48,10 @@ pub struct Arguments {
 
 impl Arguments {
     /// The command line that resumes the run with all its options, if it can be shown.
-    fn to_resume(&self, json: Option<&Path>) -> Option<String> {
+    fn to_resume(&self, steps: Option<u64>, json: Option<&Path>) -> Option<String> {
         let mut words =
             vec![format!("psidpd run {} --out {} --resume", quoted(&self.scene)?, quoted(&self.out)?)];
+        words.extend(steps.map(|steps| format!("--steps {steps}")));
         if self.threads.get() > 1 {
             words.push(format!("--threads {}", self.threads));
         }
@@ -106,8 +111,15 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
-    let Arguments { scene: path, out, resume, threads, precision, device, report, settings } = arguments;
+    let Arguments { scene: path, out, resume, steps, threads, precision, device, report, settings } =
+        arguments;
     let mut scene = settings.scene(path)?;
+    let length = steps.map(|length| length.steps(&scene, out));
+    if let Some(steps) = length {
+        let edits =
+            [&settings.edits[..], &Length::edit(steps, &scene).ok().into_iter().collect::<Vec<_>>()].concat();
+        scene = Settings { edits }.scene(path)?;
+    }
     scene.precision = precision.or(scene.precision);
     scene.device = device.unwrap_or(scene.device);
     if let Some(warning) = uncalibrated(&scene.model.at(scene.kt)?) {
@@ -153,7 +165,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
                 timing.sessions.last().filter(|s| s.one_thread_seconds > 0.1 * s.wall_seconds)
             {
                 say(&format!(
-                    "note: for {:.1} s of {:.1} one thread did the work of all, as other programs used the processors:                      with fewer threads the run is as fast",
+                    "note: for {:.1} s of {:.1} one thread did the work of all, as other programs used the processors: with fewer threads the run is as fast",
                     session.one_thread_seconds, session.wall_seconds
                 ));
             }
@@ -180,8 +192,9 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
             Ok(Verdict::Good)
         }
         Outcome::Interrupted { stop, step, steps } => {
-            let command =
-                arguments.to_resume(told.json).map_or(String::new(), |line| format!("; to go on: {line}"));
+            let command = arguments
+                .to_resume(length, told.json)
+                .map_or(String::new(), |line| format!("; to go on: {line}"));
             say(&format!("stopped after step {step} of {steps}{command}"));
             Ok(Verdict::Interrupted(u8::try_from(stop).unwrap_or(0)))
         }
@@ -205,7 +218,7 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
             say(&format!("the run in {} is finished: nothing is left to do", out.display()));
             total
         }
-        Start::Resumed { step, program, instructions, fallback } => {
+        Start::Resumed { step, prolonged, program, instructions, fallback } => {
             if let Some(why) = fallback {
                 warn(&format!("{why}; going on from the previous checkpoint"));
             }
@@ -221,7 +234,8 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
                      its files in their bytes"
                 ));
             }
-            say(&format!("going on after step {step} of {total}"));
+            let before = prolonged.map_or(String::new(), |before| format!(", where the run had {before}"));
+            say(&format!("going on after step {step} of {total}{before}"));
             *step
         }
     }

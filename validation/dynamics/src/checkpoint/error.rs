@@ -28,6 +28,10 @@ pub enum CheckpointError {
     Edited { path: PathBuf, file: PathBuf, length: u64 },
     #[error("the checkpoint {} is of another run: {}", path.display(), list(differences))]
     Foreign { path: PathBuf, differences: Vec<String> },
+    #[error("the run of {} has {before} steps in its last stage, more than the {now} of this scene", path.display())]
+    Shorter { path: PathBuf, before: u64, now: u64 },
+    #[error("the run of {} cannot be prolonged from {before} to {now} steps in its last stage: {why}", path.display())]
+    Fixed { path: PathBuf, before: u64, now: u64, why: &'static str },
 }
 
 /// The interface that a user called the program through; messages write options in its syntax.
@@ -65,6 +69,12 @@ impl CheckpointError {
         move |source| CheckpointError::Unreadable { path: path.to_owned(), source }
     }
 
+    /// Whether the checkpoint is whole, and not one that the run can go on from.
+    pub(super) fn is_of_another_run(&self) -> bool {
+        use CheckpointError::{Fixed, Foreign, Shorter};
+        matches!(self, Foreign { .. } | Shorter { .. } | Fixed { .. })
+    }
+
     pub fn absent(folder: &Path) -> CheckpointError {
         let path = folder.join(super::NEWEST);
         let source = std::io::ErrorKind::NotFound.into();
@@ -76,6 +86,15 @@ impl CheckpointError {
         match self {
             CheckpointError::Foreign { .. } => {
                 format!("go on with the scene and model that the run was started with, or {over}")
+            }
+            CheckpointError::Shorter { before, .. } => match caller {
+                Caller::Options => format!("go on with --resume --steps {before}, or {over}"),
+                _ => format!("go on with {before} steps, or {over}"),
+            },
+            CheckpointError::Fixed { .. } => {
+                format!(
+                    "begin another run at this one, by `[initial]` with `kind = \"checkpoint\"`, or {over}"
+                )
             }
             CheckpointError::Version { .. } => {
                 format!("go on with the version of psidpd that wrote it, or {over}")

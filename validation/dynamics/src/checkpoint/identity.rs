@@ -1,6 +1,7 @@
 //! What tells one run from another: the keys of its scene and of its model.
 
 use super::Written;
+use crate::scene::Scene;
 use psidpd_core::document::open_regular;
 use psidpd_core::engine::Precision;
 use psidpd_core::model::Model;
@@ -22,6 +23,10 @@ pub struct Identity {
 const FILES: [&str; 2] = ["file", "table"];
 
 impl Identity {
+    pub fn of_scene(scene: &Scene) -> Identity {
+        Identity::of(scene.source.text(), &scene.folder, scene.precision(), &scene.model)
+    }
+
     /// The identity of a scene: `scene` is its text, and its paths start from `folder`.
     pub fn of(scene: &str, folder: &Path, precision: Precision, model: &Model) -> Identity {
         let model = model.source();
@@ -35,6 +40,23 @@ impl Identity {
             scene: of_scene,
             model: keys(model.text(), beside_model, &["title", "reference", "literature"]),
         }
+    }
+
+    /// The number of steps of the last stage, with its key.
+    pub fn last_steps(&self) -> Option<(String, u64)> {
+        let stages = (1..).map(|k| format!("stage[{k}].steps"));
+        let last = stages.take_while(|key| self.scene.contains_key(key)).last();
+        let key = last.unwrap_or_else(|| "steps".into());
+        let steps = self.scene.get(&key)?.parse().ok()?;
+        Some((key, steps))
+    }
+
+    /// Whether nothing but the number of steps of the last stage differs from `before`, and both numbers: before and now.
+    pub fn lengths(&self, before: &Identity) -> Option<[u64; 2]> {
+        let ((key, steps), (_, earlier)) = (self.last_steps()?, before.last_steps()?);
+        let mut alike = before.clone();
+        alike.scene.insert(key.clone(), self.scene.get(&key)?.clone());
+        (alike == *self && steps != earlier).then_some([earlier, steps])
     }
 
     /// The keys whose values differ from those in `before`, each with both values.

@@ -38,6 +38,9 @@ use std::path::Path;
 
 const NEWEST: &str = "checkpoint";
 
+/// The file of rows of totals.
+pub const ROWS: &str = "thermo.csv";
+
 /// All data that the rest of a run depends on, and that its files will tell.
 ///
 /// Particle arrays keep the order of the run: sums of forces depend on it by rounding.
@@ -64,10 +67,25 @@ pub struct Checkpoint {
     pub last: Option<Thermo>,
     /// Sums over the thermo rows of the stage.
     pub sums: Sums,
+    /// What there was before the last row of a run, which is written whatever the interval of rows: a run that is prolonged does
+    /// not have it.
+    pub before_end: Option<BeforeEnd>,
     /// The length and checksum of each file that grows with the run, by the file's name.
     pub files: BTreeMap<String, Written>,
     /// The accumulated data of observables, in a format of their own; empty without observables.
     pub observers: Vec<u8>,
+}
+
+impl Checkpoint {
+    /// Makes it that of a run with the same steps so far and more to come.
+    pub fn prolong(&mut self, identity: Identity) {
+        self.identity = identity;
+        self.finished = false;
+        if let Some(BeforeEnd { sums, last, rows }) = self.before_end.take() {
+            (self.sums, self.last) = (sums, last);
+            self.files.extend(rows.map(|rows| (ROWS.to_owned(), rows)));
+        }
+    }
 }
 
 /// What the thermostat did when it last acted, for steps before it acts again.
@@ -77,6 +95,14 @@ pub struct Held {
     pub virial: [f64; 6],
     /// Mean drag of the pairs; empty if nobody records it.
     pub drag: Vec<Line>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BeforeEnd {
+    pub sums: Sums,
+    pub last: Option<Thermo>,
+    /// Of the file of rows, if there is one.
+    pub rows: Option<Written>,
 }
 
 /// The place of a run in its stages.

@@ -77,12 +77,12 @@ impl Store {
         };
         let newest = match load(NEWEST) {
             Ok(checkpoint) => return Ok(Some(Found { checkpoint, fallback: None })),
-            Err(error @ CheckpointError::Foreign { .. }) => return Err(error),
+            Err(error) if error.is_of_another_run() => return Err(error),
             Err(error) => error,
         };
         match load(BEFORE) {
             Ok(checkpoint) => Ok(Some(Found { checkpoint, fallback: Some(newest) })),
-            Err(error @ CheckpointError::Foreign { .. }) => Err(error),
+            Err(error) if error.is_of_another_run() => Err(error),
             Err(_) if !self.exists() => Ok(None),
             // That the newest checkpoint is missing says less than the fault of the previous one.
             Err(error) => Err(if there(&self.path()) { newest } else { error }),

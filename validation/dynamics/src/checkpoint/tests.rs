@@ -36,6 +36,11 @@ fn checkpoint(step: u64) -> Checkpoint {
         out_of_bounds: [u64::MAX, 0],
         last: None,
         sums: Sums::default(),
+        before_end: Some(BeforeEnd {
+            sums: Sums::default(),
+            last: None,
+            rows: Some(Written { length: u64::MAX, checksum: 7 }),
+        }),
         files: [("thermo.csv".to_owned(), Written { length: 3, checksum: u32::MAX })].into(),
         observers: vec![1, 2, 3],
     }

@@ -3,7 +3,7 @@
 use super::growing::GrowingFile;
 use super::thermo::HEADER;
 use super::{RunError, Thermo, Timing};
-use crate::checkpoint::{Checkpoint, Store, Written};
+use crate::checkpoint::{Checkpoint, ROWS as THERMO, Store, Written};
 use crate::scene::{Scene, every};
 use psidpd_formats::dump::write_dump;
 use psidpd_formats::files::{
@@ -21,7 +21,6 @@ use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 
-const THERMO: &str = "thermo.csv";
 const DUMP: &str = "dump.lammpstrj";
 const XYZ: &str = "trajectory.xyz";
 const GSD: &str = "trajectory.gsd";
@@ -89,12 +88,12 @@ impl Output {
         let mut thermo = create(scene.output.thermo, THERMO)?;
         thermo.iter_mut().try_for_each(|file| file.line(HEADER))?;
         let (dump, xyz) = (create(scene.output.dump, DUMP)?, create(scene.output.xyz, XYZ)?);
-        let steps: u64 = scene.stages.iter().map(|stage| stage.steps).sum();
-        let gsd = open_gsd(scene, folder, |path, every| GsdFile::create(path, 1 + steps / every))?;
+        let gsd = open_gsd(scene, folder, |path, every| GsdFile::create(path, frames(scene, every)))?;
         Ok(Output { thermo, dump, xyz, gsd })
     }
 
-    /// Opens the files of a resumed run and truncates them to what was written at its checkpoint.
+    /// Opens the files of a resumed run and truncates them to what was written at its checkpoint; the scene may have more steps than
+    /// the run had.
     pub fn reopen(scene: &Scene, folder: &Path, checkpoint: &Checkpoint) -> Result<Output, RunError> {
         remove_tables(folder)?;
         remove_all(folder, &LAST)?;
@@ -107,7 +106,7 @@ impl Output {
         // Frames begin with the initial state, once its forces are known.
         let begun = step > 0 || position.entered;
         let gsd = open_gsd(scene, folder, |path, every| {
-            GsdFile::reopen(path, if begun { 1 + step / every } else { 0 })
+            GsdFile::reopen(path, if begun { 1 + step / every } else { 0 }, frames(scene, every))
         })?;
         Ok(Output { thermo, dump, xyz, gsd })
     }
@@ -140,6 +139,11 @@ impl Output {
         Ok(())
     }
 
+    /// The record of the file of rows.
+    pub fn rows(&self) -> Option<Written> {
+        self.thermo.as_ref().map(|file| file.written)
+    }
+
     /// The record of each file that grows at its end alone.
     pub fn written(&mut self) -> BTreeMap<String, Written> {
         self.files().map(|file| (file.name.to_owned(), file.written)).collect()
@@ -155,6 +159,11 @@ impl Output {
     fn files(&mut self) -> impl Iterator<Item = &mut GrowingFile> {
         [&mut self.thermo, &mut self.dump, &mut self.xyz].into_iter().flatten()
     }
+}
+
+/// The number of frames of a run at an interval.
+fn frames(scene: &Scene, every: u64) -> u64 {
+    1 + scene.stages.iter().map(|stage| stage.steps).sum::<u64>() / every
 }
 
 fn open_gsd(

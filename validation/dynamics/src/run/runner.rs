@@ -6,7 +6,9 @@ use super::watch::Watch;
 use super::{
     Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, about, bytes_per_particle,
 };
-use crate::checkpoint::{Checkpoint, CheckpointError, Found, Held, Identity, Position, Store, Written};
+use crate::checkpoint::{
+    BeforeEnd, Checkpoint, CheckpointError, Found, Held, Identity, Position, Store, Written,
+};
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::files::{Protected, open_inside, protect, there};
@@ -36,6 +38,8 @@ pub enum Start {
     New,
     Resumed {
         step: u64,
+        /// The number of steps of the run before it was prolonged, if it is.
+        prolonged: Option<u64>,
         /// The version of the program that wrote the checkpoint, if it differs from this program: later steps
         /// can differ in rounding.
         program: Option<String>,
@@ -57,7 +61,8 @@ pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) 
 /// A runner writes `thermo.csv` and `dump.lammpstrj` during the run, `final.data` and `summary.json` at its
 /// end, and a [`Checkpoint`] at intervals. A run resumed from a checkpoint continues bit for bit: the
 /// contents of these files, and of the checkpoint of a finished run, do not depend on the number or times of
-/// interruptions. Wall times are in `timing.json` alone.
+/// interruptions. A scene whose last stage has more steps prolongs the run, finished or not, with the same contents as if it had been
+/// as long from the start. Wall times are in `timing.json` alone.
 ///
 /// If the physics fails, the last good state is written to `last-good.data` and as a checkpoint. That is the
 /// state of the last checkpoint, thermo row or start of a stage.
@@ -74,6 +79,7 @@ pub struct Runner<'a> {
     pub(super) position: Position,
     pub(super) sums: Sums,
     pub(super) last: Option<Thermo>,
+    pub(super) before_end: Option<BeforeEnd>,
     pub(super) steps: u64,
     pub(super) observers: Observers,
     /// The watch over the present stage since the start of this session.
@@ -87,11 +93,11 @@ impl<'a> Runner<'a> {
         let folder = Folder::open(out)?;
         let inputs = protect(scene.inputs());
         let store = Store::new(out);
-        let identity = Identity::of(scene.source.text(), &scene.folder, scene.precision(), &scene.model);
+        let identity = Identity::of_scene(scene);
         if begin == Begin::Resume
             && let Some(found) = store.find(|checkpoint| usable(checkpoint, &identity, scene, out))?
         {
-            return Runner::resume(scene, folder, inputs, store, found);
+            return Runner::resume(scene, folder, inputs, store, found, identity);
         }
         if begin == Begin::New {
             refuse_other_runs(&store, &identity, out)?;
@@ -130,6 +136,7 @@ impl<'a> Runner<'a> {
             out_of_bounds: [0; 2],
             last: None,
             sums: Sums::default(),
+            before_end: None,
             files: output.written(),
             observers: Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()))
                 .to_bytes(),
@@ -144,8 +151,13 @@ impl<'a> Runner<'a> {
         inputs: Protected,
         store: Store,
         found: Found,
+        identity: Identity,
     ) -> Result<Runner<'a>, RunError> {
-        let Found { checkpoint: good, fallback } = found;
+        let Found { checkpoint: mut good, fallback } = found;
+        let lengths = identity.lengths(&good.identity);
+        if lengths.is_some() {
+            good.prolong(identity);
+        }
         let mut simulation = scene.simulation_of_run(good.state.clone(), NonZeroUsize::MIN)?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
@@ -162,12 +174,14 @@ impl<'a> Runner<'a> {
         } else {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
             let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
-            let start = Start::Resumed { step: good.step, program, instructions, fallback };
+            let total: u64 = scene.stages.iter().map(|stage| stage.steps).sum();
+            let prolonged = lengths.map(|[before, now]| total - now + before);
+            let start = Start::Resumed { step: good.step, prolonged, program, instructions, fallback };
             (start, Some(Output::reopen(scene, &folder.path, &good)?))
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
-        if !there(&folder.path.join(About::NAME)) {
+        if lengths.is_some() || !there(&folder.path.join(About::NAME)) {
             about::about(scene)
                 .write(&folder.path)
                 .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
@@ -203,6 +217,7 @@ impl<'a> Runner<'a> {
             position: good.position,
             sums: good.sums,
             last: good.last,
+            before_end: good.before_end.clone(),
             steps: scene.stages.iter().map(|s| s.steps).sum(),
             observers,
             watch: Watch::default(),
@@ -267,7 +282,8 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// Checks that a run can continue from a checkpoint: it belongs to this scene, and the files hold the bytes that it records.
+/// Checks that a run can continue from a checkpoint: it belongs to this scene or to one whose last stage is shorter, and the files
+/// hold the bytes that it records.
 fn usable(
     checkpoint: &Checkpoint,
     identity: &Identity,
@@ -275,9 +291,17 @@ fn usable(
     out: &Path,
 ) -> Result<(), CheckpointError> {
     let path = Store::new(out).path();
+    let lengths = identity.lengths(&checkpoint.identity);
     let differences = identity.differences(&checkpoint.identity);
-    if !differences.is_empty() {
-        return Err(CheckpointError::Foreign { path, differences });
+    match lengths {
+        None if !differences.is_empty() => return Err(CheckpointError::Foreign { path, differences }),
+        Some([before, now]) if now < before => return Err(CheckpointError::Shorter { path, before, now }),
+        Some([before, now]) => {
+            if let Some(why) = scene.fixed_length() {
+                return Err(CheckpointError::Fixed { path, before, now, why });
+            }
+        }
+        None => {}
     }
     let position = checkpoint.position;
     let before: u64 = scene.stages.iter().take(position.stage).map(|s| s.steps).sum();
@@ -291,7 +315,7 @@ fn usable(
         });
     }
     // A finished run no longer needs its files; the user may have moved them.
-    for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
+    for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished || lengths.is_some()) {
         let file = out.join(name);
         let opened = open_inside(&file);
         let found = opened.as_ref().ok().and_then(|file| Some(file.metadata().ok()?.len()));

@@ -73,6 +73,19 @@ impl Scene {
         !stage.integrator.has_time() && stage.name == first.name && (!is_only || done < stage.steps / 4)
     }
 
+    /// Why a run of the scene cannot be prolonged: how long the last stage is acts on its steps.
+    pub(super) fn fixed_length(&self) -> Option<&'static str> {
+        let last = self.stages.last()?;
+        let first = self.stages.iter().find(|stage| !stage.integrator.has_time());
+        if last.level.is_some() {
+            Some("the levels of its ramp depend on the number")
+        } else if first.is_some_and(|first| first.name == last.name) {
+            Some("its first quarter tunes the moves of Monte Carlo")
+        } else {
+            None
+        }
+    }
+
     /// Sets the temperature, thermostat and body forces of a stage. The caller must then compute the forces
     /// of the present step anew.
     pub fn enter(&self, stage: &Stage, simulation: &mut Simulation) -> Result<(), RunError> {

@@ -1,9 +1,9 @@
 //! The course of a run: its steps, its output and its end.
 
-use super::output::{write_json, write_observations};
+use super::output::{Output, write_json, write_observations};
 use super::watch::Watch;
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
-use crate::checkpoint::Position;
+use crate::checkpoint::{BeforeEnd, Position};
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
 use psidpd_formats::DataFile;
@@ -134,6 +134,10 @@ impl Runner<'_> {
     ) -> Result<(), RunError> {
         let step = self.simulation.step_number();
         let thermo = totals.then(|| Thermo::of(&self.simulation, self.position.time));
+        if totals && !every(self.scene.output.thermo, step) {
+            let rows = self.output.as_ref().and_then(Output::rows);
+            self.before_end = Some(BeforeEnd { sums: self.sums, last: self.last, rows });
+        }
         if let Some(output) = &mut self.output {
             if let Some(thermo) = &thermo {
                 self.last = Some(*thermo);
@@ -166,6 +170,7 @@ impl Runner<'_> {
         self.simulation.fetch()?;
         let good = &mut self.checkpoints.good;
         (good.position, good.sums, good.last) = (self.position, self.sums, self.last);
+        good.before_end.clone_from(&self.before_end);
         good.step = self.simulation.step_number();
         good.state.copy_particles(self.simulation.state());
         good.forces.clear();

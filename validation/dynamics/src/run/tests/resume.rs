@@ -199,7 +199,7 @@ fn killed_after_any_step(scene: &Scene) {
         let out = folder.path().join(format!("{step}"));
         let runner = Runner::begin(scene, &out, Begin::Resume).unwrap();
         from.push(match runner.start() {
-            Start::Resumed { step, fallback: None, program: None, instructions: None } => *step,
+            Start::Resumed { prolonged: None, step, fallback: None, program: None, instructions: None } => *step,
             Start::New => 0,
             other => panic!("{other:?}"),
         });
@@ -394,13 +394,84 @@ fn other_scenes_do_not_go_on_from_a_checkpoint() {
         assert!(contents(out) == before);
     };
     refused(&flat, "box.lengths is [5, 5], was [3, 3, 3]");
-    let longer = STAGES.replace("steps = 9", "steps = 10");
-    refused(&scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &longer).unwrap(), "stage[3].steps is 10, was 9");
+    let longer = STAGES.replace("steps = 5", "steps = 10");
+    refused(&scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &longer).unwrap(), "stage[2].steps is 10, was 5");
     let softer = bounded().replace("25.0", "20.0");
     refused(
         &scene_of(&softer, "[3.0, 3.0, 3.0]", 6.05, STAGES).unwrap(),
         "the model's parameters.B is 20, was 25",
     );
+}
+
+/// A scene with another number of steps in its last stage.
+fn with_last_steps(scene: &Scene, steps: u64) -> Scene {
+    let (before, rest) = scene.source.text().rsplit_once("steps = ").unwrap();
+    let rest = rest.trim_start_matches(|c: char| c.is_ascii_digit());
+    support::scene(scene.model.source().text(), &format!("{before}steps = {steps}{rest}")).unwrap()
+}
+
+/// A run that goes on to more steps, once it is finished or on its way, ends in the bytes of one that was as long from the start.
+#[test]
+fn a_prolonged_run_ends_in_the_same_bytes() {
+    for scene in scenes() {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = folder.path().join("whole");
+        let summary = run_scene(&scene, &whole, &mut |_| ()).unwrap();
+        let last = scene.stages.last().unwrap().steps;
+        // Ends between rows, frames and actions of the thermostat.
+        for steps in [1, last - 2] {
+            let out = folder.path().join(steps.to_string());
+            let longer = with_last_steps(&scene, steps + 1);
+            finished(&with_last_steps(&scene, steps), &out, Begin::New);
+            finished(&longer, &out, Begin::Resume);
+            assert_eq!(finished(&scene, &out, Begin::Resume), summary, "{steps}");
+            assert_same(&whole, &out, &format!("{steps} steps"));
+        }
+        let out = folder.path().join("underway");
+        until(&with_last_steps(&scene, last - 1), &out, Begin::New, STEPS - 2).unwrap();
+        let runner = Runner::begin(&scene, &out, Begin::Resume).unwrap();
+        assert!(matches!(runner.start(), Start::Resumed { step, prolonged: Some(before), .. }
+            if (*step, *before) == (STEPS - 2, STEPS - 1)));
+        drop(runner);
+        assert_eq!(finished(&scene, &out, Begin::Resume), summary);
+        assert_same(&whole, &out, "underway");
+    }
+}
+
+/// What depends on the length of a run forbids another, and no run becomes shorter.
+#[test]
+fn runs_that_cannot_be_prolonged_say_why() {
+    let ramp = "[[stage]]\nname = \"cool\"\nsteps = 6\nkT = [1.5, 1.0]\nlevels = 3\n";
+    let trials = "[[stage]]\nname = \"trials\"\nsteps = 6\nintegrator = \"monte-carlo\"\n";
+    let plain = "[[stage]]\nname = \"run\"\nsteps = 6\n";
+    for (rest, steps, part) in [
+        (ramp, 9, "from 6 to 9 steps in its last stage: the levels"),
+        (trials, 9, "its first quarter"),
+        (plain, 5, "has 6 steps in its last stage, more than the 5"),
+    ] {
+        let scene = scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, rest).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        finished(&scene, folder.path(), Begin::New);
+        let before = contents(folder.path());
+        let error = Runner::begin(&with_last_steps(&scene, steps), folder.path(), Begin::Resume).map(|_| ());
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+        assert!(contents(folder.path()) == before);
+    }
+}
+
+#[test]
+fn a_length_is_counted_from_the_run() {
+    let text = "model = \"m.toml\"\nkT = 1.0\nbox = 3.0\ndensity = 6.05\nsteps = 6\n";
+    let scene = support::scene(SET6, text).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(Length::More(4).steps(&scene, folder.path()), 10);
+    finished(&with_last_steps(&scene, 8), folder.path(), Begin::New);
+    assert_eq!(Length::More(4).steps(&scene, folder.path()), 12);
+    assert_eq!(Length::Steps(4).steps(&scene, folder.path()), 4);
+    assert_eq!(Length::edit(12, &scene).unwrap().to_string(), "steps=12");
+    let [.., stages] = scenes();
+    assert_eq!(Length::edit(12, &stages).unwrap().to_string(), "stage[3].steps=12");
 }
 
 /// The identity of a run includes the precision, and excludes the number of threads.
