@@ -43,7 +43,8 @@ def run(
     precision : "mixed" or "double"; as the scene says if left out, or else mixed.
     device : "cpu", "gpu" or "gpu:N"; as the scene says if left out, or else the CPU. GPUs need a package that was built for
         them: docs/gpu.md.
-    resume : go on from the last checkpoint in `out`. A run that is finished is read.
+    resume : go on from the last checkpoint in `out`. A run that is finished is read, or prolonged if the last stage of the scene has
+        more steps than it had.
     overwrite : start over in a folder with another run.
     report : make report.html too.
 

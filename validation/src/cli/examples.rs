@@ -25,6 +25,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "psidpd run scene.toml --out slab --threads 4 --report",
             "psidpd run scene.toml --out cold --set kT=0.8 --set stage.produce.steps=5000",
             "psidpd run scene.toml --out slab --resume",
+            "psidpd run scene.toml --out slab --resume --steps +10000",
             "psidpd run scene.toml --out slab --device gpu",
         ],
     ),

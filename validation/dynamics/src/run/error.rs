@@ -139,6 +139,9 @@ impl RunError {
                 format!("there is no checkpoint yet: when the cause is gone, {over}")
             }
             RunError::Unfinished { .. } => format!("{go_on}, or {over}"),
+            RunError::Finished { other: false, .. } if caller == Caller::Options => {
+                format!("prolong it with --resume --steps +N, choose another folder, or {over}")
+            }
             RunError::Finished { .. } | RunError::InTheWay { .. } => {
                 format!("choose another folder, or {over}")
             }

@@ -199,7 +199,9 @@ fn killed_after_any_step(scene: &Scene) {
         let out = folder.path().join(format!("{step}"));
         let runner = Runner::begin(scene, &out, Begin::Resume).unwrap();
         from.push(match runner.start() {
-            Start::Resumed { prolonged: None, step, fallback: None, program: None, instructions: None } => *step,
+            Start::Resumed { prolonged: None, step, fallback: None, program: None, instructions: None } => {
+                *step
+            }
             Start::New => 0,
             other => panic!("{other:?}"),
         });
