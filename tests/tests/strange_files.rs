@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 
 const MODEL: &str = "title = \"t\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = 25\n\
                      range = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
-const SCENE: &str = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = [3.0, 3.0, 3.0]\ndensity = 3.0\nsteps = 10\n\
+/// Pictures of a narrow box are small and soon drawn.
+const SCENE: &str = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = [3.0, 3.0, 100.0]\ndensity = 0.12\nsteps = 10\n\
                      [output]\nthermo = 1\ndump = 5\nxyz = 5\ngsd = 5\nvtk = 5\nsnapshot = 5\n[observe]\nevery = 2\n\
                      temperature = true\nrdf = { range = 1.4, bins = 5 }\n";
 
@@ -26,11 +27,21 @@ fn copy(from: &Path, to: &Path) {
     assert!(Command::new("cp").arg("-a").args([from, to]).status().unwrap().success());
 }
 
+/// A command line with a limit of the shell.
+fn under(here: &Path, line: &str, limit: &str) -> Command {
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit {limit}; exec \"$0\" \"$@\"")]).arg(program()).args(line.split(' '));
+    command.current_dir(here).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn limited(here: &Path, line: &str, limit: &str) -> Output {
+    under(here, line, limit).output().unwrap()
+}
+
 /// The output of the program, which must end within seconds and must not fill the memory.
 fn soon(here: &Path, line: &str) -> (Option<i32>, String) {
-    let mut limited = Command::new("sh");
-    limited.args(["-c", "ulimit -v 4000000; exec \"$0\" \"$@\""]).arg(program()).args(line.split(' '));
-    let mut child = limited.current_dir(here).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = under(here, line, "-v 4000000").spawn().unwrap();
     let begun = Instant::now();
     while child.try_wait().unwrap().is_none() {
         if begun.elapsed() > Duration::from_secs(60) {
@@ -60,22 +71,11 @@ fn nothing_in_the_folder_of_a_run_leads_elsewhere() {
     let here = folder.path();
     with_a_scene(here);
     assert_eq!(soon(here, "run s.toml --out o").0, Some(0));
-    // The run of a longer scene that stopped on its way.
-    let more = SCENE.replace("steps = 10", "steps = 100000000");
-    std::fs::write(here.join("long.toml"), more.replace("gsd = 5\n", "")).unwrap();
-    let mut long = Command::new(program());
-    let mut long = long
-        .args(["run", "long.toml", "--out", "p"])
-        .current_dir(here)
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
-    while !here.join("p/checkpoint").exists() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    rustix::process::kill_process(rustix::process::Pid::from_child(&long), rustix::process::Signal::INT)
-        .unwrap();
-    assert_eq!(long.wait().unwrap().code(), Some(130));
+    // The run of a longer scene that a full disk stopped on its way.
+    let more = SCENE.replace("steps = 10", "steps = 40").replace("dump = 5", "dump = 1\ncheckpoint = 5");
+    std::fs::write(here.join("long.toml"), more).unwrap();
+    assert_eq!(limited(here, "run long.toml --out p", "-f 600").status.code(), Some(1));
+    assert!(here.join("p/checkpoint").exists() && !here.join("p/summary.json").exists());
     let names = [
         "about.json",
         "thermo.csv",
@@ -95,45 +95,41 @@ fn nothing_in_the_folder_of_a_run_leads_elsewhere() {
         "vtk/density-0000000005.vti",
         "observables/rdf.csv",
     ];
-    for kind in ["link", "zero", "pipe"] {
+    // What a command line makes of the folder `from` with something else in these places.
+    let meet = |kind: &str, names: &[&str], from: &str, line: &str| {
+        let folder = here.join(kind);
+        let here = folder.as_path();
+        std::fs::create_dir_all(here).unwrap();
+        std::fs::write(here.join("mine"), "mine: a secret").unwrap();
+        let _ = std::fs::remove_dir_all(here.join("q"));
+        copy(&here.join("..").join(from), &here.join("q"));
         for name in names {
-            std::fs::write(here.join("mine"), "mine: a secret").unwrap();
-            for (from, lines) in [
-                (
-                    "o",
-                    &["report q", "run s.toml --out q --resume --report", "run s.toml --out q --overwrite"][..],
-                ),
-                ("p", &["run long.toml --out q --resume"][..]),
-            ] {
-                for line in lines {
-                    let _ = std::fs::remove_dir_all(here.join("q"));
-                    copy(&here.join(from), &here.join("q"));
-                    if let Some(inner) =
-                        Path::new(name).parent().filter(|inner| !inner.as_os_str().is_empty())
-                    {
-                        std::fs::create_dir_all(here.join("q").join(inner)).unwrap();
-                    }
-                    replace_by(kind, &here.join("q").join(name));
-                    let (code, text) = match from {
-                        "o" => soon(here, line),
-                        _ => interrupted(here, line),
-                    };
-                    assert!(code.is_some(), "{kind} {name} {line}: {text}");
-                    assert!(
-                        !text.contains("secret") && !text.contains("panicked"),
-                        "{kind} {name} {line}: {text}"
-                    );
-                    let mine = std::fs::read_to_string(here.join("mine")).unwrap();
-                    assert_eq!(mine, "mine: a secret", "{kind} {name} {line}: {text}");
-                    if line.contains("--overwrite") || *line == "report q" {
-                        assert_eq!(code, Some(0), "{kind} {name} {line}: {text}");
-                    }
-                    let page = std::fs::read_to_string(here.join("q/report.html")).unwrap_or_default();
-                    assert!(!page.contains("secret"), "{kind} {name} {line}");
-                }
-            }
+            let path = here.join("q").join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            replace_by(kind, &path);
         }
-    }
+        let (code, text) = soon(here, line);
+        let what = format!("{kind} {names:?} {line}: {code:?} {text}");
+        assert!(code.is_some() && !text.contains("secret") && !text.contains("panicked"), "{what}");
+        assert_eq!(std::fs::read_to_string(here.join("mine")).unwrap(), "mine: a secret", "{what}");
+        let page = std::fs::read_to_string(here.join("q/report.html")).unwrap_or_default();
+        assert!(!page.contains("secret"), "{what}");
+        assert!(code == Some(0) || line.contains("--resume"), "{what}");
+    };
+    let all = |kind: &str| {
+        for name in names {
+            meet(kind, &[name], "o", "report q");
+            meet(kind, &[name], "o", "run ../s.toml --out q --resume --report");
+            meet(kind, &[name], "p", "run ../long.toml --out q --resume");
+        }
+        // All files are replaced, so all places are tried at once.
+        meet(kind, &names, "o", "run ../s.toml --out q --overwrite");
+    };
+    std::thread::scope(|scope| {
+        for kind in ["link", "zero", "pipe"] {
+            scope.spawn(move || all(kind));
+        }
+    });
     // Folders in it are no links either.
     for name in ["snapshots", "vtk", "observables"] {
         let _ = std::fs::remove_dir_all(here.join("q"));
@@ -143,7 +139,7 @@ fn nothing_in_the_folder_of_a_run_leads_elsewhere() {
         symlink("../elsewhere", here.join("q").join(name)).unwrap();
         std::fs::write(here.join("elsewhere/particles-0000000000.png"), "mine").unwrap();
         for line in ["run s.toml --out q --overwrite", "run long.toml --out q --resume", "report q"] {
-            interrupted(here, line);
+            soon(here, line);
             assert_eq!(std::fs::read_dir(here.join("elsewhere")).unwrap().count(), 1, "{name} {line}");
         }
     }
@@ -152,32 +148,12 @@ fn nothing_in_the_folder_of_a_run_leads_elsewhere() {
         let _ = std::fs::remove_dir_all(here.join("q"));
         copy(&here.join("o"), &here.join("q"));
         replace_by(kind, &here.join("q/checkpoint"));
-        let start = SCENE.replace("density = 3.0\n", "").replace("box = [3.0, 3.0, 3.0]\n", "");
+        let start = SCENE.replace("density = 0.12\n", "").replace("box = [3.0, 3.0, 100.0]\n", "");
         std::fs::write(here.join("start.toml"), start + "[initial]\nkind = \"checkpoint\"\nfile = \"q\"\n")
             .unwrap();
         let (found, text) = soon(here, "check start.toml");
         assert_eq!(found, Some(code), "{kind}: {text}");
     }
-}
-
-/// The same for a run that takes long: it is interrupted once it runs.
-fn interrupted(here: &Path, line: &str) -> (Option<i32>, String) {
-    let mut command = Command::new(program());
-    command.args(line.split(' ')).current_dir(here).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().unwrap();
-    let begun = Instant::now();
-    let pid = rustix::process::Pid::from_child(&child);
-    while child.try_wait().unwrap().is_none() {
-        let waited = begun.elapsed();
-        assert!(waited < Duration::from_secs(60), "{line} waits");
-        if waited > Duration::from_millis(150) {
-            let _ = rustix::process::kill_process(pid, rustix::process::Signal::INT);
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let output = child.wait_with_output().unwrap();
-    // Before its first step Ctrl-C kills a run.
-    (output.status.code().or(Some(130)), said(&output))
 }
 
 fn run(here: &Path, arguments: &[&OsStr]) -> Output {
@@ -293,14 +269,6 @@ fn a_file_beyond_the_limit_leaves_the_old_one() {
         let output = psidpd(here, &line.split(' ').collect::<Vec<_>>());
         assert_eq!(output.status.code(), Some(0), "{line}: {}", said(&output));
     }
-    let limited = |line: &str, blocks: u32| {
-        let mut command = Command::new("sh");
-        command
-            .args(["-c", &format!("ulimit -f {blocks}; exec \"$0\" \"$@\"")])
-            .arg(program())
-            .args(line.split(' '));
-        command.current_dir(here).output().unwrap()
-    };
     let old = |name: &str| std::fs::read(here.join(name)).unwrap();
     for (line, files, blocks) in [
         ("run gsd.toml --out g", &[][..], 1000),
@@ -315,7 +283,7 @@ fn a_file_beyond_the_limit_leaves_the_old_one() {
         ("check w.toml --json out.json", &[], 0),
     ] {
         let before: Vec<Vec<u8>> = files.iter().map(|name| old(name)).collect();
-        let output = limited(line, blocks);
+        let output = limited(here, line, &format!("-f {blocks}"));
         let text = said(&output);
         let code = output.status.code();
         let nothing_to_write = line.starts_with("man") && code == Some(0);
