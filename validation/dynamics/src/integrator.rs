@@ -270,6 +270,7 @@ impl Integrator {
     pub fn thermostat_every(&self) -> u64 {
         match self {
             Integrator::Aboba(coupling)
+            | Integrator::Baoab(coupling)
             | Integrator::TwoStage { coupling, .. }
             | Integrator::ForceGradient { coupling, .. } => coupling.every,
             _ => 1,

@@ -16,12 +16,12 @@ impl Coupling {
     }
 
     /// Finds the virial that it would have at the present positions.
-    pub(super) fn rehearse(self, system: &mut Simulation, dt: f64) -> Result<(), RunError> {
+    pub(in crate::run) fn rehearse(self, system: &mut Simulation, dt: f64) -> Result<(), RunError> {
         system.rehearse(self.action(dt), dt)
     }
 
     /// Announces that it will act, if it is its turn, where the next forces are computed.
-    pub(super) fn announce(self, system: &mut Simulation, dt: f64, want: Want) {
+    pub(in crate::run) fn announce(self, system: &mut Simulation, dt: f64, want: Want) {
         if let Some(heat) = self.heat(system, dt) {
             system.expect_heat(heat, system.wants_of_heat(want));
         }

@@ -26,13 +26,15 @@ use psidpd_core::engine::noise::Law;
 use reflection::Path;
 
 impl Integrator {
-    /// Adds to the virial that of the thermostat at the present positions, as `fix dpd/splitting` in LAMMPS does at setup.
-    pub(super) fn rehearse(self, system: &mut Simulation, dt: f64) -> Result<(), RunError> {
+    /// The thermostat whose virial is part of the pressure before the first step, as `fix dpd/splitting` in LAMMPS has it at setup.
+    pub(in crate::run) fn at_setup(self, system: &Simulation, want: Want) -> Option<Coupling> {
         match self {
             Integrator::Aboba(coupling)
             | Integrator::TwoStage { coupling, .. }
-            | Integrator::ForceGradient { coupling, .. } => coupling.rehearse(system, dt),
-            _ => Ok(()),
+            | Integrator::ForceGradient { coupling, .. } => {
+                (want.virial && system.step_number() == 0).then_some(coupling)
+            }
+            _ => None,
         }
     }
 

@@ -185,7 +185,13 @@ impl Simulation {
         gpu.fetched = false;
         let made = gpu.machine.prepare(dt, rule, totals);
         made.map_err(|error| self.failure(error, dt))?;
-        if totals { self.take_totals() } else { Ok(()) }
+        if !totals {
+            return Ok(());
+        }
+        self.take_totals()?;
+        let Some(coupling) = integrator.at_setup(self, want) else { return Ok(()) };
+        self.fetch()?;
+        coupling.rehearse(self, dt)
     }
 
     /// Makes a step on the GPU, or collects it for later.

@@ -139,11 +139,15 @@ impl Simulation {
         if !integrator.has_time() {
             return self.forces_or_infinite(want);
         }
+        let coupling = integrator.at_setup(self, want);
+        if let Some(coupling) = coupling {
+            coupling.announce(self, dt, want);
+        }
         match integrator.properties().drag_in_forces {
             true => self.forces_with_thermostat(dt, want),
             false => self.conservative_forces(want),
         }?;
-        if want.virial { integrator.rehearse(self, dt) } else { Ok(()) }
+        coupling.map_or(Ok(()), |coupling| coupling.rehearse(self, dt))
     }
 
     /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces only.

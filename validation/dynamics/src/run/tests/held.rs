@@ -31,6 +31,7 @@ fn the_virial_is_that_of_the_mean_force_in_every_step() {
             Integrator::TwoStage { lambda: 0.21, coupling },
             Integrator::ForceGradient { lambda: 1.0 / 6.0, gradient: 1.0 / 24.0, coupling },
             Integrator::Aboba(coupling),
+            Integrator::Baoab(coupling),
         ] {
             let mut run = Simulation::new(&model, 1e-60, state.clone(), 7).unwrap();
             run.record_flux(true);
