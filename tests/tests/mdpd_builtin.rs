@@ -135,12 +135,12 @@ fn changes_are_seen_and_kept() {
 fn the_conservative_law_refuses_with_the_reason() {
     let deck = deck("", "block 0 5 0 5 0 5", [1.0, 2.5]);
     let b_differs = ours(&MIXED).replace("0.6", "0.75");
-    for (style, name) in [(b_differs.as_str(), "B"), (&ours(&MIXED).replace("20 0", "25 0"), "rd")] {
+    for (style, name) in [(b_differs.as_str(), "B"), (&ours(&MIXED).replace("20 0", "25 0"), "B rd^4")] {
         for law in ["", " law conservative"] {
             let l = open(&deck);
             let script = format!("{}run 0", style.replace(" law lucy", law).replace("-20 12.5", "-20 25"));
             let error = l.commands(&script).unwrap_err().to_string();
-            assert!(error.contains(&format!("{name} differs between")), "{error}");
+            assert!(error.contains(&format!("{name} differs between pairs of types")), "{error}");
             assert!(error.contains("'law lucy'") && error.contains("no potential"), "{error}");
         }
     }

@@ -105,7 +105,7 @@ fn mistakes_stop_with_one_clear_line() {
         (
             &coeff,
             mdpd("pair_style mdpd/psi 1.0 1.0 5", "pair_coeff 1 1 -40 25 18 1.0"),
-            "expected 'pair_coeff I J A B gamma rc rd'",
+            "expected 'pair_coeff I J A B gamma rc rd [",
         ),
         (
             &coeff,
@@ -247,8 +247,9 @@ fn b_by_type_pair_is_refused_with_the_reason() {
              pair_coeff 2 2 -40 25 18 1 0.75",
         );
     let error = outcome(&format!("{text}\n"), 1).unwrap_err();
-    assert!(error.contains("B differs between type pairs"), "{error}");
-    assert!(error.contains("partial densities"), "{error}");
+    assert!(error.contains("B differs between pairs of types (25 and 20)"), "{error}");
+    // The nearest model has a density of each species.
+    assert!(error.contains("the nearest model is") && error.contains("n_T1"), "{error}");
     let missing = text.replace("pair_coeff 1 2 -30 20 18 1 0.75\n", "");
     let error = outcome(&format!("{missing}\n"), 1).unwrap_err();
     assert!(error.contains("no coefficients for types 1 and 2: this style does not mix them"), "{error}");
