@@ -229,3 +229,46 @@ fn without_bonds_special_bonds_do_not_matter() {
         assert!(difference(&ours.f, &theirs.f) < 1e-12, "{style}");
     }
 }
+
+/// Words that are no UTF-8: a model may have such a path, and whatever else they are meant as stops with an error of LAMMPS.
+#[test]
+fn words_that_are_no_text_are_errors_of_lammps() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join(std::ffi::OsStr::from_bytes(b"m\xff.toml"));
+    std::fs::copy(warren(), &model).unwrap();
+    let head = format!(
+        "{}units lj\ncomm_modify vel yes\nregion r {REGION}\ncreate_box 1 r\ncreate_atoms 1 random 100 5 r\nmass 1 1\n",
+        load()
+    );
+    let run = |lines: &str| {
+        let path = folder.path().join("in.lammps");
+        let text = format!("{head}{lines}\nrun 0\n");
+        let bytes: Vec<u8> = text.bytes().map(|b| if b == b'?' { 0xff } else { b }).collect();
+        std::fs::write(&path, bytes).unwrap();
+        psidpd_tests::lammps().0.run_script(1, folder.path(), &path, &[], LIMIT).map_err(|e| e.to_string())
+    };
+    let psi = "pair_style dpd/psi 1.0 5\npair_coeff * * m?.toml F";
+    run(psi).unwrap();
+    for (lines, says) in [
+        ("pair_style dpd/psi 1.0 5\npair_coeff * * m?.toml ?", "no species"),
+        ("pair_style dpd/psi 1.0 5\npair_coeff * * ?.toml F", "cannot be read"),
+        ("pair_style dpd/psi ? 5", "floating point"),
+        ("pair_style dpd/psi 1.0 5 ? 2", "unknown keyword"),
+        ("pair_style dpd/psi 1.0 5 precision ?", "unknown precision"),
+        (
+            &format!("{psi}\npair_style dpd/psi 1.0 5 device ?\npair_coeff * * m?.toml F"),
+            "Pair style dpd/psi",
+        ),
+        ("pair_style mdpd/psi 1.0 1.0 5 law ?", "unknown law"),
+        ("pair_style mdpd/psi 1.0 1.0 5\npair_coeff * * -40 25 4.5 1.0 ?", "floating point"),
+        (&format!("{psi}\nfix 1 all dpd/splitting ?"), "unknown splitting"),
+        (&format!("{psi}\nfix 1 all dpd/splitting aboba ? 1"), "unknown keyword"),
+    ] {
+        let said = run(lines).unwrap_err();
+        assert!(
+            said.contains("ERROR") && said.contains(says) && !said.contains("terminate"),
+            "{lines}: {said}"
+        );
+    }
+}

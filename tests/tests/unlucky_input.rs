@@ -156,6 +156,24 @@ fn many_species_are_looked_at_in_a_moment() {
     }
 }
 
+/// Mixtures at temperatures and densities where no phase has the pressure: each took half a minute or more.
+#[test]
+fn theory_of_extreme_mixtures_ends_in_a_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, state) in [
+        ("huggins", "--kT 0.001"),
+        ("huggins-demixing", "--density 1e-9"),
+        ("binary-2d", "--density 1e-9"),
+        ("binary-2d", "--density 1e6"),
+    ] {
+        let model = psidpd_tests::root().join(format!("validation/models/{name}.toml"));
+        let mut limited = Command::new("sh");
+        limited.args(["-c", &format!("ulimit -t 10 && exec \"$0\" theory \"$1\" {state}")]);
+        let output = limited.arg(program()).arg(model).current_dir(folder.path()).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{name} {state}: {}", said(&output));
+    }
+}
+
 /// Control characters in a file are shown, and do not reach the terminal.
 #[test]
 fn messages_are_plain_and_short() {

@@ -35,6 +35,10 @@ pub struct CompositionLine<'a> {
 const REACH: f64 = 30.0;
 const STEPS: usize = 1200;
 
+/// Most steps from one composition to the next where no mixture has the pressure: a search through all densities takes
+/// a hundredth of a second.
+const WIDEST: usize = 32;
+
 /// Relative difference of pressures that differ only by rounding.
 const SAME: f64 = 1e-7;
 
@@ -51,18 +55,41 @@ impl<'a> CompositionLine<'a> {
     pub fn at_pressure(theory: &'a MeanField, pressure: f64) -> CompositionLine<'a> {
         let held = Held::Pressure(pressure);
         let mut line = CompositionLine { theory, held, followed: vec![f64::NAN; STEPS + 1] };
-        let grid = line.grid();
-        let densest =
-            |u: f64| theory.densities_at_pressure(&fractions(u), pressure).pop().map_or(f64::NAN, f64::ln);
         let middle = STEPS / 2;
-        line.followed[middle] = densest(grid[middle]);
-        let towards = |from: usize, i: usize, line: &CompositionLine| {
-            let near = line.solve_density(grid[i], line.followed[from], pressure);
-            near.unwrap_or_else(|| densest(grid[i]))
-        };
-        (middle + 1..=STEPS).for_each(|i| line.followed[i] = towards(i - 1, i, &line));
-        (0..middle).rev().for_each(|i| line.followed[i] = towards(i + 1, i, &line));
+        line.followed[middle] = line.densest(middle, pressure);
+        line.follow(&(middle..=STEPS).collect::<Vec<_>>(), pressure);
+        line.follow(&(0..=middle).rev().collect::<Vec<_>>(), pressure);
         line
+    }
+
+    /// `ln ρ` of the densest mixture at a point of the grid; NaN if none has the pressure.
+    fn densest(&self, at: usize, pressure: f64) -> f64 {
+        let all = self.theory.densities_at_pressure(&fractions(self.grid()[at]), pressure);
+        all.last().map_or(f64::NAN, |rho| rho.ln())
+    }
+
+    /// Follows the density along these points of the grid from the first of them.
+    fn follow(&mut self, way: &[usize], pressure: f64) {
+        let grid = self.grid();
+        let near = |line: &Self, at: usize, from: usize| {
+            line.solve_density(grid[way[at]], line.followed[way[from]], pressure)
+        };
+        let (mut last, mut gap) = (0, 1);
+        while last + gap < way.len() {
+            let at = last + gap;
+            let found = near(self, at, last).unwrap_or_else(|| self.densest(way[at], pressure));
+            self.followed[way[at]] = found;
+            if found.is_nan() {
+                gap = (2 * gap).min(gap + WIDEST);
+                continue;
+            }
+            // Back into the gap that was crossed.
+            for i in (last + 1..at).rev() {
+                let Some(found) = near(self, i, i + 1) else { break };
+                self.followed[way[i]] = found;
+            }
+            (last, gap) = (at, 1);
+        }
     }
 
     /// `ln ρ` at the given pressure, by Newton's method from a neighbouring value.
