@@ -55,6 +55,7 @@ fn main() {
             "cpp/fix_splitting_beside.cpp",
             "cpp/fix_splitting_displaced.cpp",
             "cpp/fix_splitting_held.cpp",
+            "cpp/fix_splitting_walls.cpp",
             "cpp/register.cpp",
         ])
         .include("cpp")

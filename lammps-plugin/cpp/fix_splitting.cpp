@@ -200,6 +200,7 @@ void FixSplitting::final_integrate()
     show_virial(vflag_of_step);
     return;
   }
+  watch_walls();
   kick(0.5 * dt);
   if (is_due()) act();
   show_virial(vflag_of_step);
@@ -371,13 +372,22 @@ void FixSplitting::compute_forces(int eflag, int vflag)
 // Fix pair reads the pair style at the first evaluation of a step that it sees: it sees that at the end only.
 void FixSplitting::add_forces(int vflag)
 {
-  const auto is_reader = [](const Fix *fix) { return strcmp(fix->style, "pair") == 0; };
-  if (std::none_of(modify->fix, modify->fix + modify->nfix, is_reader)) {
+  const auto is_reader = [&](int k) { return strcmp(modify->fix[k]->style, "pair") == 0; };
+  bool all_alike = true;
+  for (int k = 0; k < modify->nfix; k++) all_alike = all_alike && !is_reader(k) && !is_watched(k);
+  if (all_alike) {
     modify->post_force(vflag);
     return;
   }
-  for (int k = 0; k < modify->nfix; k++)
-    if ((modify->fmask[k] & POST_FORCE) && !is_reader(modify->fix[k])) modify->fix[k]->post_force(vflag);
+  // As LAMMPS does, dynamic groups first.
+  for (const bool groups : {true, false})
+    for (int k = 0; k < modify->nfix; k++) {
+      if (!(modify->fmask[k] & POST_FORCE) || begins(modify->fix[k]->style, "GROUP") != groups || is_reader(k)) continue;
+      if (is_watched(k))
+        watch(modify->fix[k], vflag);
+      else
+        modify->fix[k]->post_force(vflag);
+    }
 }
 
 extern "C" void *psidpd_create_dpd_splitting(void *lmp, int narg, char **arg)

@@ -91,6 +91,12 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void rehearse();
   // Adds what other fixes add to forces.
   void add_forces(int vflag);
+  // Whether the fix with number k is a wall that has not been found too stiff.
+  bool is_watched(int k) const;
+  // Adds the forces of a wall; warns if they are too strong for the timestep.
+  void watch(LAMMPS_NS::Fix *wall, int vflag);
+  // Watches all walls where LAMMPS itself has added their forces, and leaves the forces as they are.
+  void watch_walls();
   // For which part of a timestep the forces at its end act, on average; those in the middle act for the rest.
   double share_of_end() const { return scheme == Scheme::aboba ? 0.0 : 2.0 * lambda; }
   // Stores the pushes of the last action.
@@ -124,6 +130,8 @@ class FixSplitting : public LAMMPS_NS::Fix {
   std::vector<double> masses;
   // IDs of fixes that a warning has named.
   std::set<std::string> named;
+  // IDs of walls that a warning of this run has named.
+  std::set<std::string> too_stiff;
   // Whether this run has warned that the thermostat is inaccurate.
   bool warned = false;
   // Iterations of the thermostat before this run.
@@ -133,7 +141,7 @@ class FixSplitting : public LAMMPS_NS::Fix {
   // For force-gradient: the displacement of each atom, and its position before.
   double **shifts = nullptr;
   std::vector<double> home;
-  // Forces that a probe overwrites.
+  // Forces before a probe, or a wall, changes them.
   std::vector<double> covered;
 };
 

@@ -39,7 +39,7 @@ constexpr const char *TRIED[] = {
     "accelerate/cos", "adapt", "addforce", "addtorque", "ave", "balance", "bond/", "deform", "deposit", "drag", "dt/reset",
     "efield", "ehex", "evaporate", "external", "flow/gauss", "freeze", "gcmc", "gravity", "GROUP", "halt", "heat", "indent",
     "lineforce", "manifoldforce", "momentum", "oneway", "pair", "planeforce", "press/berendsen", "print", "propel/self",
-    "property/atom", "recenter", "restrain", "rhok", "setforce", "spring", "STORE", "store", "temp/berendsen", "temp/csvr",
+    "property/atom", "recenter", "restrain", "rhok", "setforce", "spring", "SRP", "STORE", "store", "temp/berendsen", "temp/csvr",
     "temp/rescale", "thermal/conductivity", "ti/spring", "vector", "viscosity", "viscous", "wall/"};
 
 // When a fix acts, in words; empty if only at ends of timesteps and of runs, or when neighbor lists are made.

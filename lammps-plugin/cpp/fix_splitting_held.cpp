@@ -91,6 +91,7 @@ void FixSplitting::setup_pre_reverse(int eflag, int vflag)
   vflag_of_step = vflag;
   evaluation = Evaluation::other;
   warned = false;
+  too_stiff.clear();
   rehearse();
   pre_reverse(eflag, vflag);
 }

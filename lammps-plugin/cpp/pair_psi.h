@@ -67,6 +67,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   std::array<double, 6> heat(const std::vector<double> &masses, const Action &action);
   // Atoms are going to be displaced from the present positions, where ghosts may have been found; or are back there.
   void displace(bool away);
+  // The temperature as an energy.
+  double kt() const;
   // The engine, which exists after init_style().
   Style &engine() { return **style; }
   // Iterations of the thermostat in its last update, and of all its updates since the style was set up.
@@ -98,7 +100,6 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Read and check the temperature and the seed of pair_style.
   void read_temperature(const char *arg);
   void read_seed(const char *arg);
-  double kt() const;
   // Stops with "Pair style NAME: text", on all ranks; LAMMPS adds the file and the line.
   [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   // Warns on one rank with "Pair style NAME: text", with the file and the line.

@@ -161,6 +161,38 @@ fn defaults_are_those_of_the_page() {
     }
 }
 
+/// Steps that are the same by their formulas: without drag two of velocity Verlet are one of *two-stage* with λ = ¼; with *gradient 0*
+/// the force gradient is absent. Threads, and whether energies are asked for, do not matter.
+#[test]
+fn steps_that_are_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(warren()).unwrap();
+    let (_quiet, quiet) = file(text.split("[[thermostat]]").next().unwrap());
+    let end = |fix: &str, dt: f64, rest: &str, edit: &dyn Fn(String) -> String, ranks| {
+        run(&edit(format!("{}{rest}\n", from_data(folder.path(), "", fix, dt))), ranks).v
+    };
+    let same = |script: String| script;
+    let without_drag = |script: String| script.replace(&warren(), &quiet);
+    let verlet = |script: String| without_drag(script).replace("dpd/splitting none", "nve");
+    let two = end("two-stage lambda 0.25", 0.02, "run 10", &without_drag, 1);
+    let apart = difference(&two, &end("none", 0.01, "run 20", &verlet, 1));
+    assert!(apart < 1e-9, "{apart:e}");
+    let plain = end("two-stage", 0.03, "run 6", &same, 1);
+    assert!(plain == end("force-gradient gradient 0 lambda 0.21", 0.03, "run 6", &same, 1));
+    let threads =
+        |script: String| script.replace(&format!("psi 1.0 {SEED}"), &format!("psi 1.0 {SEED} threads 2"));
+    assert!(plain == end("two-stage", 0.03, "run 6", &threads, 1));
+    let seldom = end("aboba", 0.03, "thermo 100\nrun 6", &same, 1);
+    let apart = difference(&end("aboba", 0.03, "thermo 1\nrun 6", &same, 1), &seldom);
+    assert!(apart < 1e-9, "{apart:e}");
+    let mixed = |script: String| {
+        script.replace(&format!("psi 1.0 {SEED}"), &format!("psi 1.0 {SEED} precision mixed"))
+    };
+    let [one, two] = [1, 2].map(|ranks| end("two-stage", 0.03, "run 1", &mixed, ranks));
+    let apart = difference(&two, &one);
+    assert!(apart < 2e-6 && apart > 0.0, "{apart:e}");
+}
+
 /// Two atoms half a range apart, so slow that they stay there, and so cold that there is no noise. With x =
 /// DΔt/μ = 0.6 the midpoint rule leaves (1 − x/2)/(1 + x/2) of their relative velocity in a step. Velocity
 /// Verlet, whose drag uses half-step velocities, leaves (1 − x/2)² in the first step and 1 − x in later ones.
@@ -170,16 +202,19 @@ fn the_drag_of_a_pair_is_that_of_the_formula() {
         file("title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n");
     let along = [1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
     let near = along.map(|e| 2.0 - 0.5 * e);
-    for (fix, steps, left) in [
-        ("dpd/splitting two-stage", 3, (0.7f64 / 1.3).powi(3)),
-        ("dpd/splitting force-gradient every 2", 4, (0.4f64 / 1.6).powi(2)),
-        ("dpd/splitting aboba", 3, (0.7f64 / 1.3).powi(3)),
-        ("nve", 3, (0.7f64 * 0.4).powi(2)),
+    let alone = ["dpd/psi", ""];
+    for (fix, [style, name], steps, left) in [
+        ("dpd/splitting two-stage", alone, 3, (0.7f64 / 1.3).powi(3)),
+        // A scaled hybrid scales forces, and neither drag nor noise.
+        ("dpd/splitting two-stage", ["hybrid/scaled 0.5 dpd/psi", "dpd/psi"], 3, (0.7f64 / 1.3).powi(3)),
+        ("dpd/splitting force-gradient every 2", alone, 4, (0.4f64 / 1.6).powi(2)),
+        ("dpd/splitting aboba", alone, 3, (0.7f64 / 1.3).powi(3)),
+        ("nve", alone, 3, (0.7f64 * 0.4).powi(2)),
     ] {
         let script = format!(
             "units lj\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\nregion b block 0 4 0 4 0 4\n\
              create_box 2 b\ncreate_atoms 1 single 2 2 2\ncreate_atoms 2 single {} {} {}\nmass 1 1\nmass 2 3\n{}\
-             pair_style dpd/psi 1e-60 {SEED}\npair_coeff * * \"{path}\" A B\ngroup first type 1\n\
+             pair_style {style} 1e-60 {SEED}\npair_coeff * * {name} \"{path}\" A B\ngroup first type 1\n\
              velocity first set 3e-12 -1e-12 2e-12\nfix 1 all {fix}\ntimestep 0.3\nrun {steps}\n",
             near[0],
             near[1],
@@ -398,7 +433,11 @@ fn iterations_are_counted() {
         }
     }
     // Each run counts its own.
+    // LAMMPS counts the first forces of a timestep, and the thermostat, as the time of fixes.
     let both = said(&format!("{head}run 9\nrun 6\n"), 1);
+    let modify = both.lines().find(|line| line.starts_with("Modify")).unwrap_or_else(|| panic!("{both}"));
+    let share: f64 = modify.split_whitespace().last().unwrap().parse().unwrap();
+    assert!(share > 25.0, "{modify}");
     assert!(both.contains("acted 4 times") && both.contains("acted 3 times"), "{both}");
     let strong = head.replace(&warren(), &folder.path().join("strong.toml").display().to_string());
     let model = std::fs::read_to_string(warren()).unwrap().replace("gamma = 18.0", "gamma = 1e12");

@@ -252,37 +252,70 @@ fn dangerous_builds_that_do_no_harm() {
     assert!(difference(&narrow.v, &wide.v) < 1e-9);
 }
 
-/// Without drag and noise the fix moves atoms beside other fixes as `fix nve` does where the timestep goes to 0.
+/// Without drag and noise the fix moves atoms beside other fixes as `fix nve` does where the timestep goes to 0. Fixes for some
+/// atoms are tried together, each on a group of its own.
 #[test]
 fn other_fixes_act_as_beside_nve() {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(warren()).unwrap();
     let (_folder, quiet) = file(text.split("[[thermostat]]").next().unwrap());
     let psi = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{quiet}\" F F\n");
-    let groups = "group some id <= 100\ngroup rest subtract all some\n";
-    for fix in [
-        "all gravity 5 vector 0 0 -1",
-        "some addforce 5 0 0",
-        "some setforce 0 0 0",
-        "some spring/self 50",
-        "some spring couple rest 50 1 0 0 0",
-        "all indent 50 sphere 3 3 3 2",
-        "all momentum 10 linear 1 1 1 angular",
-        "all temp/berendsen 2 2 0.05",
-        "all viscosity 20 x z 6",
-        "all heat 1 100",
-        "all rhok 1 0 0 0.2 50",
+    let of_groups = [
+        "gravity 5 vector 0 0 -1",
+        "addforce 5 0 0",
+        "addtorque 0 0 50",
+        "accelerate/cos 5",
+        "propel/self velocity 5",
+        "setforce 0 0 0",
+        "spring tether 500 3 3 3 1",
+        "spring couple g0 500 1 0 0 0",
+        "spring/self 50",
+        "spring/rg 500 1",
+        "ti/spring 50 50 50",
+        "indent 50 sphere 3 3 3 2",
+        "drag 3 3 3 5 0.5",
+        "viscous 2",
+        "restrain bond 351 352 50 50 0.5",
+        "momentum 10 linear 1 1 1 angular",
+        "temp/berendsen 2 2 0.05",
+        "temp/rescale 10 2 2 0.02 1",
+        "temp/csvr 2 2 0.05 77",
+        "heat 1 100",
+        "ehex 1 100",
+        "rhok 1 0 0 0.2 50",
+        "recenter 3 3 3",
+        "store/force",
+    ];
+    let mut grouped = String::new();
+    for (k, fix) in of_groups.iter().enumerate() {
+        let [from, to] = [25 * k + 1, 25 * k + 25];
+        grouped += &format!("group g{k} id {from}:{to}\nfix f{k} g{k} {fix}\n");
+    }
+    let end = |move_by: &str, more: &str| {
+        let fixes = format!("fix 1 all {move_by}\n{more}timestep 0.0005\nrun 100\n");
+        run(&deck(folder.path(), "", &psi, &fixes).replace("\ntimestep 0.02\n", "\n"), 1).v
+    };
+    let alone = end("nve", "");
+    for (more, groups) in [
+        (grouped.as_str(), of_groups.as_slice()),
+        ("fix 2 all viscosity 20 x z 6\n", &["viscosity"]),
+        ("fix 2 all thermal/conductivity 20 z 6\n", &["thermal/conductivity"]),
+        ("fix 2 all deform 1 x erate 0.5 remap x\n", &["deform"]),
+        ("fix 2 all press/berendsen iso 0 0 0.5\n", &["press/berendsen"]),
     ] {
-        let end = |move_by: &str, more: &str| {
-            let fixes = format!("{groups}fix 1 all {move_by}\n{more}timestep 0.0005\nrun 100\n");
-            run(&deck(folder.path(), "", &psi, &fixes).replace("\ntimestep 0.02\n", "\n"), 1).v
-        };
-        let more = format!("fix 2 {fix}\n");
-        let [nve, alone] = [end("nve", &more), end("nve", "")];
-        let effect = difference(&nve, &alone);
+        let nve = end("nve", more);
+        let size = 600 / groups.len();
         for scheme in ["two-stage", "force-gradient", "aboba"] {
-            let apart = difference(&end(&format!("dpd/splitting {scheme}"), &more), &nve);
-            assert!(apart < 0.03 * effect, "{fix}, {scheme}: {apart:e} of {effect:e}");
+            let found = end(&format!("dpd/splitting {scheme}"), more);
+            for (k, fix) in groups.iter().enumerate() {
+                let part = |v: &[[f64; 3]]| v[size * k..size * (k + 1)].to_vec();
+                let effect = difference(&part(&nve), &part(&alone));
+                let apart = difference(&part(&found), &part(&nve));
+                assert!(
+                    apart < 0.03 * effect || *fix == "store/force",
+                    "{fix}, {scheme}: {apart:e} of {effect:e}"
+                );
+            }
         }
     }
 }
@@ -355,4 +388,101 @@ fn computes_see_ends_of_steps_without_energies() {
         rows
     });
     assert!(found.len() == 400 && found == expected);
+}
+
+/// What computes say at the last step of a run is what they say of its last positions and velocities.
+#[test]
+fn computes_are_those_of_ends_of_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut columns = String::new();
+    let mut computes = String::from("group some id <= 200\ngroup rest subtract all some\n");
+    for (k, (compute, outputs)) in [
+        ("temp", &[""][..]),
+        ("temp/com", &[""]),
+        ("temp/partial 1 1 0", &[""]),
+        ("temp/profile 1 1 1 z 4", &[""]),
+        ("ke", &[""]),
+        ("pe", &[""]),
+        ("pair dpd/psi", &["", "[1]", "[2]"]),
+        ("group/group rest pair yes", &["", "[1]", "[3]"]),
+        ("rdf 20", &["[18][2]", "[20][3]"]),
+        ("adf 20 * * * 0.1 0.9 0.1 0.9", &["[18][2]"]),
+        ("com", &["[1]"]),
+        ("gyration", &["", "[4]"]),
+        ("momentum", &["[1]", "[2]"]),
+        ("msd", &["[4]"]),
+        ("msd/nongauss", &["[3]"]),
+        ("vacf", &["[4]"]),
+        ("pressure NULL pair", &["", "[5]"]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        computes +=
+            &format!("compute c{k} {} {compute}\n", if compute.contains("rest") { "some" } else { "all" });
+        columns += &outputs.iter().map(|part| format!(" c_c{k}{part}")).collect::<String>();
+    }
+    for (k, compute) in [
+        "ke/atom",
+        "pe/atom",
+        "stress/atom NULL",
+        "centroid/stress/atom NULL",
+        "coord/atom cutoff 0.8",
+        "cluster/atom 0.5",
+        "orientorder/atom nnn NULL degrees 1 6 cutoff 0.9",
+        "centro/atom 8",
+        "displace/atom",
+        "property/atom vx fx",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let part = match compute.split('/').next() {
+            Some("stress" | "centroid" | "property") => "[2]",
+            Some("displace") => "[4]",
+            Some("orientorder") => "[1]",
+            _ => "",
+        };
+        computes += &format!("compute p{k} all {compute}\ncompute r{k} all reduce sumsq c_p{k}{part}\n");
+        columns += &format!(" c_r{k}");
+    }
+    computes += "compute flux all heat/flux p0 p1 p2\n";
+    columns += " c_flux[1] c_flux[3]";
+    for scheme in ["two-stage", "aboba"] {
+        let fix = format!(
+            "fix 1 all dpd/splitting {scheme}\n{computes}thermo_style custom step{columns}\n\
+            thermo_modify format float %.15g line one\nthermo 1000\nrun 13\nfix_modify 1 virial no\nrun 0\n"
+        );
+        let said = outcome(folder.path(), &deck(folder.path(), "", &psi("dpd/psi"), &fix)).unwrap();
+        let rows: Vec<Vec<f64>> = said
+            .lines()
+            .filter_map(|line| line.split_whitespace().map(|w| w.parse().ok()).collect::<Option<Vec<f64>>>())
+            .filter(|row| row.len() > 20 && row[0] == 13.0)
+            .collect();
+        let [during, after] = &rows[..] else { panic!("{scheme}: {said}") };
+        let off: Vec<_> = during
+            .iter()
+            .zip(after)
+            .enumerate()
+            .filter(|(_, (a, b))| (*a - *b).abs() > 1e-8 * (1.0 + b.abs()))
+            .collect();
+        assert!(off.is_empty(), "{scheme}: {off:?} of{columns}");
+    }
+}
+
+/// The same steps in runs of several kinds, and beside fixes that insert and remove atoms once a timestep.
+#[test]
+fn commands_for_runs_and_atoms() {
+    let folder = tempfile::tempdir().unwrap();
+    for scheme in ["two-stage every 2", "force-gradient every 2", "aboba every 2"] {
+        let start = deck(folder.path(), "", &psi("dpd/psi"), &format!("fix 1 all dpd/splitting {scheme}"));
+        let whole = run(&format!("{start}run 14\n"), 1);
+        let parts = "run 3\nrun 2 pre no post no\nrun 8 upto\nrun 4 every 2 \"variable a equal 1\"\nrun 2 start 0 stop 14\n";
+        let apart = difference(&run(&format!("{start}{parts}"), 1).v, &whole.v);
+        assert!(apart < 1e-8, "{scheme}: {apart:e}");
+        let count = "region all block 0.5 5.5 0.5 4.5 0.5 4.5\nfix 2 all deposit 5 1 2 777 region all near 0.01\n\
+                     fix 3 all evaporate 5 10 all 778\nrun 11\nprint \"there are $(atoms) atoms\"\n";
+        let said = outcome(folder.path(), &format!("{start}{count}")).unwrap();
+        assert!(said.contains("there are 585 atoms"), "{scheme}: {said}");
+    }
 }

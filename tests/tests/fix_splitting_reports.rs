@@ -142,3 +142,71 @@ fn the_force_on_walls_balances_the_drive() {
         assert!(off < 0.02, "{scheme}, {group}, {speed}: {found} {expected}");
     }
 }
+
+/// Atoms of five times the thermal velocity, at twenty phases of a timestep, come back from walls with their energy within 3 kT at
+/// the timesteps of the page, and no wall is named; at longer ones they do not, and each wall is named once in a run.
+#[test]
+fn walls_that_are_too_stiff_are_named() {
+    let (folder, path) = file("title = \"free\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 1\nrange = 1\n");
+    let page =
+        std::fs::read_to_string(psidpd_tests::root().join("lammps-plugin/doc/fix_dpd_splitting.md")).unwrap();
+    for row in [
+        "| wall/lj93, ε = 1, σ = 1 | 67 | 0.03 | 0.02 |",
+        "| wall/lj126, ε = 1, σ = 1 | 63 | 0.03 | 0.02 |",
+        "| wall/harmonic, ε = 1000 | 45 | 0.03 | 0.03 |",
+    ] {
+        assert!(page.contains(row), "{row}");
+    }
+    for (scheme, right, wrong, mass, kt) in [
+        ("two-stage", 0.03, 0.05, 1.0, 1.0),
+        ("force-gradient", 0.03, 0.05, 4.0, 2.0),
+        ("aboba", 0.02, 0.035, 1.0, 2.0),
+    ] {
+        let unit = f64::sqrt(mass / kt);
+        let speed = 5.0 / unit;
+        for (step, named) in [(right, false), (wrong, true)] {
+            let dt = step * unit;
+            let mut atoms = String::new();
+            for (row, [y, z, v, w]) in
+                [[10.0, 2.6, 0.0, -speed], [10.0, 17.4, 0.0, speed], [1.1, 10.0, -speed, 0.0]]
+                    .into_iter()
+                    .enumerate()
+            {
+                for k in 0..20 {
+                    let back = dt * f64::from(k) / 20.0;
+                    atoms += &format!(
+                        "create_atoms 1 single {} {} {}\n",
+                        1.5 * f64::from(k),
+                        y - v * back,
+                        z - w * back
+                    );
+                }
+                atoms += &format!(
+                    "group r{row} id {}:{}\nvelocity r{row} set 0 {v} {w}\n",
+                    20 * row + 1,
+                    20 * row + 20
+                );
+            }
+            let steps = (1.1 * unit / dt).round();
+            let script = format!(
+                "units lj\natom_style atomic\nboundary p f f\nregion b block 0 30 0 20 0 20\ncreate_box 1 b\nmass 1 {mass}\n{atoms}{}\
+                 pair_style dpd/psi {kt} 5\npair_coeff * * \"{path}\" A\nfix 1 all dpd/splitting {scheme}\n\
+                 fix a all wall/lj93 zlo EDGE {kt} 1 2.5\nfix b all wall/lj126 zhi EDGE {kt} 1 2.5\n\
+                 fix c all wall/harmonic ylo EDGE $(1000*{kt}) 1 1\ncompute e all ke/atom\ncompute top all reduce max c_e\n\
+                 compute low all reduce min c_e\nthermo_style custom step c_top c_low\ntimestep {dt}\nrun {steps}\n\
+                 print \"energies $(c_top/{kt}) $(c_low/{kt})\"\nrun 1\n",
+                load()
+            );
+            for ranks in [1, 2] {
+                let said = said(folder.path(), &script, ranks);
+                let energies = rows(&said, "energies ");
+                let off = energies[0].iter().map(|e| (e - 12.5).abs()).fold(0.0, f64::max);
+                assert_eq!(off > 3.0, named, "{scheme}, {step}: {energies:?}");
+                for wall in ["fix a (wall/lj93)", "fix b (wall/lj126)", "fix c (wall/harmonic)"] {
+                    let warned = said.matches(&format!("{wall} at step")).count();
+                    assert_eq!(warned, usize::from(named), "{scheme}, {step}, {wall}, {ranks} ranks: {said}");
+                }
+            }
+        }
+    }
+}

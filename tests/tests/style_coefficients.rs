@@ -205,6 +205,11 @@ fn chains_with_segmental_repulsion() {
             format!(
                 "pair_style hybrid dpd/psi 1 5 srp 0.8 1 mid\npair_coeff * * dpd/psi \"{model}\" F F NULL\n{none}pair_coeff 3 3 srp 0.0\n"
             ),
+            // Bonds that break where they are longer than any is.
+            format!(
+                "fix b poly bond/break 5 1 99\npair_style hybrid/overlay dpd/psi 1 5 srp/react 0.8 1 mid b\n\
+                 pair_coeff * * dpd/psi \"{model}\" F F NULL\n{none}pair_coeff 3 3 srp/react 0.0\n"
+            ),
         ] {
             let with = frames(&format!("{head}{}{style}{}{runs}", load(), rest(integrator)));
             let apart = difference(&with, &plain);

@@ -2,15 +2,16 @@
 //!
 //! Every text in quotes is read as commands, in the order of the program; all other text keeps its bytes.
 
-use super::command::commands;
+use super::command::{command, commands};
 use super::survey::Read;
 use super::work::{Work, names_built_in};
 use super::{Converted, Law};
 
 /// Converts the program `old`.
 pub fn program(old: &str, law: Law, plugin: Option<&str>, read: Read) -> Converted {
+    let mut code = Vec::new();
     let texts = literals(old);
-    let whole: Vec<String> = texts.iter().map(lines_of).collect();
+    let whole: Vec<String> = texts.iter().map(|text| lines_of(text, old, &mut code)).collect();
     let mut work = Work::new(&whole.join("\n"), law, plugin, read);
     work.inline = true;
     let mut new = String::new();
@@ -40,12 +41,24 @@ pub fn program(old: &str, law: Law, plugin: Option<&str>, read: Read) -> Convert
             continue;
         }
         new += &old[at..text.begin];
-        new += &text.with(old, &lines);
+        let lines: Vec<String> = lines.iter().map(|line| restored(line, &code)).collect();
+        let place = text.place(old);
+        if lines.len() > 1 && matches!(place, Place::Value) {
+            let text = "this text is several commands now, in lines: send them one by one";
+            work.by_hand(&command(first, inside), text);
+        }
+        new += &text.with(&place, &lines);
         at = text.end;
     }
     new += &old[at..];
     let mut found = work.finish();
     found.script = new;
+    for note in found.changed.iter_mut().chain(&mut found.left).chain(&mut found.by_hand) {
+        note.text = restored(&note.text, &code);
+    }
+    for (note, _) in &mut found.models {
+        note.text = restored(&note.text, &code);
+    }
     found
 }
 
@@ -72,55 +85,127 @@ impl Literal<'_> {
         self.quote.len() == 3
     }
 
-    /// The text in the program for new commands.
-    fn with(&self, program: &str, lines: &[String]) -> String {
-        let text: Vec<String> = lines.iter().map(|line| restored(line, self.inside)).collect();
-        let quoted = |line: &str| format!("{}{line}{}", self.open, self.quote);
-        if self.is_long() {
-            return quoted(&text.concat());
+    /// Where more commands than one go.
+    fn place(&self, program: &str) -> Place {
+        if self.is_long() || self.inside.contains("\\n") || self.is_piece(program) {
+            return Place::Text { ends: self.inside.ends_with("\\n") && !self.is_piece(program) };
         }
-        let parts: Vec<&str> = text.iter().map(|line| line.trim_end_matches('\n')).collect();
-        if self.inside.contains("\\n") || self.is_piece(program) {
-            let end = if self.inside.ends_with("\\n") && !self.is_piece(program) { "\\n" } else { "" };
-            return quoted(&format!("{}{end}", parts.join("\\n")));
+        if self.names_file(program) {
+            return Place::File;
         }
-        let before = program[..self.begin].trim_end();
-        let call = before.strip_suffix('(').filter(|call| call.ends_with(".command"));
-        let between = match call {
-            Some(call) => {
-                let line = call.rfind('\n').map_or(0, |k| k + 1);
-                let receiver = &call[line..];
-                let indent = &receiver[..receiver.len() - receiver.trim_start().len()];
-                let name = receiver.rsplit([' ', ';', ':', '(', '\t', '=']).next().unwrap_or(receiver);
-                format!(")\n{indent}{name}(")
+        let line = program[..self.begin].rfind('\n').map_or(0, |k| k + 1);
+        let (head, after) = (&program[line..self.begin], program[self.end..].trim_start_matches([' ', '\t']));
+        let begin = head.trim_start();
+        let indent = &head[..head.len() - begin.len()];
+        let after_comma = head.trim_end().ends_with(',') || after.starts_with(',');
+        // The statement that has the text, behind others of its line.
+        let shared = begin.rfind(": ").map(|k| k + 2).max(begin.rfind(';').map(|k| k + 1));
+        let statement = begin[shared.unwrap_or(0)..].trim_start();
+        let between = |end: &str| match shared {
+            Some(_) => format!("{end}; {statement}"),
+            None => format!("{end}\n{indent}{statement}"),
+        };
+        let name = statement.strip_suffix('(');
+        let is_call =
+            |name: &str| !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "._".contains(c));
+        match self.bracket(program) {
+            Some('(') if name.is_some_and(is_call) && after.starts_with(')') => {
+                Place::Statement(between(")"))
             }
-            None => ", ".to_owned(),
+            Some('(') if !after_comma => Place::Value,
+            None if statement == "yield " => Place::Statement(between("")),
+            None if !after_comma => Place::Value,
+            _ => Place::Element,
+        }
+    }
+
+    /// Whether LAMMPS reads a script of this name.
+    fn names_file(&self, program: &str) -> bool {
+        program[..self.begin].trim_end().ends_with(".file(")
+    }
+
+    /// The innermost bracket around the text.
+    fn bracket(&self, program: &str) -> Option<char> {
+        let mut open = Vec::new();
+        let mut at = 0;
+        let outside = literals(&program[..self.begin]).into_iter().map(|text| (text.begin, text.end));
+        for (begin, end) in outside.chain([(self.begin, self.begin)]) {
+            for line in program[at..begin].lines() {
+                for c in line.split('#').next().unwrap_or_default().chars() {
+                    match c {
+                        '(' | '[' | '{' => open.push(c),
+                        ')' | ']' | '}' => {
+                            open.pop();
+                        }
+                        _ => {}
+                    }
+                }
+            }
+            at = end;
+        }
+        open.pop()
+    }
+
+    /// The text in the program for new commands.
+    fn with(&self, place: &Place, lines: &[String]) -> String {
+        let quoted = |line: &str| format!("{}{line}{}", self.open, self.quote);
+        let parts: Vec<&str> = lines.iter().map(|line| line.trim_end_matches('\n')).collect();
+        let between = match place {
+            Place::File => return quoted(parts.concat().trim_start_matches("include ").trim()),
+            Place::Text { .. } if self.is_long() => return quoted(&lines.concat()),
+            Place::Text { ends } => {
+                return quoted(&format!("{}{}", parts.join("\\n"), if *ends { "\\n" } else { "" }));
+            }
+            Place::Value => return quoted(&parts.join("\\n")),
+            Place::Statement(between) => between.as_str(),
+            Place::Element => ", ",
         };
         let parts: Vec<String> =
             if parts.is_empty() { vec![quoted("")] } else { parts.iter().map(|p| quoted(p)).collect() };
-        parts.join(&between)
+        parts.join(between)
     }
 }
 
-/// The marks that stand for braces of a formatted text, in whose code there may be blanks and quotes.
+/// What a text in quotes is in its program.
+enum Place {
+    /// Commands in lines; `ends` if the last one has an end.
+    Text { ends: bool },
+    /// An element of a list.
+    Element,
+    /// The only argument of a statement, with what goes between two of them.
+    Statement(String),
+    /// The name of a script.
+    File,
+    /// A value for one command.
+    Value,
+}
+
+/// The marks around the number of a piece of code in a formatted text, in which there may be blanks and quotes.
 const MARK: char = '\u{E000}';
 
-/// The text of a literal as lines, with marks in the place of code.
-fn lines_of(text: &Literal) -> String {
+/// The commands of a literal as lines, with marks in the place of code, which is added to `code`.
+fn lines_of<'a>(text: &Literal<'a>, program: &str, code: &mut Vec<&'a str>) -> String {
+    if text.names_file(program) {
+        return format!("include {}", text.inside);
+    }
     let mut found = String::new();
     let mut rest = text.inside;
     while let Some(at) = rest.find(['{', '\\']) {
         found += &rest[..at];
         rest = &rest[at..];
-        let code = if rest.starts_with('{') && text.formatted && !rest.starts_with("{{") {
+        let end = if rest.starts_with('{') && text.formatted && !rest.starts_with("{{") {
             end_of_code(rest)
         } else {
             None
         };
-        if let Some(end) = code {
-            found.push(MARK);
-            found += &(text.inside.len() - rest.len()).to_string();
-            found.push(MARK);
+        if let Some(end) = end {
+            let inside = rest[1..end - 1].trim();
+            if inside.parse::<f64>().is_ok() {
+                found += inside;
+            } else {
+                found += &format!("{MARK}{}{MARK}", code.len());
+                code.push(&rest[..end]);
+            }
             rest = &rest[end..];
         } else if !text.is_long() && rest.starts_with("\\n") {
             found.push('\n');
@@ -135,15 +220,12 @@ fn lines_of(text: &Literal) -> String {
 }
 
 /// A line with the code of the marks.
-fn restored(line: &str, inside: &str) -> String {
-    let mut new = String::new();
-    for (k, part) in line.split(MARK).enumerate() {
-        match part.parse::<usize>().ok().filter(|at| k % 2 == 1 && *at < inside.len()) {
-            Some(at) => new += &inside[at..at + end_of_code(&inside[at..]).unwrap_or(0)],
-            None => new += part,
-        }
-    }
-    new
+fn restored(line: &str, code: &[&str]) -> String {
+    let parts = line.split(MARK).enumerate().map(|(k, part)| {
+        let known = part.parse::<usize>().ok().filter(|_| k % 2 == 1).and_then(|k| code.get(k));
+        known.copied().unwrap_or(part)
+    });
+    parts.collect()
 }
 
 /// Where the code in braces at the beginning of a text ends.

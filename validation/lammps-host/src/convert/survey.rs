@@ -29,7 +29,8 @@ impl Survey {
         for command in commands(script) {
             match command.words.as_slice() {
                 ["variable", rest @ ..] => variables.define(rest),
-                ["include", file] if depth < 10 => {
+                // A script may jump to itself.
+                [verb @ ("include" | "jump"), file, ..] if depth < if *verb == "jump" { 3 } else { 10 } => {
                     if let Some(text) = variables.expand(bare(file)).and_then(|name| read(&name)) {
                         self.look(&text, read, variables, depth + 1);
                     }

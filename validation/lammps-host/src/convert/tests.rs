@@ -284,3 +284,99 @@ fn programs_keep_what_is_no_command() {
          \x20   write(\"fix 1 all nve\\n\")\n"
     );
 }
+
+/// A script that goes on in another file is converted there; one that jumps to itself does so by the name that every script has.
+#[test]
+fn scripts_that_jump() {
+    let style = "pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5\n";
+    let read = |name: &str| match name {
+        "fluid.in" => Some(format!("label again\n{style}jump fluid.in again\njump in.main top\n")),
+        "in.main" => Some("label top\njump in.main top\njump fluid.in\n".to_owned()),
+        _ => None,
+    };
+    let old = read("in.main").unwrap();
+    let new = script(&old, Law::Lucy, Some("p.so"), &read);
+    assert_eq!(new.script, "label top\njump SELF top\njump fluid.in.psi\n");
+    assert_eq!(
+        new.included[0].1,
+        "label again\ncomm_modify vel yes\nplugin     load p.so\npair_style mdpd/psi 1 1 5 law lucy\njump SELF again\njump in.main top\n"
+    );
+    assert!(
+        texts(&new.by_hand).contains("in.main is the script, which has another name now"),
+        "{:?}",
+        new.by_hand
+    );
+    let lost = converted(&format!("{style}jump other.in\n"), Law::Lucy, "p.so");
+    assert!(texts(&lost.by_hand).contains("2: the included file cannot be read"));
+}
+
+/// The old integrator had velocities of its own.
+#[test]
+fn fixes_that_had_no_effect() {
+    let style = "pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5\nfix w all wall/reflect zlo 0\n";
+    let undone = "2: fix mvv/dpd undid what this fix does to velocities; now it acts";
+    let new = converted(&format!("{style}fix 1 all mvv/dpd\n"), Law::Lucy, "p.so");
+    assert!(texts(&new.left).contains(undone), "{:?}", new.left);
+    let new = converted(&format!("{style}fix 1 all nve\n"), Law::Lucy, "p.so");
+    assert!(!texts(&new.left).contains(undone), "{:?}", new.left);
+}
+
+/// One text that becomes several commands: elements of lists, arguments of calls, values that a generator yields, names of scripts;
+/// code in a formatted text stays, in remarks too.
+#[test]
+fn programs_send_commands_in_several_ways() {
+    let style = "pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5";
+    let read = |name: &str| (name == "in.part").then(|| format!("{style}\n"));
+    let plugin = "plugin     load p.so";
+    let new = "pair_style mdpd/psi 1 1 5 law lucy";
+    for (old, expected, by_hand) in [
+        (format!("a = ['{style}', 'x']\n"), format!("a = ['{plugin}', '{new}', 'x']\n"), ""),
+        (format!("a = '{style}', 'x'\n"), format!("a = '{plugin}', '{new}', 'x'\n"), ""),
+        (
+            format!("def f():\n    yield '{style}'\n"),
+            format!("def f():\n    yield '{plugin}'\n    yield '{new}'\n"),
+            "",
+        ),
+        (
+            format!("  l.command('{style}') # c\n"),
+            format!("  l.command('{plugin}')\n  l.command('{new}') # c\n"),
+            "",
+        ),
+        (
+            format!("if a: l.command('{style}')\n"),
+            format!("if a: l.command('{plugin}'); l.command('{new}')\n"),
+            "",
+        ),
+        (format!("send(\"{style}\")\n"), format!("send(\"{plugin}\")\nsend(\"{new}\")\n"), ""),
+        (
+            format!("a = '{style}'\n"),
+            format!("a = '{plugin}\\n{new}'\n"),
+            "1: this text is several commands now",
+        ),
+        ("l.file('in.part')\n".to_owned(), "l.file('in.part.psi')\n".to_owned(), ""),
+    ] {
+        let old = format!("# \"it's\"\nc = 'comm_modify vel yes'\n{old}");
+        let new = python::program(&old, Law::Lucy, Some("p.so"), &read);
+        assert!(new.script.ends_with(&expected), "{expected}: {}", new.script);
+        let by_hand = by_hand.replace("1:", "3:");
+        assert!(
+            texts(&new.by_hand).contains(&by_hand) && new.by_hand.is_empty() == by_hand.is_empty(),
+            "{:?}",
+            new.by_hand
+        );
+    }
+    let old = format!(
+        "l.command(f'{style}')\nl.command(f'pair_coeff * * mdpd/rhosum {{0.8}}')\nl.command(f'pair_coeff * * mdpd {{a[\"x\"]}} 25 0 1 {{rd:.2f}}')\n"
+    );
+    let new = python::program(&old, Law::Lucy, None, &read);
+    assert!(
+        new.script.ends_with("l.command(f'pair_coeff * * {a[\"x\"]} 25 0 1 {rd:.2f}')\n"),
+        "{}",
+        new.script
+    );
+    assert!(
+        texts(&new.left).contains("had the range 0.8, forces {rd:.2f}, which may differ"),
+        "{:?}",
+        new.left
+    );
+}

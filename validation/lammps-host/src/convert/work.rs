@@ -12,6 +12,19 @@ use super::{Converted, DATA, INCLUDED, Law, Note, new_name};
 const OF_BUILT_IN: [&str; 7] =
     ["mdpd/rhosum", "mdpd", "mdpd/diffcut", "mvv/dpd", "sph/rho", "meso/rho", "edpd/source"];
 
+/// Fixes that change velocities behind the integrator.
+const CHANGE_VELOCITIES: [&str; 9] = [
+    "wall/reflect",
+    "wall/reflect/stochastic",
+    "momentum",
+    "temp/berendsen",
+    "temp/rescale",
+    "temp/csvr",
+    "heat",
+    "ehex",
+    "viscosity",
+];
+
 /// Converts the text of a script; the new script loads the file `plugin`. `read` reads files that it includes.
 pub fn script(old: &str, law: Law, plugin: Option<&str>, read: Read) -> Converted {
     let mut work = Work::new(old, law, plugin, read);
@@ -49,6 +62,8 @@ pub(super) struct Work<'a> {
     plugin: Option<&'a str>,
     read: Read<'a>,
     survey: Survey,
+    /// The text of the script.
+    own: String,
     parts: Vec<Part>,
     /// The number of the part that the present command is in.
     part: usize,
@@ -72,6 +87,9 @@ pub(super) struct Work<'a> {
     waiting: Vec<String>,
     /// What replaces them.
     replaced: Vec<(String, String)>,
+    /// Whether the integrator kept velocities of its own, and the fixes whose changes it undid.
+    kept_velocities: bool,
+    undone: Vec<Note>,
     /// Whether commands have no file around them, in which lines could be inserted later.
     pub(super) inline: bool,
 }
@@ -84,6 +102,7 @@ impl<'a> Work<'a> {
             plugin,
             read,
             survey,
+            own: old.to_owned(),
             parts: vec![Part { name: None, text: String::new(), is_open: true }],
             part: 0,
             found: Converted::default(),
@@ -98,6 +117,8 @@ impl<'a> Work<'a> {
             written: vec![],
             waiting: vec![],
             replaced: vec![],
+            kept_velocities: false,
+            undone: vec![],
             inline: false,
         }
     }
@@ -153,12 +174,21 @@ impl<'a> Work<'a> {
             ["pair_style", style @ ..] => self.pair_style(command, style),
             ["pair_coeff", i, j, rest @ ..] => self.pair_coeff(command, [i, j], rest),
             ["fix", id, group, style, rest @ ..] if base(style) == "mvv/dpd" => {
+                self.kept_velocities = true;
                 Some(self.integrator(command, [id, group], rest))
+            }
+            ["fix", _, _, style, ..] if CHANGE_VELOCITIES.contains(style) => {
+                let note =
+                    self.note(command, "fix mvv/dpd undid what this fix does to velocities; now it acts");
+                self.undone.push(note);
+                self.look(command)
             }
             ["set", rest @ ..] if self.column.is_some() && rest.iter().any(is_density) => {
                 self.set(command, rest)
             }
-            ["include", file] => self.include(command, bare(file)),
+            ["include", file] => self.include(command, "include", bare(file), &[]),
+            ["jump", file, ..] if bare(file) == "SELF" => None,
+            ["jump", file, label @ ..] => self.jump(command, bare(file), label),
             ["read_data", file, rest @ ..] => self.read_data(command, bare(file), rest),
             ["comm_modify", rest @ ..] => {
                 self.velocities |= rest.windows(2).any(|w| w == ["vel", "yes"]);
@@ -693,7 +723,26 @@ impl<'a> Work<'a> {
         Some(command.with("read_data", &words))
     }
 
-    fn include(&mut self, command: &Command, file: &str) -> Option<String> {
+    /// A script that is read from its beginning, or from a label, in the place of the rest of this one.
+    fn jump(&mut self, command: &Command, file: &str, label: &[&str]) -> Option<String> {
+        let here = self.parts[self.part].name.as_deref();
+        let name = self.variables.expand(file);
+        let is_own = name.as_ref().and_then(|name| (self.read)(name)).is_some_and(|text| text == self.own);
+        if name.is_some() && here == name.as_deref() || here.is_none() && is_own {
+            self.changed(command, format!("{file} is this script, which has another name now"));
+            return Some(command.with("jump", &[&["SELF"], label].concat()));
+        }
+        if is_own {
+            return self.by_hand(
+                command,
+                format!("{file} is the script, which has another name now: write its new name"),
+            );
+        }
+        self.include(command, "jump", file, label)
+    }
+
+    /// Converts a file that the command `verb` reads.
+    fn include(&mut self, command: &Command, verb: &str, file: &str, rest: &[&str]) -> Option<String> {
         let Some(file) = self.variables.expand(file) else {
             return self
                 .by_hand(command, "a variable has the included file: write its name, and convert again");
@@ -741,8 +790,8 @@ impl<'a> Work<'a> {
         }
         self.found.included.iter().find(|(name, _)| name == file)?;
         let new = new_name(file, INCLUDED);
-        self.changed(command, format!("includes {new}, which was converted"));
-        Some(command.with("include", &[&new]))
+        self.changed(command, format!("reads {new}, which was converted"));
+        Some(command.with(verb, &[&[new.as_str()], rest].concat()))
     }
 
     /// Compares the fluid of a run with the new style's.
@@ -785,6 +834,9 @@ impl<'a> Work<'a> {
 
     pub(super) fn finish(mut self) -> Converted {
         self.check();
+        if self.kept_velocities {
+            self.found.left.append(&mut self.undone);
+        }
         let first = Note { file: None, line: 1, text: String::new() };
         let last = self.styles.last().map_or(first, |place| place.note.clone());
         self.request_velocities();
