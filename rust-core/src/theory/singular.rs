@@ -96,7 +96,7 @@ fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) ->
             (true, true)
                 if i + 1 < grid.len()
                     && values[i + 1].is_finite()
-                    && values[i] > 0.0
+                    && values[i] > values[i - 1].min(values[i + 1])
                     && values[i] >= values[i - 1]
                     && values[i] >= values[i + 1] =>
             {
