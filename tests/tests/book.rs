@@ -238,3 +238,45 @@ fn a_page_that_says_something_else_is_seen() {
         assert_eq!(seen(&|results| results.hold_lines("a page", text)), wrong, "{text}");
     }
 }
+
+/// The steps of `force-gradient` in a scene: those behind its last header that gives one.
+fn long_steps(scene: &str) -> Vec<f64> {
+    let value = |part: &str, key: &str| {
+        let line = part.lines().find(|line| line.split('=').next().is_some_and(|word| word.trim() == key))?;
+        Some(line.split('=').nth(1)?.split('#').next()?.trim().trim_matches('"').to_owned())
+    };
+    let parts = scene.split("\n[");
+    let long = parts.filter(|part| value(part, "integrator").as_deref() == Some("force-gradient"));
+    long.filter_map(|part| value(part, "dt")?.parse().ok()).collect()
+}
+
+/// Long steps of one fluid are the same in the table of steps, on the first page and in the templates.
+#[test]
+fn pages_and_templates_have_the_steps_of_the_table() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();
+    let table = read("docs/choosing.md");
+    let templates = "validation/dynamics/src/scene/templates";
+    for (row, scenes) in [
+        ("standard DPD, a = 25", vec![format!("{templates}/bulk.toml")]),
+        (
+            "Warren, sets 5 and 6",
+            vec![
+                format!("{templates}/slab.toml"),
+                format!("{templates}/pendant-drop.toml"),
+                "README.md".to_owned(),
+            ],
+        ),
+        ("spline drop", vec![format!("{templates}/droplet.toml")]),
+    ] {
+        let line = table.lines().find(|line| line.starts_with(&format!("| {row}"))).unwrap();
+        let cell = line.split('|').nth(3).unwrap().trim();
+        let step: f64 = cell.split([' ', ';']).next().unwrap().parse().unwrap();
+        for scene in scenes {
+            let found = long_steps(&read(&scene));
+            assert!(
+                !found.is_empty() && found.iter().all(|dt| *dt == step),
+                "{scene}: {found:?}, not {step}"
+            );
+        }
+    }
+}

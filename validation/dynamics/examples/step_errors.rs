@@ -1,10 +1,31 @@
-//! Errors of steps of random fluids: what a trial says beside what longer runs of larger boxes have.
+//! Errors of steps of random fluids: what a trial says beside what longer runs from other starts have.
 //!
-//! `cargo run --release -p psidpd-dynamics --example step_errors FIRST LAST`: the numbers of the fluids.
+//! `cargo run --release --workspace --example step_errors FIRST LAST`: the numbers of the fluids, from 1; the number is the seed.
+//! Each line has the verdict first, so `sort -r` puts the worst first. `step_errors MODEL KT RHO DT...` tries steps of a model.
 
+use psidpd_core::engine::Want;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::Model;
 use psidpd_dynamics::integrator::{Coupling, Integrator};
-use psidpd_dynamics::trial::{Composition, Piece};
+use psidpd_dynamics::run::{RunError, Simulation};
+use psidpd_dynamics::trial::{Composition, Piece, StepErrors};
+use psidpd_observe::frame::Frame;
+use psidpd_observe::series::Series;
+use psidpd_observe::{Measured, configurational};
+
+/// The step that is advised.
+const STEP: Integrator = Integrator::ForceGradient {
+    lambda: 0.17,
+    gradient: 1.0 / 24.0,
+    coupling: Coupling { every: 2, ..Coupling::DEFAULT },
+};
+
+/// ωΔt of the reference of the pressure.
+const SHORT: f64 = 0.4;
+
+/// Samples of a long run, and steps between them: odd, for steps with and without a thermostat.
+const SAMPLES: u64 = 800;
+const BETWEEN: u64 = 5;
 
 struct Draws(u64);
 
@@ -42,7 +63,9 @@ fn fluid(number: u64) -> Fluid {
     let gamma = d.log(1.0, 100.0);
     let kt = d.log(0.5, 2.0);
     let kind = (5.0 * d.uniform()) as usize;
-    let mut text = format!("title = \"f\"\nspecies = [{}]\n", quoted.join(", "));
+    // Every fifth is a fluid of the plane.
+    let dimensions = if number.is_multiple_of(5) { 2 } else { 3 };
+    let mut text = format!("title = \"f\"\ndimensions = {dimensions}\nspecies = [{}]\n", quoted.join(", "));
     let rho = match kind {
         // Soft pairs.
         0 => d.between(3.0, 6.0),
@@ -71,7 +94,8 @@ fn fluid(number: u64) -> Fluid {
             let b = 0.045;
             text += &format!(
                 "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.0, {:.3}]\n",
-                0.95 / b
+                // Bounds hold the part of each species, and the pole is one of their sum.
+                0.95 / b / species as f64
             );
             psi(&|k| format!("-kT*ln(1 - {b}*n) - {:.2}*n", 0.1 * (1 + k) as f64), &mut text);
         }
@@ -105,7 +129,7 @@ fn of_model(arguments: &[String]) -> Result<(), Box<dyn std::error::Error>> {
     let n = model.species().len();
     let (masses, densities) = (vec![1.0; n], vec![numbers[1] / n as f64; n]);
     let of = Composition { model: &model, masses: &masses, kt: numbers[0], densities: &densities, seed: 3 };
-    let Some(piece) = Piece::settled(&of)? else { return Err("no piece".into()) };
+    let piece = Piece::settled(&of)??;
     println!(
         "{} w {:.2} mean {:?} drag {:.2} cap {:.4} beta {:.2}",
         arguments[0],
@@ -116,14 +140,75 @@ fn of_model(arguments: &[String]) -> Result<(), Box<dyn std::error::Error>> {
         piece.thermal_pressure
     );
     for dt in &numbers[2..] {
-        let integrator = Integrator::ForceGradient {
-            lambda: 0.17,
-            gradient: 1.0 / 24.0,
-            coupling: Coupling { every: 2, ..Coupling::DEFAULT },
-        };
-        println!("  dt {dt} z {:.2} {:?}", dt * piece.frequency, piece.errors(integrator, *dt)?);
+        println!("  dt {dt} z {:.2} {:?}", dt * piece.frequency, piece.errors(STEP, *dt)?);
     }
     Ok(())
+}
+
+/// The temperatures less 1, and the carried pressure in ρkT, of a long run; `None` where it stops.
+fn long_run(
+    piece: &Piece,
+    model: &Model,
+    kt: f64,
+    (dt, seed): (f64, u64),
+) -> Result<Option<[Measured; 3]>, RunError> {
+    let mut run = Simulation::new(model, kt, piece.state().clone(), seed)?;
+    let evaluator = Evaluator::new(model.at(kt)?)?;
+    let ideal = run.len() as f64 * kt / run.state().domain.volume(run.dimensions());
+    let (mut ends, mut forces) = (Series::new(2), Series::new(2));
+    if run.prepare_for(STEP, dt, Want::TOTALS).is_err() || run.advance(600, dt, STEP).is_err() {
+        return Ok(None);
+    }
+    for sample in 0..SAMPLES {
+        run.record_flux(false);
+        if run.advance(BETWEEN - 1, dt, STEP).is_err() {
+            return Ok(None);
+        }
+        run.record_flux(true);
+        if run.step(dt, STEP, Want::TOTALS).is_err() {
+            return Ok(None);
+        }
+        let frame = Frame::new(run.view(0.0), &evaluator);
+        let carried = frame.carried_pressure().unwrap_or([f64::NAN; 6]);
+        ends.push(&[run.temperature() / kt, run.scalar_pressure(carried) / ideal]);
+        if sample.is_multiple_of(2) {
+            forces.push(&configurational::sums(&frame));
+        }
+    }
+    let one = Measured::from(1.0);
+    let ratio = forces.ratio(|s| s[0], |s| s[1]).times(1.0 / kt).minus(one);
+    Ok(Some([ends.mean(0).minus(one), ratio, ends.mean(1)]))
+}
+
+/// Whether an estimate is right within a factor of two, but for what neither it nor the run resolves.
+fn verdict(
+    said: Option<StepErrors>,
+    found: Option<[Measured; 3]>,
+    reference: Measured,
+) -> (&'static str, String) {
+    let Some([kinetic, configurational, pressure]) = found else {
+        return match said {
+            None => ("dies as said", String::new()),
+            Some(_) => ("wrong: dies", String::new()),
+        };
+    };
+    let pressure = pressure.minus(reference);
+    let told = [kinetic, configurational, pressure];
+    let text = told.map(|m| format!("{:+.4}({:.4})", m.value, m.error)).join(" ");
+    let Some(said) = said else { return ("said dies, lives", text) };
+    // A configurational temperature that scatters as much tells nothing.
+    let known = told.into_iter().filter(|m| m.error < 0.03);
+    let worst = known.max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
+    let Some(Measured { value, error }) = worst else { return ("unknown", text) };
+    let (low, high) = (value.abs() - 3.0 * error, value.abs() + 3.0 * error);
+    let most = said.worst().max(said.resolution());
+    let verdict = match () {
+        () if most > 0.1 => "no claim",
+        () if low > 2.0 * most => "wrong: too small",
+        () if high < 0.5 * (said.worst() - said.resolution()) => "wrong: too large",
+        () => "right",
+    };
+    (verdict, text)
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -131,54 +216,43 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if texts.first().is_some_and(|first| first.ends_with(".toml")) {
         return of_model(&texts);
     }
-    let arguments: Vec<u64> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
-    let multiples: Vec<f64> = std::env::args().skip(3).filter_map(|a| a.parse().ok()).collect();
-    let [first, last, ..] = arguments[..] else { return Err("FIRST LAST MULTIPLES...".into()) };
-    let offset = std::env::var("SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
+    let arguments: Vec<u64> = texts.iter().map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let [first, last] = arguments[..] else { return Err("FIRST LAST".into()) };
     for number in first..=last {
         let f = fluid(number);
         let model = Model::parse("f.toml", &f.text).map_err(|e| format!("{number}: {e}\n{}", f.text))?;
         let of =
             |seed| Composition { model: &model, masses: &f.masses, kt: f.kt, densities: &f.densities, seed };
-        let begun = std::time::Instant::now();
-        let Some(piece) = Piece::settled(&of(number + offset))? else {
-            println!("{number} no piece");
+        let dimensions = model.dimensions();
+        let head = format!("fluid {number} {dimensions}D masses {:.2?}", f.masses);
+        let (piece, other) = match (Piece::settled(&of(number))?, Piece::settled(&of(number + 1000))?) {
+            (Ok(piece), Ok(other)) => (piece, other),
+            (Err(why), _) | (_, Err(why)) => {
+                println!("no estimate | {head} {why}");
+                continue;
+            }
+        };
+        let w = piece.frequency;
+        let head = format!("{head} w {w:.2} ({:.2}) k/w {:.2}", other.frequency, piece.drag / w);
+        let reference = long_run(&other, &model, f.kt, (SHORT / w, number + 2000))?;
+        let Some([.., reference]) = reference else {
+            println!("no reference | {head}");
             continue;
         };
-        let settled = begun.elapsed().as_secs_f64();
-        for z in &multiples {
-            let lambda = 0.17;
-            let integrator = Integrator::ForceGradient {
-                lambda,
-                gradient: 1.0 / 24.0,
-                coupling: Coupling { every: 2, ..Coupling::DEFAULT },
-            };
-            let dt = z / piece.frequency;
-            let begun = std::time::Instant::now();
-            let errors = piece.errors(integrator, dt)?;
-            let took = begun.elapsed().as_secs_f64();
-            let head = format!(
-                "{number} z {z} w {:.2} mean {:.2} k/w {:.3} masses {:.2?} settled {settled:.2} took {took:.2}",
-                piece.frequency,
-                piece.mean_frequency.unwrap_or(f64::NAN),
-                piece.drag / piece.frequency,
-                f.masses
-            );
-            match errors {
-                None => println!("{head} DIES"),
-                Some(e) => {
-                    let s = |v: psidpd_observe::Measured| format!("{:+.4}({:.4})", v.value, v.error);
-                    println!(
-                        "{head} beta {:.2} Tk {} Tc {} p {:.4} worst {:.4} res {:.4}",
-                        e.thermal_pressure,
-                        s(e.kinetic),
-                        e.configurational.map_or("-".into(), s),
-                        e.carried(),
-                        e.worst(),
-                        e.resolution()
-                    )
-                }
-            }
+        let advised = piece.longest(STEP)?;
+        if advised.is_none() {
+            println!("no estimate | {head} no step is advised");
+        }
+        // Beyond what is advised errors are large enough to be compared.
+        let longer = 1.3 * advised.map_or(0.6 / w, |(dt, _)| dt);
+        let tried = [advised.map(|(dt, said)| (dt, Some(said))), Some((longer, piece.errors(STEP, longer)?))];
+        for (dt, said) in tried.into_iter().flatten() {
+            let found = long_run(&other, &model, f.kt, (dt, number + 3000))?;
+            let (verdict, text) = verdict(said, found, reference);
+            let estimate = said.map_or("dies".to_owned(), |said| {
+                format!("{:.4} resolves {:.4}", said.worst(), said.resolution())
+            });
+            println!("{verdict} | {head} wdt {:.2} said {estimate} has {text}", w * dt);
         }
     }
     Ok(())

@@ -133,6 +133,8 @@ pub struct Properties {
     pub lammps: Counterpart,
     /// Whether drag and noise act inside the forces.
     pub drag_in_forces: bool,
+    /// Evaluations of forces in a step.
+    pub evaluations: u64,
     /// For which part of a step each of its evaluations of forces acts, on average.
     pub force_shares: [f64; 2],
     /// Whether the last forces of a step are those at its end.
@@ -220,6 +222,7 @@ impl Integrator {
             accuracy: Accuracy { temperature: [5.0, drag], pressure: [0.5, 0.75, 0.0] },
             lammps,
             drag_in_forces: true,
+            evaluations: 1,
             force_shares: [1.0, 0.0],
             forces_at_end: true,
         };
@@ -249,12 +252,14 @@ impl Integrator {
             Integrator::TwoStage { lambda, coupling } => Properties {
                 accuracy: Accuracy { temperature: [0.01, 0.0], pressure: [0.1, 0.0, 0.0] },
                 lammps: splitting(coupling),
+                evaluations: 2,
                 force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
                 ..apart
             },
             Integrator::ForceGradient { lambda, coupling, .. } => Properties {
                 accuracy: Accuracy { temperature: [0.02, 0.0], pressure: [0.0, 0.0, 0.02] },
                 lammps: splitting(coupling),
+                evaluations: 3,
                 force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
                 ..apart
             },

@@ -147,6 +147,13 @@ impl Observers {
         if forgetful == self.observers { Ok(restored) } else { Err(ObserveError::OtherObservables) }
     }
 
+    /// The temperatures of a stage, if it measures them.
+    pub fn temperature(&self, stage: &str) -> Option<Observation> {
+        let mut all = self.observers.iter().flat_map(|o| &o.stages);
+        let temperature = |s: &&Sampled| s.stage == stage && matches!(s.meter, AnyMeter::Temperature(_));
+        all.find(temperature)?.meter.finish().pop()
+    }
+
     pub fn finish(&self) -> Vec<Observation> {
         let mut all = Vec::new();
         for sampled in self.observers.iter().flat_map(|o| &o.stages) {

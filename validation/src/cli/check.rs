@@ -1,7 +1,9 @@
 use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_dynamics::run::bytes_per_particle;
-use psidpd_experiments::check::{Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates};
+use psidpd_experiments::check::{
+    Cost, Findings, Severity, StepEstimate, Steps, Warning, check, cost, estimates,
+};
 use psidpd_formats::memory::{self, shown};
 use psidpd_report::quantity::{decimal, number};
 
@@ -59,16 +61,22 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
         too_large = memory::check(particles, bytes_per_particle(&scene)).err();
         too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
-        let steps = if too_far.is_none() { estimates(&scene)? } else { Vec::new() };
+        let steps = if too_far.is_none() { estimates(&scene)? } else { Steps::default() };
         let taken = if too_far.is_none() { cost(&scene).ok() } else { None };
         (scene.model.clone(), scene.kt, Some(densities), steps, taken)
     } else {
         let (model, kt) = arguments.settings.model(&arguments.file)?;
-        (model, kt.unwrap_or(1.0), None, Vec::new(), None)
+        (model, kt.unwrap_or(1.0), None, Steps::default(), None)
     };
     let kt = arguments.kt.unwrap_or(kt);
     let densities = per_species(&arguments.density, model.species().len()).or(densities);
-    let mut findings = Findings { steps, cost: taken, ..check(&model, kt, densities.as_deref())? };
+    let Steps { known, unknown } = steps;
+    let mut findings = Findings {
+        steps: known,
+        unknown_steps: unknown,
+        cost: taken,
+        ..check(&model, kt, densities.as_deref())?
+    };
     if let Some(warning) = too_long(&findings.steps) {
         findings.warnings.push(warning);
         findings.warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
@@ -103,11 +111,16 @@ const TOO_LONG: f64 = 0.1;
 /// Above this an error is no small correction, and its value means nothing.
 const FAR_OFF: f64 = 1.0;
 
+/// Smaller errors are of no interest.
+const LEAST: f64 = 1e-4;
+
 /// An error in percent, as far as it is known.
 fn percent(error: f64, resolution: f64) -> String {
     match error {
         e if e < resolution && resolution > TOO_LONG => "what a short trial cannot tell".to_owned(),
-        e if e < resolution.max(1e-4) => format!("less than {} %", two_digits(100.0 * resolution.max(1e-4))),
+        e if e < resolution.max(LEAST) => {
+            format!("less than {} %", two_digits(100.0 * resolution.max(LEAST)))
+        }
         e if e <= FAR_OFF => format!("about {} %", two_digits(100.0 * e)),
         _ => format!("more than {} %", two_digits(100.0 * FAR_OFF)),
     }
@@ -148,8 +161,8 @@ fn two_digits(x: f64) -> String {
 }
 
 fn print_step(step: &StepEstimate, which: &str) {
-    let told = step.carried >= step.resolution.max(1e-4) && step.carried <= FAR_OFF;
-    let thinner = step.thinner.filter(|_| told).map(|by| {
+    let told = step.carried >= step.resolution.max(LEAST) && step.carried <= FAR_OFF;
+    let thinner = step.thinner.filter(|by| told && *by >= LEAST).map(|by| {
         format!(", a liquid in equilibrium with its vapour too thin by about {} %", two_digits(100.0 * by))
     });
     let one_percent = match step.one_percent {
@@ -218,6 +231,15 @@ fn print(findings: &Findings, species: &[String]) {
             }
             all => all.iter().for_each(|step| print_step(step, "")),
         }
+    }
+    for step in &findings.unknown_steps {
+        say!(
+            "time step     {} of stage \"{}\", {}: no estimate: {}",
+            step.dt,
+            step.stage,
+            step.integrator,
+            step.why
+        );
     }
     for warning in &findings.warnings {
         let kind = match warning.severity {

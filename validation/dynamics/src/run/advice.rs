@@ -3,7 +3,7 @@
 use super::{Integrator, Simulation, State};
 use crate::integrator::Coupling;
 use crate::scene::Stage;
-use crate::trial::{Composition, Piece, two_digits};
+use crate::trial::{Composition, Piece, percent, two_digits};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
@@ -72,7 +72,7 @@ impl Advice {
             densities: &densities,
             seed: 1,
         };
-        let (better_dt, found) = Piece::settled(&of).ok()??.longest(ADVISED).ok()??;
+        let (better_dt, found) = Piece::settled(&of).ok()?.ok()?.longest(ADVISED).ok()??;
         let better_errors = [found.temperatures(), found.carried()];
         let time = PRICE * stage.dt / better_dt;
         let gains = worst(errors) > worst(better_errors) && time < 3.0;
@@ -135,18 +135,17 @@ fn frequency(simulation: &Simulation) -> Option<f64> {
 impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Advice { stage, dt, errors, better_dt, better_errors, resolution, time } = self;
-        let percent = |x: f64| two_digits(100.0 * x);
         let better = better_errors[0].max(better_errors[1]);
         let better = match better < *resolution {
-            true => format!("less than {} %", percent(*resolution)),
-            false => format!("at most {} % in temperatures and pressure", percent(better)),
+            true => format!("less than {}", percent(*resolution)),
+            false => format!("at most {} in temperatures and pressure", percent(better)),
         };
         let mut advised = ADVISED;
         let lambda = advised.settings().lambda.map_or(0.0, |(lambda, _)| *lambda);
         write!(
             f,
-            "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate the configurational temperature is off by {} %, and \
-             the pressure that steps carry, which sets the density of a liquid in equilibrium with its vapour, by {} % of rho kT. \
+            "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate the configurational temperature is off by {}, and \
+             the pressure that steps carry, which sets the density of a liquid in equilibrium with its vapour, by {} of rho kT. \
              integrator = \"{}\", lambda = {lambda}, thermostat_every = 2, dt = {better_dt} was off by {better} in a trial with a \
              piece of the fluid, in {} of the time; psidpd pareto measures it",
             percent(errors[0]),

@@ -1,7 +1,7 @@
 //! The course of a run: its steps, its output and its end.
 
 use super::output::{Output, write_json, write_observations};
-use super::watch::Watch;
+use super::watch::{Deviation, Thermometer, Watch};
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
 use crate::scene::{Stage, every};
@@ -157,12 +157,28 @@ impl Runner<'_> {
             self.keep_state()?;
         }
         let deviations = match self.position.done == stage.steps {
-            true => self.watch.deviations(stage),
+            true => {
+                let mut found = self.watch.deviations(stage);
+                let known = found.iter().any(|d| d.thermometer == Thermometer::Configurational);
+                found.extend(self.measured_deviation(stage).filter(|_| !known));
+                found
+            }
             false => Vec::new(),
         };
         let thermo = thermo.as_ref();
         progress(Progress { stage: &stage.name, step, steps: self.steps, thermo, deviations: &deviations });
         Ok(())
+    }
+
+    /// The deviation of the configurational temperature that a stage measures, with more configurations than the watch looks at.
+    /// The first stage may still settle.
+    fn measured_deviation(&self, stage: &Stage) -> Option<Deviation> {
+        let steady = self.position.stage > 0 && stage.level.is_none();
+        if !steady || !stage.thermostat || self.simulation.has_body_forces() {
+            return None;
+        }
+        let found = self.observers.temperature(&stage.name)?;
+        Deviation::measured(stage, found.scalar("configurational")?, found.samples as usize)
     }
 
     /// Keeps the present state as the last good one. The output of this step must be written already.

@@ -3,8 +3,8 @@
 //! The temperature is that of the relative velocities which drag and noise act on, so the motion of a drop or
 //! a flow does not count. Each stage has a number of samples, a long stage one every [`INTERVAL`] steps, at a
 //! hundredth of the cost of the steps; sampling changes no step. The configurational temperature, which is
-//! most sensitive to errors of the forces, is sampled every [`RARE`] steps, more often in a shorter stage of
-//! at least [`WORTH_A_LOOK`] steps.
+//! most sensitive to errors of the forces, is sampled [`LOOKS`] times in a stage of at least [`WORTH_A_LOOK`] steps, at
+//! most at a twentieth of the cost of the steps.
 //!
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
@@ -27,12 +27,17 @@ const LEAST: u64 = 10;
 /// Target number of samples in a short stage.
 const SAMPLES: u64 = 24;
 
-/// Largest and smallest number of steps between configurational temperatures; one costs about as much as ten steps.
+/// Largest number of steps between configurational temperatures, and the smallest number of evaluations of forces: one
+/// costs about as much as ten steps of velocity Verlet.
 const RARE: u64 = 1000;
 const LEAST_RARE: u64 = 250;
 
-/// Target number of configurational temperatures in a short stage.
-const LOOKS: u64 = 12;
+/// Target number of configurational temperatures in a stage.
+const LOOKS: u64 = 60;
+
+/// With as many configurations their scatter in time gives the error, which the scatter over blocks only bounds: in a slab
+/// blocks of the surface differ from those inside.
+const ENOUGH: usize = 20;
 
 /// A run stops if it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples, and
 /// has not cooled to [`COOLER`] of its lowest temperature for as long. A start that cools, even slowly, continues.
@@ -108,6 +113,22 @@ impl fmt::Display for Deviation {
             "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
              dt, or an integrator that allows it (docs/integrators.md)"
         )
+    }
+}
+
+impl Deviation {
+    /// A configurational temperature that an observable has found, if it is off beyond chance.
+    pub(super) fn measured(stage: &Stage, found: Measured, samples: usize) -> Option<Deviation> {
+        let Measured { value, error } = found.times(1.0 / stage.kt);
+        let found = Estimate { mean: value, error, samples, tau: 0.5 };
+        (error > 0.0 && is_off(&found)).then(|| Deviation {
+            stage: stage.name.clone(),
+            thermometer: Thermometer::Configurational,
+            mean: value,
+            error,
+            falls: false,
+            dt: stage.integrator.has_time().then_some(stage.dt),
+        })
     }
 }
 
@@ -265,7 +286,9 @@ impl Watch {
 
 /// Whether a configurational temperature is due.
 fn looks_at_forces(stage: &Stage, done: u64) -> bool {
-    let interval = (stage.steps / LOOKS).clamp(LEAST_RARE, RARE);
+    // Odd, for steps with and without a thermostat.
+    let least = LEAST_RARE / stage.integrator.properties().evaluations;
+    let interval = (stage.steps / LOOKS).clamp(least, RARE) | 1;
     stage.steps >= WORTH_A_LOOK && stage.level.is_none() && done.is_multiple_of(interval)
 }
 
@@ -302,17 +325,22 @@ fn estimate(samples: &[f64]) -> Option<Estimate> {
 }
 
 /// `Σ a/Σ b` in units of kT. The error of each configuration comes from its blocks, and their number sets the
-/// degrees of freedom of this error. The error of a long series is at least that from the scatter of the series.
+/// degrees of freedom of this error. The error of a longer series is at least that from its scatter, and from [`ENOUGH`]
+/// configurations on it is that.
 fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Estimate> {
     let sum = |f: &dyn Fn(&Configurational) -> f64| samples.iter().map(f).sum::<f64>();
     let (a, b) = (sum(&|s| s.a), sum(&|s| s.b));
     let mut error = FACES * sum(&|s| s.variance(a / b)).sqrt() / b;
+    let mut freedom = sum(&|s| s.blocks - 1.0);
     if samples.len() >= MINIMUM_SAMPLES {
         let mut series = Series::new(2);
         samples.iter().for_each(|s| _ = series.push(&[s.a, s.b]));
-        error = error.max(series.ratio(|s| s[0], |s| s[1]).error);
+        let in_time = series.ratio(|s| s[0], |s| s[1]).error;
+        (error, freedom) = match samples.len() >= ENOUGH {
+            true => (in_time, samples.len() as f64 - 1.0),
+            false => (error.max(in_time), freedom),
+        };
     }
-    let freedom = sum(&|s| s.blocks - 1.0);
     let found = Estimate { mean: a / b / kt, error: error / kt, samples: freedom as usize + 1, tau: 0.5 };
     (error.is_finite() && error > 0.0).then_some(found)
 }
@@ -427,6 +455,39 @@ mod tests {
         assert_eq!(estimate(&[1.0, 1.1, 0.9]), None);
         let far = estimate(&[1.30, 1.32, 1.29, 1.31, 1.30, 1.28]).unwrap();
         assert!(is_off(&far), "{far:?}");
+    }
+
+    /// Sums of forces of forty looks at a fluid of this temperature, in units of kT: twenty blocks, whose own values differ by half
+    /// of kT as those of a surface and of the inside do, and next looks that are alike.
+    fn looked_at(rng: &mut StdRng, ratio: f64) -> Vec<Configurational> {
+        let mut normal = |size: f64| -> f64 {
+            let z: f64 = StandardNormal.sample(rng);
+            size * z
+        };
+        let mut drift = 0.0;
+        let look = |_| {
+            drift = 0.4 * drift + normal(0.02);
+            let block = |k| {
+                let b = 1.0 + normal(0.1);
+                [(ratio + drift) * b + if k % 2 == 0 { 0.5 } else { -0.5 } + normal(0.1), b]
+            };
+            Configurational::of(&(0..20).map(block).collect::<Vec<_>>())
+        };
+        (0..40).map(look).collect()
+    }
+
+    /// A temperature that is off by as much as is tolerated raises an alarm in 1 of 1000 stages at most; this counts 1000 of them,
+    /// among which 7 or more have a probability below 10⁻⁴. One that is off by 5 % is seen, although blocks scatter by half of kT.
+    #[test]
+    fn configurational_temperatures_that_are_off_are_seen() {
+        let mut rng = StdRng::seed_from_u64(6);
+        let mut alarms = |ratio: f64, of: usize| {
+            let warned =
+                |_: &usize| is_off(&estimate_configurational(&looked_at(&mut rng, ratio), 1.0).unwrap());
+            (0..of).filter(warned).count()
+        };
+        let (right, high, low) = (alarms(1.02, 1000), alarms(1.06, 200), alarms(0.94, 200));
+        assert!(right <= 6 && high >= 190 && low >= 190, "{right} {high} {low}");
     }
 
     /// The pairs of all forces are stored for as many particles as watch and advice evaluate, and for no more.

@@ -33,8 +33,27 @@ const BETWEEN: u64 = 6;
 /// Most trials of a search.
 const TRIALS: usize = 6;
 
-/// Most steps that settle a piece.
+/// Most steps that settle a piece of one phase, and of one that condenses; steps between looks at its frequency.
 const SETTLE: f64 = 1200.0;
+const LONGEST_SETTLE: u64 = 6000;
+const STRETCH: u64 = 60;
+
+/// Looks that decide whether a piece is steady, and by how much the second half of them may be faster.
+const RECENT: usize = 10;
+const GROWTH: f64 = 0.06;
+
+/// Why a fluid has no piece.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoPiece {
+    #[error("there are no particles")]
+    Empty,
+    #[error("the forces reach so far that even a small piece of the fluid has more than {MOST} particles")]
+    Large,
+    #[error("a small piece of the fluid does not come to rest in short steps")]
+    Unsettled,
+    #[error("a small piece of the fluid still condenses or separates after {LONGEST_SETTLE} short steps")]
+    Separates,
+}
 
 /// Number density of each species, and what else a piece needs to know.
 #[derive(Debug, Clone)]
@@ -70,9 +89,11 @@ const ACCURATE: Integrator =
     Integrator::ForceGradient { lambda: 0.17, gradient: 1.0 / 24.0, coupling: Coupling::DEFAULT };
 
 impl Piece {
-    /// `None` where there is no density, or where the forces reach so far that a piece is no small one.
-    pub fn settled(of: &Composition) -> Result<Option<Piece>, RunError> {
-        let Some(mut state) = start(of)? else { return Ok(None) };
+    pub fn settled(of: &Composition) -> Result<Result<Piece, NoPiece>, RunError> {
+        let mut state = match start(of)? {
+            Ok(state) => state,
+            Err(why) => return Ok(Err(why)),
+        };
         let fluid = of.model.at(of.kt)?;
         let evaluator = Evaluator::new(fluid)?;
         let (mut number, mut rates) = (3, [0.0; 2]);
@@ -82,40 +103,43 @@ impl Piece {
             range if range > 0.0 => (of.kt / lightest).sqrt() / range,
             _ => 0.0,
         };
-        for round in 0..=ROUNDS {
+        for _ in 0..ROUNDS {
             draw_velocities(&mut state, of, number);
             number += 3;
             let mut run = simulation(of.model, of.kt, state.clone(), of.seed)?;
             rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
-            let [frequency, drag] = rates;
-            let fastest = frequency.max(0.1 * drag).max(crossing);
+            let fastest = rates[0].max(0.1 * rates[1]).max(crossing);
             if fastest <= 0.0 {
                 break;
             }
-            let steps = match round {
-                ROUNDS => {
-                    let relaxation = 30.0 / fastest + 10.0 * drag / (fastest * fastest);
-                    (relaxation * fastest / SHORT).min(SETTLE) as u64
-                }
-                _ => ROUND,
-            };
             run.prepare_for(ACCURATE, SHORT / fastest, Want::FORCES)?;
-            if run.advance(steps, SHORT / fastest, ACCURATE).is_err() {
-                return Ok(None);
+            if run.advance(ROUND, SHORT / fastest, ACCURATE).is_err() {
+                return Ok(Err(NoPiece::Unsettled));
             }
             state = run.state().clone();
         }
+        if rates[0].max(rates[1]) > 0.0 {
+            draw_velocities(&mut state, of, number);
+            number += 3;
+            let run = simulation(of.model, of.kt, state, of.seed)?;
+            state = match come_to_rest(run, &evaluator, crossing, number)? {
+                Ok(state) => state,
+                Err(why) => return Ok(Err(why)),
+            };
+        }
         let mut run = simulation(of.model, of.kt, state.clone(), of.seed)?;
+        if rates[0].max(rates[1]) > 0.0 {
+            rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
+        }
         let dt = SHORT / rates[0].max(0.1 * rates[1]).max(crossing);
         let mut samples = Vec::new();
         if dt.is_finite() {
-            rates = [frequency(&run, &evaluator, number), drag(&mut run)?];
             for _ in 0..PRESSURES {
                 let made = run
                     .advance(BETWEEN - 1, dt, ACCURATE)
                     .and_then(|()| run.step(dt, ACCURATE, Want::TOTALS));
                 if made.is_err() {
-                    return Ok(None);
+                    return Ok(Err(NoPiece::Unsettled));
                 }
                 let flux = 2.0 * run.kinetic_energy()
                     / (run.dimensions() as f64 * state.domain.volume(run.dimensions()));
@@ -134,7 +158,7 @@ impl Piece {
             square.max(0.0).sqrt()
         });
         let [frequency, drag] = rates;
-        Ok(Some(Piece {
+        Ok(Ok(Piece {
             model: of.model.clone(),
             kt: of.kt,
             seed: of.seed,
@@ -145,6 +169,11 @@ impl Piece {
             pressure: ideal + virial,
             thermal_pressure: 1.0 + covariance.max(0.0),
         }))
+    }
+
+    /// Its particles, in equilibrium.
+    pub fn state(&self) -> &State {
+        &self.state
     }
 
     /// The longest step that may be advised, whatever its errors.
@@ -183,6 +212,43 @@ impl Piece {
         }
         Ok(None)
     }
+}
+
+/// Steps until the frequency of the fastest species no longer grows. A fluid between two phases condenses meanwhile, and its steps
+/// are those of the denser phase.
+fn come_to_rest(
+    mut run: Simulation,
+    evaluator: &Evaluator,
+    crossing: f64,
+    number: u32,
+) -> Result<Result<State, NoPiece>, RunError> {
+    let (mut steps, mut relaxation) = (0, 0.0);
+    let mut frequencies = Vec::new();
+    while steps < LONGEST_SETTLE {
+        let [frequency, drag] = [frequency(&run, evaluator, number), drag(&mut run)?];
+        let fastest = frequency.max(0.1 * drag).max(crossing);
+        frequencies.push(frequency);
+        if relaxation >= 1.0 && is_steady(&frequencies) {
+            return Ok(Ok(run.state().clone()));
+        }
+        let dt = SHORT / fastest;
+        if run.prepare_for(ACCURATE, dt, Want::FORCES).is_err() || run.advance(STRETCH, dt, ACCURATE).is_err()
+        {
+            return Ok(Err(NoPiece::Unsettled));
+        }
+        steps += STRETCH;
+        let full = (30.0 + 10.0 * drag / fastest) / SHORT;
+        relaxation += STRETCH as f64 / full.min(SETTLE);
+    }
+    Ok(Err(NoPiece::Separates))
+}
+
+/// Whether the second half of the frequencies of a piece is no larger than the first, but for the scatter of few particles.
+fn is_steady(frequencies: &[f64]) -> bool {
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    let recent = &frequencies[frequencies.len().saturating_sub(RECENT)..];
+    let (before, after) = recent.split_at(recent.len() / 2);
+    !before.is_empty() && mean(after) <= (1.0 + GROWTH) * mean(before)
 }
 
 /// On one thread: a piece is too small for more.
@@ -239,23 +305,23 @@ fn gaussian_or_uniform(of: &Composition, tags: &[u32], number: u32, law: Law) ->
 }
 
 /// Particles at random in a cube.
-fn start(of: &Composition) -> Result<Option<State>, RunError> {
+fn start(of: &Composition) -> Result<Result<State, NoPiece>, RunError> {
     let fluid = of.model.at(of.kt)?;
     let total: f64 = of.densities.iter().sum();
     if total.is_nan() || total <= 0.0 {
-        return Ok(None);
+        return Ok(Err(NoPiece::Empty));
     }
     let dimensions = fluid.dimensions;
     let volume = (PARTICLES / total).max((EDGE * fluid.cutoff()).powi(dimensions as i32));
     if volume * total > MOST {
-        return Ok(None);
+        return Ok(Err(NoPiece::Large));
     }
     // Of one species the density is exact.
     let volume = (volume * total).round() / total;
     let length = volume.powf(1.0 / dimensions as f64);
     let lengths = [length, length, if dimensions == 2 { 1.0 } else { length }];
     let Ok(domain) = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, dimensions == 3]) else {
-        return Ok(None);
+        return Ok(Err(NoPiece::Large));
     };
     let species: Vec<i32> = (0..)
         .zip(of.densities)
@@ -268,7 +334,7 @@ fn start(of: &Composition) -> Result<Option<State>, RunError> {
             x[c] = lengths[c] * (0.5 + f64::from(place) / 12f64.sqrt());
         }
     }
-    Ok(Some(State { species, ..State::at_rest(domain, of.masses.to_vec(), x) }))
+    Ok(Ok(State { species, ..State::at_rest(domain, of.masses.to_vec(), x) }))
 }
 
 /// Velocities of Maxwell's distribution without momentum in sum.

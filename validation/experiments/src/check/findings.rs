@@ -1,5 +1,5 @@
 use super::cost::Cost;
-use super::timestep::StepEstimate;
+use super::timestep::{StepEstimate, UnknownStep};
 use psidpd_core::theory::Stability;
 use serde::Serialize;
 
@@ -16,6 +16,8 @@ pub struct Findings {
     pub stability: Option<Waves>,
     /// Time steps of a scene and their errors; estimates, and none for a model alone.
     pub steps: Vec<StepEstimate>,
+    /// Time steps of which nothing can be said.
+    pub unknown_steps: Vec<UnknownStep>,
     /// What phases are expected, and where mean field fails.
     pub theory: Vec<String>,
     /// What a scene takes on this machine; none for a model alone.

@@ -8,7 +8,7 @@ mod warnings;
 
 pub use cost::{Cost, cost};
 pub use findings::{Findings, Severity, Warning};
-pub use timestep::{StepEstimate, estimates};
+pub use timestep::{StepEstimate, Steps, UnknownStep, estimates};
 pub use warnings::uncalibrated;
 
 use crate::ExperimentError;
@@ -55,6 +55,7 @@ pub fn check(model: &Model, kt: f64, densities: Option<&[f64]>) -> Result<Findin
         stability: stability.map(Into::into),
         densities: densities.map(<[f64]>::to_vec),
         steps: Vec::new(),
+        unknown_steps: Vec::new(),
         cost: None,
         theory: prediction.map_or(Vec::new(), |p| p.summary()),
         warnings: found,

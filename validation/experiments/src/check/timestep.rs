@@ -11,7 +11,7 @@ use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::prediction::predict;
 use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::{Scene, Stage};
-use psidpd_dynamics::trial::{Composition, Piece};
+use psidpd_dynamics::trial::{Composition, NoPiece, Piece};
 use serde::Serialize;
 
 /// Up to this ωΔt the rule holds.
@@ -46,11 +46,31 @@ pub struct StepEstimate {
     pub one_percent: Option<f64>,
 }
 
-/// Of each stage with conditions of its own, of a ramp the first level and the last; empty where nothing can be said: without a
-/// density, or where the forces reach too far for a small piece.
-pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
+/// A step of which nothing can be said, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnknownStep {
+    pub stage: String,
+    pub integrator: String,
+    pub dt: f64,
+    pub why: String,
+}
+
+/// What is known of the steps of a scene.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Steps {
+    pub known: Vec<StepEstimate>,
+    pub unknown: Vec<UnknownStep>,
+}
+
+/// Why steps without drag have no estimate.
+const NO_DRAG: &str =
+    "nothing takes the heat that steps add, so the error grows with the length of the stage";
+
+/// Of each stage with conditions of its own, of a ramp the first level and the last.
+pub fn estimates(scene: &Scene) -> Result<Steps, RunError> {
     let mut found: Vec<StepEstimate> = Vec::new();
-    let mut known: Vec<(f64, Option<Sample>)> = Vec::new();
+    let mut unknown: Vec<UnknownStep> = Vec::new();
+    let mut known: Vec<(f64, Result<Sample, NoPiece>)> = Vec::new();
     let mut longest: Vec<(f64, Integrator, Option<f64>)> = Vec::new();
     let at_an_end = |stage: &&Stage| stage.level.is_none_or(|[level, levels]| level == 1 || level == levels);
     let timed = scene.stages.iter().filter(|stage| stage.integrator.has_time());
@@ -62,8 +82,23 @@ pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
                 known.len() - 1
             }
         };
-        let Some(sample) = &known[at].1 else { continue };
-        let Some([error, carried, resolution]) = errors(&sample.piece, stage)? else { continue };
+        let untold = |why: String| UnknownStep {
+            stage: stage.name.clone(),
+            integrator: stage.integrator.to_string(),
+            dt: stage.dt,
+            why,
+        };
+        let sample = match &known[at].1 {
+            Ok(sample) => sample,
+            Err(why) => {
+                unknown.push(untold(why.to_string()));
+                continue;
+            }
+        };
+        let Some([error, carried, resolution]) = errors(&sample.piece, stage)? else {
+            unknown.push(untold(NO_DRAG.to_owned()));
+            continue;
+        };
         let one_percent = match longest.iter().find(|(kt, of, _)| (*kt, *of) == (stage.kt, stage.integrator))
         {
             Some((.., dt)) => *dt,
@@ -95,7 +130,8 @@ pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
             found.push(estimate);
         }
     }
-    Ok(found)
+    unknown.dedup();
+    Ok(Steps { known: found, unknown })
 }
 
 fn is_fourth_order(stage: &Stage) -> bool {
@@ -162,23 +198,28 @@ struct Sample {
 const DENSER: f64 = 1.04;
 
 /// The fluid of a scene where its particles are fastest.
-fn sampled(scene: &Scene, kt: f64) -> Result<Option<Sample>, RunError> {
-    let mut fastest: Option<(Piece, Vec<f64>)> = None;
+fn sampled(scene: &Scene, kt: f64) -> Result<Result<Sample, NoPiece>, RunError> {
+    let mut fastest: Result<(Piece, Vec<f64>), NoPiece> = Err(NoPiece::Empty);
     for densities in compositions(scene, kt)? {
-        let Some(piece) = settled(scene, kt, &densities)? else { continue };
-        if fastest.as_ref().is_none_or(|(other, _)| piece.frequency > other.frequency) {
-            fastest = Some((piece, densities));
+        match (settled(scene, kt, &densities)?, &fastest) {
+            (Ok(piece), Ok((other, _))) if piece.frequency <= other.frequency => {}
+            (Ok(piece), _) => fastest = Ok((piece, densities)),
+            (Err(why), Err(_)) => fastest = Err(why),
+            (Err(_), Ok(_)) => {}
         }
     }
-    let Some((piece, densities)) = fastest else { return Ok(None) };
+    let (piece, densities) = match fastest {
+        Ok(fastest) => fastest,
+        Err(why) => return Ok(Err(why)),
+    };
     let total: f64 = densities.iter().sum();
     let denser: Vec<f64> = densities.iter().map(|rho| DENSER * rho).collect();
-    let compressed = settled(scene, kt, &denser)?.map(|piece| piece.pressure);
+    let compressed = settled(scene, kt, &denser)?.ok().map(|piece| piece.pressure);
     let resistance = compressed.map(|compressed| (compressed - piece.pressure) / ((DENSER - 1.0) * total));
-    Ok(Some(Sample { piece, resistance: resistance.filter(|resistance| *resistance > 0.0) }))
+    Ok(Ok(Sample { piece, resistance: resistance.filter(|resistance| *resistance > 0.0) }))
 }
 
-fn settled(scene: &Scene, kt: f64, densities: &[f64]) -> Result<Option<Piece>, RunError> {
+fn settled(scene: &Scene, kt: f64, densities: &[f64]) -> Result<Result<Piece, NoPiece>, RunError> {
     Piece::settled(&Composition { model: &scene.model, masses: &scene.mass, kt, densities, seed: scene.seed })
 }
 

@@ -31,7 +31,7 @@ fn unit(scene: &Scene, stage: &Stage) -> Result<f64, ExperimentError> {
     let stages = [stage.clone()].into_iter().map(|stage| Stage { integrator: setting::longest(), ..stage });
     asked.stages = stages.collect();
     let one_percent =
-        estimates(&asked)?.first().and_then(|estimate| estimate.one_percent).unwrap_or(f64::INFINITY);
+        estimates(&asked)?.known.first().and_then(|estimate| estimate.one_percent).unwrap_or(f64::INFINITY);
     Ok(stage.dt.min(one_percent / LONGEST_BEGIN))
 }
 

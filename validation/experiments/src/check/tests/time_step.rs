@@ -12,7 +12,7 @@ fn estimated(model: &str, density: f64, stages: &[(&str, f64)]) -> Vec<StepEstim
             "[[stage]]\nname = \"{integrator}\"\nsteps = 5\ndt = {dt}\nintegrator = \"{integrator}\"\n"
         );
     }
-    let found = estimates(&scene(model, &text).unwrap()).unwrap();
+    let found = estimates(&scene(model, &text).unwrap()).unwrap().known;
     assert_eq!(found.len(), stages.len(), "{found:?}");
     found
 }
@@ -47,7 +47,7 @@ fn units_of_energy_change_no_estimate() {
         let text = format!(
             "title = \"t\"\nmodel = \"m.toml\"\nkT = {kt:?}\nseed = 7\nbox = 6.0\ndensity = 20.0\nsteps = 5\ndt = {dt}\n"
         );
-        estimates(&scene(&gas, &text).unwrap()).unwrap().remove(0)
+        estimates(&scene(&gas, &text).unwrap()).unwrap().known.remove(0)
     };
     let (cold, hot) = (of(1.0, 0.01, 0.1), of(4.0, 0.005, 0.2));
     assert!(
@@ -100,5 +100,23 @@ fn long_steps_are_tried() {
         assert!(worst.contains(&found.carried), "{found:?}");
         let advised = found.one_percent.unwrap();
         assert!(advised * found.mean_frequency.unwrap() < 1.3 && advised > 0.04, "{found:?}");
+    }
+}
+
+/// What has no estimate says why: without drag, where forces reach so far that no piece is small, and without particles.
+#[test]
+fn a_step_without_estimate_says_why() {
+    let far = "title = \"t\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 1\nrange = 6\n\
+               [[thermostat]]\ngamma = 1\nrange = 1\n";
+    for (model, more, expected) in [
+        (SOFT, "thermostat = false\nintegrator = \"force-gradient\"\n", "nothing takes the heat"),
+        (far, "", "more than 6000 particles"),
+    ] {
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = 14.0\ndensity = 3.0\nsteps = 5\ndt = 0.12\n{more}"
+        );
+        let found = estimates(&scene(model, &text).unwrap()).unwrap();
+        let [unknown] = &found.unknown[..] else { panic!("{found:?}") };
+        assert!(found.known.is_empty() && unknown.why.contains(expected), "{found:?}");
     }
 }
