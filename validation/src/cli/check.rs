@@ -2,10 +2,10 @@ use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_dynamics::run::bytes_per_particle;
 use psidpd_experiments::check::{
-    Cost, Findings, Severity, StepEstimate, Steps, Warning, check, cost, estimates,
+    Cost, Findings, Flow, Severity, StepEstimate, Steps, Warning, check, cost, estimates, flow_of_scene,
 };
 use psidpd_formats::memory::{self, shown};
-use psidpd_report::quantity::{decimal, number};
+use psidpd_report::quantity::{decimal, number, with_error};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
 #[derive(Debug, clap::Args)]
@@ -50,7 +50,7 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
     let (mut too_far, mut too_large) = (None, None);
-    let mut mixtures = Vec::new();
+    let (mut mixtures, mut flow_of_fluid) = (Vec::new(), None);
     let (model, kt, densities, steps, taken) = if document.root().get("model").is_some() {
         let scene = arguments.settings.scene(&arguments.file)?;
         let densities = scene.densities();
@@ -63,6 +63,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
         let steps = if too_far.is_none() { estimates(&scene)? } else { Steps::default() };
         let taken = if too_far.is_none() { cost(&scene).ok() } else { None };
+        flow_of_fluid = Some(flow_of_scene(&scene));
         (scene.model.clone(), scene.kt, Some(densities), steps, taken)
     } else {
         let (model, kt) = arguments.settings.model(&arguments.file)?;
@@ -77,6 +78,12 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         cost: taken,
         ..check(&model, kt, densities.as_deref())?
     };
+    if let Some(flow) = flow_of_fluid
+        && arguments.kt.is_none()
+        && arguments.density.is_empty()
+    {
+        findings.flow = flow;
+    }
     if let Some(warning) = too_long(&findings.steps) {
         findings.warnings.push(warning);
         findings.warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
@@ -183,6 +190,22 @@ fn print_step(step: &StepEstimate, which: &str) {
     );
 }
 
+fn print_flow(flow: &Flow) {
+    let shown = |[x, error]: [f64; 2]| with_error(x, Some(error));
+    let more = match (flow.diffusion, flow.schmidt) {
+        (Some(d), Some(sc)) => format!(", diffusion coefficient {}, Schmidt number {}", shown(d), shown(sc)),
+        _ => String::new(),
+    };
+    let how = if flow.interpolated { "between measured drags" } else { "measured" };
+    say!(
+        "viscosity     {}{more} ({how}: {}, density {}, gamma {}, short steps; docs/choosing.md)",
+        shown(flow.viscosity),
+        flow.fluid,
+        decimal(flow.density, 3),
+        number(flow.gamma)
+    );
+}
+
 fn print(findings: &Findings, species: &[String]) {
     if let Some(reference) = &findings.reference {
         say!("reference     {reference}");
@@ -213,6 +236,9 @@ fn print(findings: &Findings, species: &[String]) {
     }
     for line in &findings.theory {
         say!("theory        {line}");
+    }
+    if let Some(flow) = &findings.flow {
+        print_flow(flow);
     }
     if let Some(Cost { particles, steps, bytes, seconds }) = findings.cost {
         say!(

@@ -1,5 +1,6 @@
 use super::cost::Cost;
 use super::timestep::{StepEstimate, UnknownStep};
+use super::viscosity::Flow;
 use psidpd_core::theory::Stability;
 use serde::Serialize;
 
@@ -22,6 +23,8 @@ pub struct Findings {
     pub theory: Vec<String>,
     /// What a scene takes on this machine; none for a model alone.
     pub cost: Option<Cost>,
+    /// Viscosity and diffusion, if they are those of a measured fluid.
+    pub flow: Option<Flow>,
     /// What cannot work, or may surprise.
     pub warnings: Vec<Warning>,
 }

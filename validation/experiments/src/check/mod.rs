@@ -4,11 +4,13 @@
 mod cost;
 mod findings;
 mod timestep;
+mod viscosity;
 mod warnings;
 
 pub use cost::{Cost, cost};
 pub use findings::{Findings, Severity, Warning};
 pub use timestep::{StepEstimate, Steps, UnknownStep, estimates};
+pub use viscosity::{Flow, flow, flow_of_scene};
 pub use warnings::uncalibrated;
 
 use crate::ExperimentError;
@@ -57,6 +59,7 @@ pub fn check(model: &Model, kt: f64, densities: Option<&[f64]>) -> Result<Findin
         steps: Vec::new(),
         unknown_steps: Vec::new(),
         cost: None,
+        flow: flow(&fluid, 1.0, densities.and_then(one)),
         theory: prediction.map_or(Vec::new(), |p| p.summary()),
         warnings: found,
     })

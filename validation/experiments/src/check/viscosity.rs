@@ -1,0 +1,162 @@
+//! Measured viscosities of usual fluids against drag.
+//!
+//! Kinetic theory of particles that are not correlated, η = 45 kT/(4πγr_c³) + 2πγρ²r_c⁵/1575, is several times too high at strong drag.
+//! So nothing is computed here: a fluid of the table has what was measured at its drag, or between rows what lies between them, and
+//! nothing is said of other fluids and beyond the rows. In units of r_c, kT and the mass m.
+
+use psidpd_core::model::Fluid;
+use psidpd_core::model::pair::PairPotential;
+use psidpd_dynamics::integrator::Integrator;
+use psidpd_dynamics::scene::Scene;
+use serde::Serialize;
+
+/// A value and its error.
+type Value = [f64; 2];
+
+/// What periodic Poiseuille flow and mean square displacements gave at a drag.
+struct Row {
+    gamma: f64,
+    viscosity: Value,
+    diffusion: Option<Value>,
+}
+
+const fn row(gamma: f64, viscosity: Value, diffusion: Option<Value>) -> Row {
+    Row { gamma, viscosity, diffusion }
+}
+
+struct Usual {
+    name: &'static str,
+    /// a r_c/kT of the soft repulsion a (1 − r/r_c).
+    repulsion: f64,
+    density: f64,
+    /// By rising drag.
+    rows: &'static [Row],
+}
+
+const USUAL: &[Usual] = &[
+    Usual {
+        name: "no forces",
+        repulsion: 0.0,
+        density: 3.0,
+        rows: &[
+            row(4.5, [1.23, 0.03], Some([0.711, 0.005])),
+            row(100.0, [1.61, 0.03], Some([0.098, 0.001])),
+            row(1000.0, [9.1, 0.2], None),
+        ],
+    },
+    Usual {
+        name: "standard DPD, a = 25",
+        repulsion: 25.0,
+        density: 3.0,
+        rows: &[row(4.5, [0.823, 0.009], Some([0.290, 0.003])), row(100.0, [2.51, 0.10], None)],
+    },
+];
+
+/// Strengths and densities that differ by less are the same.
+const SAME: f64 = 0.01;
+
+/// Shear thinning, and the finite size of the boxes: a relative error beside those of the table.
+const SYSTEMATIC: f64 = 0.05;
+
+/// The guide's values for a fluid, in its own units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Flow {
+    /// The fluid of the table, and its density.
+    pub fluid: &'static str,
+    pub density: f64,
+    pub gamma: f64,
+    /// η, D and Sc = η/ρmD, each with its error.
+    pub viscosity: Value,
+    pub diffusion: Option<Value>,
+    pub schmidt: Option<Value>,
+    /// Whether the drag is between two of the table.
+    pub interpolated: bool,
+}
+
+/// The measured viscosity of the fluid of a scene at its density, if all its stages have the drag of the model.
+pub fn flow_of_scene(scene: &Scene) -> Option<Flow> {
+    let drags = |i: &Integrator| !matches!(i, Integrator::LoweAndersen | Integrator::MonteCarlo { .. });
+    let usual = scene.stages.iter().all(|s| s.thermostat && s.kt == scene.kt && drags(&s.integrator));
+    let ([mass], [density]) = (&scene.mass[..], &scene.densities()[..]) else { return None };
+    usual.then(|| flow(&scene.model.at(scene.kt).ok()?, *mass, Some(*density)))?
+}
+
+/// The measured viscosity of a fluid of particles of a mass; without a density, at that of the table.
+pub fn flow(fluid: &Fluid, mass: f64, density: Option<f64>) -> Option<Flow> {
+    let [Some(drag)] = &fluid.thermostats[..] else { return None };
+    let (repulsion, range) = repulsion(fluid, drag.range)?;
+    if fluid.dimensions != 3 || drag.exponent != 1.0 || (drag.range / range - 1.0).abs() > 1e-9 {
+        return None;
+    }
+    let near = |x: f64, y: f64| (x - y).abs() <= SAME * y;
+    let same = |usual: &&Usual| {
+        near(repulsion, usual.repulsion) && density.is_none_or(|rho| near(rho * range.powi(3), usual.density))
+    };
+    let usual = USUAL.iter().find(same)?;
+    let speed = (fluid.kt / mass).sqrt();
+    let gamma = drag.gamma * range / (mass * speed);
+    let interpolated = !usual.rows.iter().any(|row| row.is_at(gamma));
+    let widened = |[x, error]: Value| [x, error.hypot(SYSTEMATIC * x)];
+    let viscosity = widened(between(usual.rows, gamma, |row| Some(row.viscosity))?);
+    let diffusion = between(usual.rows, gamma, |row| row.diffusion).map(widened);
+    let times = |value: Value, unit: f64| value.map(|x| x * unit);
+    Some(Flow {
+        fluid: usual.name,
+        density: usual.density / range.powi(3),
+        gamma: drag.gamma,
+        viscosity: times(viscosity, mass * speed / (range * range)),
+        diffusion: diffusion.map(|d| times(d, range * speed)),
+        schmidt: diffusion.map(|d| schmidt(viscosity, d, usual.density)),
+        interpolated,
+    })
+}
+
+/// η/ρD in units of the table.
+fn schmidt(viscosity: Value, diffusion: Value, density: f64) -> Value {
+    let value = viscosity[0] / diffusion[0] / density;
+    [value, value * (viscosity[1] / viscosity[0]).hypot(diffusion[1] / diffusion[0])]
+}
+
+/// The repulsion of a fluid that has no other forces, and its range; without repulsion, that of the drag.
+fn repulsion(fluid: &Fluid, drag: f64) -> Option<(f64, f64)> {
+    match (&fluid.densities[..], &fluid.pairs[..]) {
+        ([], []) => Some((0.0, drag)),
+        ([], [pair]) => {
+            let PairPotential::Soft(soft) = &pair.potential else { return None };
+            let range = if soft.strength == 0.0 { drag } else { soft.range };
+            Some((soft.strength * range / fluid.kt, range))
+        }
+        _ => None,
+    }
+}
+
+impl Row {
+    fn is_at(&self, gamma: f64) -> bool {
+        (self.gamma / gamma - 1.0).abs() < 1e-9
+    }
+}
+
+/// A value at a drag: that of a row, or between rows the straight line in logarithms. The distance of the line from the parabola through
+/// a third row is part of the error, so nothing is said between two rows alone.
+fn between(rows: &[Row], gamma: f64, of: impl Fn(&Row) -> Option<Value>) -> Option<Value> {
+    if let Some(row) = rows.iter().find(|row| row.is_at(gamma)) {
+        return of(row);
+    }
+    let above = rows.iter().position(|row| row.gamma > gamma).filter(|k| *k > 0)?;
+    let below = above - 1;
+    let others = [above + 1, below.wrapping_sub(1)].into_iter().filter_map(|k| rows.get(k));
+    let far = |row: &&Row| (row.gamma / gamma).ln().abs();
+    let third = others.min_by(|a, b| far(a).total_cmp(&far(b)))?;
+    let point = |row: &Row| of(row).map(|[value, error]| (row.gamma.ln(), value.ln(), error / value));
+    let ((a, fa, ea), (b, fb, eb), (c, fc, _)) = (point(&rows[below])?, point(&rows[above])?, point(third)?);
+    let x = gamma.ln();
+    let share = (x - a) / (b - a);
+    let line = |x: f64| fa + (fb - fa) * (x - a) / (b - a);
+    let curved = (fc - line(c)) * (x - a) * (x - b) / ((c - a) * (c - b));
+    let measured = ((1.0 - share) * ea).hypot(share * eb);
+    let found = line(x).exp();
+    Some([found, found * measured.hypot(curved.exp_m1())])
+}
+
+#[cfg(test)]
+mod tests;
