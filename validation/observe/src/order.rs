@@ -12,8 +12,11 @@
 //! S_ij is the product of the bond-order vectors q_6m of the two (Steinhardt, Nelson and Ronchetti, Phys. Rev. B 28, 784 (1983)),
 //! and c_i the mean product by which ten Wolde, Ruiz-Montero and Frenkel, J. Chem. Phys. 104, 9932 (1996), tell solid particles
 //! from liquid ones; in two dimensions cos 6θ takes the place of P₆. c is near 0.1 in liquids, and 0.5 to 1 in crystals, whichever
-//! their lattice, also where grains, drops or slabs have no common direction. Distances from the neighbours of the
-//! start leave out drift and rotation.
+//! their lattice, also where grains, drops or slabs have no common direction. Distances from neighbours leave out drift and
+//! rotation.
+//!
+//! A run may crystallise at any time. So displacements count from the start while they are small, and else from a later sample, that
+//! at which they were found to be large; and a run that was a liquid and is ordered has become a crystal, wherever its particles go.
 
 use crate::meter::linked::density_of_densest_tenth;
 use psidpd_core::engine::PeriodicBox;
@@ -34,6 +37,9 @@ const SHARE: [f64; 2] = [0.5, 0.3];
 /// The largest root mean square displacement in a crystal, in distances of neighbours: twice that of vibrations by Lindemann's rule at
 /// melting, as it is a difference of four positions.
 const CAGE: f64 = 0.35;
+
+/// After a larger one particles are followed anew.
+const GONE: f64 = 2.0 * CAGE;
 
 /// The largest growth of the mean square displacement in a crystal while the time doubles; diffusion has 2.
 const GROWTH: f64 = 1.4;
@@ -62,11 +68,16 @@ pub struct Sight<'a> {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Order {
     samples: u64,
+    /// The sample from which particles are followed, and its time.
+    since: u64,
     start: f64,
     dimensions: usize,
     probes: Vec<Probe>,
-    /// The last two looks, at times one of which is twice the other.
+    /// The last two looks since then, at times one of which is twice the other.
     looks: Vec<Look>,
+    /// The share of ordered particles: at the last two looks, and the least of all.
+    ordered: [f64; 2],
+    least: f64,
 }
 
 /// A particle that is followed.
@@ -76,7 +87,7 @@ struct Probe {
     neighbours: Vec<Neighbour>,
 }
 
-/// A neighbour at the first sample.
+/// A neighbour at the sample from which particles are followed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Neighbour {
     tag: i32,
@@ -90,7 +101,7 @@ struct Look {
     time: f64,
     /// The share of ordered particles.
     ordered: f64,
-    /// The mean square change of distances from the neighbours of ordered particles, in squares of the distance of neighbours.
+    /// The mean square change of distances from the neighbours, the median of ordered particles, in squares of the distance of neighbours.
     square: f64,
     /// The time of a free flight from neighbour to neighbour.
     flight: f64,
@@ -101,7 +112,13 @@ struct Look {
 pub struct Crystal {
     /// The share of ordered particles.
     pub ordered: f64,
-    /// The root mean square displacement of these against their neighbours, in distances of neighbours.
+    /// How these stay in place; `None` where the run has become a crystal, and not long been one.
+    pub stays: Option<Stays>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stays {
+    /// The root mean square displacement of ordered particles against their neighbours, in distances of neighbours.
     pub displacement: f64,
     /// The time over which they were followed.
     pub time: f64,
@@ -110,12 +127,15 @@ pub struct Crystal {
 impl Crystal {
     /// A remark beside an observable that assumes a liquid.
     pub fn note(&self) -> String {
+        let how = match self.stays {
+            Some(Stays { displacement, time }) => format!(
+                "and after a time of {time:.3} these are {displacement:.3} of the distance between neighbours from their places"
+            ),
+            None => "and before they had not: the run has crystallised".to_owned(),
+        };
         format!(
-            "The particles are a crystal, and this assumes a liquid: {:.0} % of them have ordered neighbours, and after a time of \
-             {:.3} these are {:.3} of the distance between neighbours from their places.",
-            100.0 * self.ordered,
-            self.time,
-            self.displacement
+            "The particles are a crystal, and this assumes a liquid: {:.0} % of them have ordered neighbours, {how}.",
+            100.0 * self.ordered
         )
     }
 }
@@ -175,7 +195,9 @@ impl Order {
     /// Takes a sample; `moves` tells mobile particles from frozen ones, which do not count.
     pub fn sample(&mut self, sight: &Sight, moves: impl Fn(usize) -> bool) {
         self.samples = self.samples.saturating_add(1);
-        if !self.samples.is_power_of_two() {
+        // Few looks, however long the run.
+        let (passed, unit) = (self.samples.saturating_sub(self.since), (self.since / 2).max(1));
+        if self.samples > 1 && !(passed.is_multiple_of(unit) && (passed / unit).is_power_of_two()) {
             return;
         }
         let rho = density_of_densest_tenth(sight.x, sight.domain, sight.dimensions, sight.range, &moves);
@@ -187,18 +209,28 @@ impl Order {
         let widths = (0..sight.dimensions).map(|k| sight.domain.height(k));
         reach = widths.fold(reach, f64::min);
         if self.samples == 1 {
+            self.least = 1.0;
             self.begin(sight, &moves, reach);
         }
-        if let Some(look) = self.look(sight, &moves, reach) {
-            if self.looks.len() > 1 {
-                self.looks.remove(0);
+        let look = self.look(sight, &moves, reach);
+        let ordered = look.map_or(0.0, |look| look.ordered);
+        self.ordered = [self.ordered[1], ordered];
+        self.least = self.least.min(ordered);
+        match look.filter(|look| look.square.sqrt() <= GONE) {
+            Some(look) => {
+                if self.looks.len() > 1 {
+                    self.looks.remove(0);
+                }
+                self.looks.push(look);
             }
-            self.looks.push(look);
+            None if self.samples > 1 => self.begin(sight, &moves, reach),
+            None => {}
         }
     }
 
     fn begin(&mut self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) {
-        (self.start, self.dimensions) = (sight.time, sight.dimensions);
+        (self.since, self.start, self.dimensions) = (self.samples, sight.time, sight.dimensions);
+        self.looks.clear();
         let mut mobile: Vec<usize> = (0..sight.x.len()).filter(|k| moves(*k)).collect();
         mobile.sort_unstable_by_key(|k| sight.tags[*k]);
         let chosen = mobile.iter().copied().step_by(mobile.len().div_ceil(PROBES).max(1));
@@ -236,7 +268,7 @@ impl Order {
             Some(a.iter().map(each).sum::<f64>())
         };
         let own: HashMap<usize, f64> = all.keys().filter_map(|k| Some((*k, product(*k, *k)?))).collect();
-        let (mut ordered, mut square, mut spacing) = (0.0, 0.0, 0.0);
+        let (mut ordered, mut of_each, mut spacing) = (0.0, Vec::new(), 0.0);
         for probe in &self.probes {
             let Some((k, list)) = at(&probe.tag).and_then(|k| Some((k, of_probes.get(&k)?))) else {
                 continue;
@@ -253,14 +285,17 @@ impl Order {
             if c > ORDERED {
                 ordered += 1.0;
                 spacing += distance;
-                square += squares.iter().sum::<f64>() / squares.len() as f64 / (distance * distance);
+                of_each.push(squares.iter().sum::<f64>() / squares.len() as f64 / (distance * distance));
             }
         }
+        // The median: vapour that came by or went is far from where it was.
+        of_each.sort_unstable_by(f64::total_cmp);
+        let square = of_each.get(of_each.len() / 2).copied().unwrap_or(f64::NAN);
         let share = ordered / self.probes.len() as f64;
         let look = Look {
             time: sight.time - self.start,
             ordered: share,
-            square: square / ordered,
+            square,
             flight: spacing / ordered / sight.speed,
         };
         (ordered > 0.0 && [look.time, look.square, look.flight].iter().all(|x| x.is_finite())).then_some(look)
@@ -268,14 +303,21 @@ impl Order {
 
     /// The crystal, if the run is one and was long enough to tell.
     pub fn crystal(&self) -> Option<Crystal> {
-        let [before, last] = self.looks[..] else { return None };
-        let resolved = self.samples >= LEAST_SAMPLES && last.time >= LEAST_FLIGHTS * last.flight;
-        let stays = last.square.sqrt() <= CAGE && last.square <= GROWTH * before.square;
-        (resolved && stays && last.ordered >= SHARE[usize::from(self.dimensions > 2)]).then_some(Crystal {
-            ordered: last.ordered,
-            displacement: last.square.sqrt(),
-            time: last.time,
-        })
+        let share = SHARE[usize::from(self.dimensions > 2)];
+        let ordered = self.ordered[1];
+        if self.samples < LEAST_SAMPLES || ordered < share {
+            return None;
+        }
+        let followed = self.samples.saturating_sub(self.since) >= LEAST_SAMPLES - 1;
+        let stays = match self.looks[..] {
+            [before, last] if followed && last.time >= LEAST_FLIGHTS * last.flight => {
+                (last.square.sqrt() <= CAGE && last.square <= GROWTH * before.square)
+                    .then(|| Stays { displacement: last.square.sqrt(), time: last.time })
+            }
+            _ => None,
+        };
+        let became = self.ordered[0] >= share && self.least < 0.5 * share;
+        (stays.is_some() || became).then_some(Crystal { ordered, stays })
     }
 }
 

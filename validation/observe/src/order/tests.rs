@@ -94,10 +94,11 @@ fn lattices_that_vibrate_are_crystals() {
                 x
             });
             let found = found.unwrap_or_else(|| panic!("{nearest} {width}: {:?}", stage.order.looks));
-            assert!(found.ordered > 0.9 && found.displacement < 0.35, "{found:?}");
+            let displacement = found.stays.unwrap().displacement;
+            assert!(found.ordered > 0.9 && displacement < 0.35, "{found:?}");
             // The positions of two particles at two times, along the line between them.
             let expected = 2.0 * width;
-            assert!((found.displacement / expected - 0.9).abs() < 0.15, "{width}: {found:?}");
+            assert!((displacement / expected - 0.9).abs() < 0.15, "{width}: {found:?}");
         }
     }
 }
@@ -179,6 +180,44 @@ fn liquids_glasses_and_short_runs_are_none() {
     assert!(walled.order.looks.iter().all(|look| look.ordered < 0.05), "{:?}", walled.order.looks);
 }
 
+/// A gas that becomes a crystal early, in the middle and late in a run, in space and in the plane; a crystal that becomes a gas is none.
+#[test]
+fn what_crystallises_during_a_run_is_a_crystal() {
+    let mut rng = StdRng::seed_from_u64(7);
+    let height = 0.75f64.sqrt();
+    let plane = (0..168).map(|k| {
+        let row = k / 12;
+        [(k % 12) as f64 + 0.5 * (row % 2) as f64, row as f64 * height, 0.0]
+    });
+    let cases =
+        [(lattice(BCC, [6, 6, 6]), [6.0; 3], 3), (plane.collect::<Vec<_>>(), [12.0, 14.0 * height, 1.0], 2)];
+    for (sites, lengths, dimensions) in cases {
+        let show = |freezes: bool, at: usize, rng: &mut StdRng| {
+            let mut stage = Stage::new(lengths, dimensions);
+            for k in 0..200 {
+                let x = match (k < at) == freezes {
+                    true => random(sites.len(), lengths, rng)
+                        .iter()
+                        .map(|x| [x[0], x[1], if dimensions == 2 { 0.0 } else { x[2] }])
+                        .collect(),
+                    false => shaken(&sites, 0.05, dimensions, rng),
+                };
+                stage.show(&x, 0, rng);
+            }
+            stage.order.crystal()
+        };
+        for at in [0, 3, 20, 60, 90] {
+            let found = show(true, at, &mut rng);
+            assert!(
+                found.is_some_and(|c| c.ordered > 0.9 && c.note().contains("are a crystal")),
+                "{at}: {found:?}"
+            );
+            assert!(at > 20 || found.is_some_and(|c| c.stays.is_some()), "{at}: {found:?}");
+            assert_eq!(show(false, at, &mut rng), None, "{at}");
+        }
+    }
+}
+
 /// A run that continues from a checkpoint ends with the same.
 #[test]
 fn order_comes_back_from_a_checkpoint() {
@@ -194,5 +233,5 @@ fn order_comes_back_from_a_checkpoint() {
             }
         }
     }
-    assert!(whole.order == parts.order && whole.order.crystal().is_some());
+    assert!(whole.order == parts.order && whole.order.crystal().is_some_and(|c| c.stays.is_some()));
 }
