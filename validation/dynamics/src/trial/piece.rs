@@ -30,6 +30,9 @@ const SHORT: f64 = 0.45;
 const PRESSURES: usize = 100;
 const BETWEEN: u64 = 6;
 
+/// Samples of the pressure to each of the frequency, which scatters where the fastest are few.
+const LOOKS: usize = 10;
+
 /// Most trials of a search.
 const TRIALS: usize = 6;
 
@@ -134,7 +137,12 @@ impl Piece {
         let dt = SHORT / rates[0].max(0.1 * rates[1]).max(crossing);
         let mut samples = Vec::new();
         if dt.is_finite() {
-            for _ in 0..PRESSURES {
+            let mut frequencies = Vec::new();
+            for k in 0..PRESSURES {
+                if k % LOOKS == 0 {
+                    number += 3;
+                    frequencies.push(frequency(&run, &evaluator, number));
+                }
                 let made = run
                     .advance(BETWEEN - 1, dt, ACCURATE)
                     .and_then(|()| run.step(dt, ACCURATE, Want::TOTALS));
@@ -146,6 +154,7 @@ impl Piece {
                 let virial = run.scalar_pressure(run.conservative_pressure_tensor()) - flux;
                 samples.push([virial, run.potential_energy()]);
             }
+            rates[0] = frequencies.iter().sum::<f64>() / frequencies.len() as f64;
         }
         let ideal = run.len() as f64 * of.kt / state.domain.volume(run.dimensions());
         let mean = |k: usize| samples.iter().map(|s| s[k]).sum::<f64>() / samples.len().max(1) as f64;

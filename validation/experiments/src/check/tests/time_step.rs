@@ -109,12 +109,14 @@ fn a_step_without_estimate_says_why() {
     let far = "title = \"t\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 1\nrange = 6\n\
                [[thermostat]]\ngamma = 1\nrange = 1\n";
     for (model, more, expected) in [
-        (SOFT, "thermostat = false\nintegrator = \"force-gradient\"\n", "nothing takes the heat"),
-        (far, "", "more than 6000 particles"),
+        (
+            SOFT,
+            "[[stage]]\nname = \"alone\"\nsteps = 5\ndt = 0.12\nthermostat = false\nintegrator = \"force-gradient\"\n",
+            "nothing takes the heat",
+        ),
+        (far, "steps = 5\ndt = 0.12\n", "more than 6000 particles"),
     ] {
-        let text = format!(
-            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = 14.0\ndensity = 3.0\nsteps = 5\ndt = 0.12\n{more}"
-        );
+        let text = format!("title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = 14.0\ndensity = 3.0\n{more}");
         let found = estimates(&scene(model, &text).unwrap()).unwrap();
         let [unknown] = &found.unknown[..] else { panic!("{found:?}") };
         assert!(found.known.is_empty() && unknown.why.contains(expected), "{found:?}");
