@@ -203,6 +203,8 @@ fn follow(page: &str) -> usize {
                 assert!(run.stdout.contains("Loop time"), "{page}: {}", run.stdout);
             }
             "text" => results.hold_lines(page, &text),
+            // The table of viscosities is the data of `check`, and a test beside these compares the two.
+            "" if page == "docs/choosing.md" => {}
             "" => results.hold_numbers(page, &text),
             other => panic!("{page}: nothing follows blocks of {other}"),
         }
@@ -268,10 +270,10 @@ fn pages_and_templates_have_the_steps_of_the_table() {
         ),
         ("spline drop", vec![format!("{templates}/droplet.toml")]),
     ] {
-        let rows = table
+        let mut rows = table
             .lines()
             .filter(|line| line.starts_with(&format!("| {row}")) && line.matches('|').count() == 4);
-        let cell = rows.last().unwrap().split('|').nth(3).unwrap().trim();
+        let cell = rows.next_back().unwrap().split('|').nth(3).unwrap().trim();
         let step: f64 = cell.split([' ', ';']).next().unwrap().parse().unwrap();
         for scene in scenes {
             let found = long_steps(&read(&scene));
