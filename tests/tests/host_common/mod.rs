@@ -80,11 +80,11 @@ pub fn forces_equal_the_native_engine(runs: &Runs) {
         for (atom, x) in data.atoms.iter_mut().zip(&positions) {
             atom.x = *x;
         }
-        data.write(&folder.path().join("same.data")).unwrap();
-        let arguments = "forces --model model.toml --data same.data --kT 1 --json native.json";
+        data.write(&folder.path().join(format!("{ranks}.data"))).unwrap();
+        let arguments = format!("forces --model model.toml --data {ranks}.data --kT 1 --json {ranks}.json");
         let native = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
         assert!(native.status.success(), "{}", said(&native));
-        let native = std::fs::read_to_string(folder.path().join("native.json")).unwrap();
+        let native = std::fs::read_to_string(folder.path().join(format!("{ranks}.json"))).unwrap();
         let native: serde_json::Value = serde_json::from_str(&native).unwrap();
         let own: Vec<[f64; 3]> = serde_json::from_value(native["forces"].clone()).unwrap();
 
