@@ -147,8 +147,8 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
             all.to_vec()
         };
         assert_eq!(names, expected);
-        // With many particles the first forces take long: the stop requests include step 0.
-        for step in 0..STEPS {
+        // With many particles the first forces take long: the stop requests include step 0. The run below stops at the others.
+        for step in (0..STEPS).step_by(2) {
             let out = folder.path().join(format!("{step}"));
             interrupted(&scene, &out, Begin::New, step);
             assert_eq!(finished(&scene, &out, Begin::Resume), summary, "step {step}");
