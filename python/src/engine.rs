@@ -98,6 +98,8 @@ impl Engine {
             3 => positions.as_slice()?.as_chunks().0.to_vec(),
             _ => positions.as_slice()?.as_chunks().0.iter().map(|[x, y]| [*x, *y, 0.0]).collect(),
         };
+        // What lends the array ends in an abort if the array has moved meanwhile.
+        drop(positions);
         let kinds = self.kinds(types, count)?;
         let periodic = directions(periodic, self.dimensions)?;
         let domain = self.domain(r#box, periodic)?;

@@ -96,6 +96,8 @@ impl Model {
             )));
         }
         let densities = rho.as_slice()?.to_vec();
+        // What lends the array ends in an abort if the array has moved meanwhile.
+        drop(rho);
         if let Some(rho) = densities.iter().find(|rho| !(**rho >= 0.0 && rho.is_finite())) {
             return Err(wrong(format!(
                 "a density must be a finite number that is not negative, found {rho}"
@@ -123,8 +125,7 @@ impl Model {
         density: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = kT.py();
-        let temperatures = numbers(kT, "kT")?;
-        let temperatures = temperatures.as_slice()?.to_vec();
+        let temperatures = numbers(kT, "kT")?.as_slice()?.to_vec();
         let rows =
             py.detach(|| temperatures.iter().map(|kt| phases::row(&self.model, *kt, density)).collect());
         let rows: Vec<phases::Row> = Result::from_iter::<Vec<Result<_, _>>>(rows)?;
