@@ -271,15 +271,14 @@ impl Integrator {
         }
     }
 
+    /// How drag and noise act, where they are apart from the forces and may act at every few steps.
+    pub fn coupling(mut self) -> Option<Coupling> {
+        self.settings().coupling.copied()
+    }
+
     /// At every how many steps drag and noise act.
-    pub fn thermostat_every(&self) -> u64 {
-        match self {
-            Integrator::Aboba(coupling)
-            | Integrator::Baoab(coupling)
-            | Integrator::TwoStage { coupling, .. }
-            | Integrator::ForceGradient { coupling, .. } => coupling.every,
-            _ => 1,
-        }
+    pub fn thermostat_every(self) -> u64 {
+        self.coupling().map_or(1, |coupling| coupling.every)
     }
 
     pub fn has_time(&self) -> bool {

@@ -91,7 +91,7 @@ pub fn run(
     let mut runner = Runner::begin(scene, folder, begin)?;
     runner.set_threads(threads)?;
     fault.into_iter().for_each(|fault| runner.falsify(fault));
-    let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
+    let steps = scene.steps();
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
     runner.run_to_end(&mut |p| bar.set(p.step))?;
     Observed::read(folder)

@@ -116,8 +116,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let mut scene = settings.scene(path)?;
     let length = steps.map(|length| length.steps(&scene, out));
     if let Some(steps) = length {
-        let edits =
-            [&settings.edits[..], &Length::edit(steps, &scene).ok().into_iter().collect::<Vec<_>>()].concat();
+        let edits = [&settings.edits[..], &[Length::edit(steps, &scene)]].concat();
         scene = Settings { edits }.scene(path)?;
     }
     scene.precision = precision.or(scene.precision);
@@ -134,7 +133,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     runner.set_threads(*threads)?;
     // Before this line a signal ends the program at once, because nothing can be lost yet.
     let stop = watch_signals()?;
-    let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
+    let total = scene.steps();
     let made = tell_start(runner.start(), begin, out, total);
     say(&format!("forces by {}", runner.evaluation()));
     let bar = Progress::new().steps(&scene.title, total, made, runner.particles());

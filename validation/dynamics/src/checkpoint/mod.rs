@@ -81,10 +81,18 @@ impl Checkpoint {
     pub fn prolong(&mut self, identity: Identity) {
         self.identity = identity;
         self.finished = false;
-        if let Some(BeforeEnd { sums, last, rows }) = self.before_end.take() {
+        self.files = self.files_to_prolong();
+        if let Some(BeforeEnd { sums, last, .. }) = self.before_end.take() {
             (self.sums, self.last) = (sums, last);
-            self.files.extend(rows.map(|rows| (ROWS.to_owned(), rows)));
         }
+    }
+
+    /// What a longer run keeps of the files.
+    pub fn files_to_prolong(&self) -> BTreeMap<String, Written> {
+        let rows = self.before_end.as_ref().and_then(|end| end.rows);
+        let mut files = self.files.clone();
+        files.extend(rows.map(|rows| (ROWS.to_owned(), rows)));
+        files
     }
 }
 

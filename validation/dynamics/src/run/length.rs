@@ -41,9 +41,9 @@ impl Length {
     }
 
     /// The edit of a scene that gives its last stage this number of steps.
-    pub fn edit(steps: u64, scene: &Scene) -> Result<Edit, String> {
+    pub fn edit(steps: u64, scene: &Scene) -> Edit {
         let key = Identity::of_scene(scene).last_steps().map_or_else(|| "steps".into(), |(key, _)| key);
-        format!("{key}={steps}").parse()
+        Edit::new(&key, steps)
     }
 }
 

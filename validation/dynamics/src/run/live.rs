@@ -51,7 +51,7 @@ impl Live {
     }
 
     pub fn left(&self) -> u64 {
-        let all: u64 = self.scene.stages.iter().map(|stage| stage.steps).sum();
+        let all = self.scene.steps();
         all.saturating_sub(self.simulation.step_number())
     }
 

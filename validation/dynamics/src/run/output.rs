@@ -163,7 +163,7 @@ impl Output {
 
 /// The number of frames of a run at an interval.
 fn frames(scene: &Scene, every: u64) -> u64 {
-    1 + scene.stages.iter().map(|stage| stage.steps).sum::<u64>() / every
+    1 + scene.steps() / every
 }
 
 fn open_gsd(

@@ -14,6 +14,7 @@ use psidpd_core::engine::{Fault, Settings};
 use psidpd_formats::files::{Protected, open_inside, protect, there};
 use psidpd_formats::{About, memory};
 use psidpd_observe::Observers;
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
@@ -157,6 +158,8 @@ impl<'a> Runner<'a> {
         let lengths = identity.lengths(&good.identity);
         if lengths.is_some() {
             good.prolong(identity);
+            // Before its files change: a run that is killed before its next checkpoint can go on.
+            store.write(&good)?;
         }
         let mut simulation = scene.simulation_of_run(good.state.clone(), NonZeroUsize::MIN)?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
@@ -174,8 +177,7 @@ impl<'a> Runner<'a> {
         } else {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
             let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
-            let total: u64 = scene.stages.iter().map(|stage| stage.steps).sum();
-            let prolonged = lengths.map(|[before, now]| total - now + before);
+            let prolonged = lengths.map(|[before, now]| scene.steps() - now + before);
             let start = Start::Resumed { step: good.step, prolonged, program, instructions, fallback };
             (start, Some(Output::reopen(scene, &folder.path, &good)?))
         };
@@ -218,7 +220,7 @@ impl<'a> Runner<'a> {
             sums: good.sums,
             last: good.last,
             before_end: good.before_end.clone(),
-            steps: scene.stages.iter().map(|s| s.steps).sum(),
+            steps: scene.steps(),
             observers,
             watch: Watch::default(),
             clock: Clock::new(earlier, good.step),
@@ -315,7 +317,12 @@ fn usable(
         });
     }
     // A finished run no longer needs its files; the user may have moved them.
-    for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished || lengths.is_some()) {
+    let needed = match lengths {
+        Some(_) => checkpoint.files_to_prolong(),
+        None if checkpoint.finished => BTreeMap::new(),
+        None => checkpoint.files.clone(),
+    };
+    for (name, expected) in &needed {
         let file = out.join(name);
         let opened = open_inside(&file);
         let found = opened.as_ref().ok().and_then(|file| Some(file.metadata().ok()?.len()));

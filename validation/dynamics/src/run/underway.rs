@@ -134,7 +134,7 @@ impl Runner<'_> {
     ) -> Result<(), RunError> {
         let step = self.simulation.step_number();
         let thermo = totals.then(|| Thermo::of(&self.simulation, self.position.time));
-        if totals && !every(self.scene.output.thermo, step) {
+        if step == self.steps && !every(self.scene.output.thermo, step) {
             let rows = self.output.as_ref().and_then(Output::rows);
             self.before_end = Some(BeforeEnd { sums: self.sums, last: self.last, rows });
         }

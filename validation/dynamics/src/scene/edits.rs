@@ -25,13 +25,11 @@ impl FromStr for Edit {
 
     fn from_str(text: &str) -> Result<Edit, String> {
         let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
-        let (key, value) = (key.trim(), value.trim());
-        let path: Vec<String> =
-            key.replace('[', ".").replace(']', "").split('.').map(|part| part.trim().to_owned()).collect();
-        if path.iter().any(String::is_empty) || value.is_empty() {
+        let edit = Edit::new(key.trim(), value.trim());
+        if edit.path.iter().any(String::is_empty) || edit.value.is_empty() {
             return Err("expected KEY=VALUE, as kT=0.9 or stage.produce.dt=0.02".into());
         }
-        Ok(Edit { text: format!("{key}={value}"), path, value: value.to_owned() })
+        Ok(edit)
     }
 }
 
@@ -42,6 +40,13 @@ impl std::fmt::Display for Edit {
 }
 
 impl Edit {
+    pub fn new(key: &str, value: impl ToString) -> Edit {
+        let path = key.replace('[', ".").replace(']', "");
+        let path = path.split('.').map(|part| part.trim().to_owned()).collect();
+        let value = value.to_string();
+        Edit { text: format!("{key}={value}"), path, value }
+    }
+
     pub fn key(&self) -> &str {
         self.text.split('=').next().unwrap_or_default()
     }

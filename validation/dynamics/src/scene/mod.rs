@@ -166,6 +166,11 @@ impl Scene {
         Ok(scene)
     }
 
+    /// Number of steps of all stages.
+    pub fn steps(&self) -> u64 {
+        self.stages.iter().map(|stage| stage.steps).sum()
+    }
+
     /// The particles before the first step; a function of the file alone.
     pub fn initial_state(&self) -> State {
         fill::fill(self).0

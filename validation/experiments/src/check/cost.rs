@@ -32,7 +32,7 @@ pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
         [] => scene.initial_state().len(),
         parts => parts.iter().map(|p| p.count).sum(),
     };
-    let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
+    let steps = scene.steps();
     let each = if particles > LARGE {
         let sampling = Sampling {
             particles: SAMPLE,

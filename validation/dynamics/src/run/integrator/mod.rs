@@ -20,7 +20,7 @@ mod two_stage;
 mod velocity_verlet;
 
 use super::{Integrator, RunError, Simulation};
-use crate::integrator::Coupling;
+use crate::integrator::{Counterpart, Coupling};
 use psidpd_core::engine::Want;
 use psidpd_core::engine::noise::Law;
 use reflection::Path;
@@ -28,14 +28,8 @@ use reflection::Path;
 impl Integrator {
     /// The thermostat whose virial is part of the pressure before the first step, as `fix dpd/splitting` in LAMMPS has it at setup.
     pub(in crate::run) fn at_setup(self, system: &Simulation, want: Want) -> Option<Coupling> {
-        match self {
-            Integrator::Aboba(coupling)
-            | Integrator::TwoStage { coupling, .. }
-            | Integrator::ForceGradient { coupling, .. } => {
-                (want.virial && system.step_number() == 0).then_some(coupling)
-            }
-            _ => None,
-        }
+        let has_setup = matches!(self.properties().lammps, Counterpart::Splitting);
+        self.coupling().filter(|_| has_setup && want.virial && system.step_number() == 0)
     }
 
     /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.
