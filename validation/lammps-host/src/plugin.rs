@@ -127,7 +127,7 @@ fn builds_dir(root: &Path) -> PathBuf {
     let own = folders
         .clone()
         .zip(folders.skip(1))
-        .find(|(profile, target)| profile.ends_with("release") && target.join("CACHEDIR.TAG").is_file());
+        .find(|(profile, _)| profile.ends_with("release") && profile.join(".cargo-lock").is_file());
     own.map_or_else(|| root.join("target"), |(_, target)| target.to_owned())
 }
 

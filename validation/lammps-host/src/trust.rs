@@ -21,8 +21,8 @@ pub(super) fn checkout() -> Result<PathBuf, LammpsError> {
 fn is_built_in(root: &Path) -> bool {
     let Ok(program) = std::env::current_exe().and_then(fs::canonicalize) else { return false };
     let installed = program.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"psidpd"));
-    // Cargo marks its folders, which need not be in the checkout.
-    let built = program.ancestors().any(|folder| folder.join("CACHEDIR.TAG").is_file());
+    // Cargo locks the folders that it builds in, which need not be in the checkout.
+    let built = program.ancestors().any(|folder| folder.join(".cargo-lock").is_file());
     !installed || built || root.canonicalize().is_ok_and(|root| program.starts_with(root))
 }
 
