@@ -82,7 +82,7 @@ fn full_scenes_have_the_sizes_of_the_papers() {
     let mut found = 0;
     for path in scenes("scenes/full") {
         let scene = Scene::open(&path).unwrap_or_else(|e| panic!("{e}"));
-        let count: usize = scene.initial.parts().iter().map(|p| p.count).sum();
+        let count: usize = scene.initial.count();
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         if let Some((_, expected)) = counts.iter().find(|(n, _)| *n == name) {
             assert_eq!(count, *expected, "{name}");

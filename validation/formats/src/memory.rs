@@ -50,7 +50,7 @@ fn limits() -> Vec<(f64, &'static str)> {
     let machine = read_to_string("/proc/meminfo").ok().and_then(|text| left_on_machine(&text));
     let of_shell = getrlimit(Resource::As).current.map(|most| most as f64 - in_use().unwrap_or(0.0));
     let mut all = Vec::new();
-    all.extend(machine.map(|left| (left, "take fewer particles, or a machine with more memory")));
+    all.extend(machine.map(|left| (left, "take fewer particles or bins, or a machine with more memory")));
     all.extend(of_shell.map(|left| (left.max(0.0), "the limit of the shell (ulimit -v) allows no more")));
     let groups = read_to_string("/proc/self/cgroup").unwrap_or_default();
     let groups = groups.lines().flat_map(|line| left_in_groups(line, Path::new("/sys/fs/cgroup")));

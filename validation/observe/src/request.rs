@@ -21,6 +21,18 @@ pub struct Request {
     pub meter: AnyMeter,
 }
 
+impl Observe {
+    /// About how many bytes the samples of a run take. `steps` tells the steps of a stage.
+    pub fn bytes(&self, particles: f64, steps: impl Fn(&str) -> u64) -> f64 {
+        let of_request = |request: &Request| -> f64 {
+            let mut meter = request.meter.clone();
+            let samples = |stage: &String| (steps(stage) / request.every.max(1)) as f64;
+            request.stages.iter().map(|stage| meter.bytes(particles, samples(stage))).sum()
+        };
+        self.requests.iter().map(of_request).sum()
+    }
+}
+
 /// Reads `[observe]`.
 pub fn read(root: &Section, place: &Place) -> Result<Observe, FileError> {
     let Some(value) = root.get("observe") else { return Ok(Observe::default()) };

@@ -172,6 +172,11 @@ impl Series {
         self.block *= 2;
     }
 
+    /// The most bytes that it holds of so many samples.
+    pub fn bytes(&self, samples: f64) -> f64 {
+        (size_of::<f64>() * self.width) as f64 * (1.0 + samples.min(self.most as f64))
+    }
+
     pub fn len(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }

@@ -1,10 +1,10 @@
 use super::*;
 use psidpd_core::engine::check_reach;
-use psidpd_dynamics::run::bytes_per_particle;
+use psidpd_dynamics::run::check_memory;
 use psidpd_experiments::check::{
     Cost, Findings, Flow, Severity, StepEstimate, Steps, Warning, check, cost, estimates, flow_of_scene,
 };
-use psidpd_formats::memory::{self, shown};
+use psidpd_formats::memory::shown;
 use psidpd_report::quantity::{decimal, number, with_error};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
@@ -49,6 +49,7 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 
 pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
+    let progress = Progress::new();
     let (mut too_far, mut too_large) = (None, None);
     let (mut mixtures, mut flow_of_fluid) = (Vec::new(), None);
     let (model, kt, densities, steps, taken) = if document.root().get("model").is_some() {
@@ -58,11 +59,14 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
             mixtures = scene.mixtures();
         }
         let range = scene.model.at(scene.kt)?.cutoff();
-        let particles = scene.initial.parts().iter().map(|p| p.count).sum();
-        too_large = memory::check(particles, bytes_per_particle(&scene)).err();
+        let particles = scene.initial.count();
+        too_large = check_memory(&scene).err();
         too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
-        let steps = if too_far.is_none() { estimates(&scene)? } else { Steps::default() };
-        let taken = if too_far.is_none() { cost(&scene).ok() } else { None };
+        let (mut steps, mut taken) = (Steps::default(), None);
+        if too_far.is_none() {
+            steps = progress.spinner("trying timesteps", || estimates(&scene))?;
+            taken = progress.spinner("trying the scene", || cost(&scene)).ok();
+        }
         flow_of_fluid = Some(flow_of_scene(&scene));
         (scene.model.clone(), scene.kt, Some(densities), steps, taken)
     } else {
@@ -76,7 +80,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         steps: known,
         unknown_steps: unknown,
         cost: taken,
-        ..check(&model, kt, densities.as_deref())?
+        ..progress.spinner("mean field", || check(&model, kt, densities.as_deref()))?
     };
     if let Some(flow) = flow_of_fluid
         && arguments.kt.is_none()

@@ -19,7 +19,7 @@ pub struct Live {
 
 impl Live {
     pub fn new(scene: Scene, threads: NonZeroUsize) -> Result<Live, RunError> {
-        let particles = scene.initial.parts().iter().map(|part| part.count).sum();
+        let particles = scene.initial.count();
         memory::check(particles, memory::PARTICLE)?;
         let simulation = scene.simulation_of_run(scene.initial_state(), threads)?;
         let mut live = Live { scene, simulation, stage: 0, done: 0, begin: 0.0 };

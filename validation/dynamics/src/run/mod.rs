@@ -15,6 +15,7 @@ mod growing;
 mod integrator;
 mod length;
 mod live;
+mod memory;
 mod outcome;
 mod output;
 mod reorder;
@@ -34,13 +35,14 @@ pub use advice::Advice;
 pub use error::RunError;
 pub use length::Length;
 pub use live::Live;
+pub use memory::{bytes, check_memory};
 pub use outcome::{Outcome, Progress, Summary};
 pub use output::FILES;
 pub use reorder::INTERVAL as REORDERING;
 pub use runner::{Begin, Runner, Start, run_scene};
 pub use simulation::Simulation;
 pub use timing::{Iterations, Session, Timing};
-pub use watch::{Deviation, Thermometer, bytes_per_particle};
+pub use watch::{Deviation, Thermometer};
 
 #[cfg(test)]
 mod tests;

@@ -3,16 +3,14 @@ use super::folder::Folder;
 use super::output::{Output, has_begun, in_the_way, input_among, replaces};
 use super::timing::Clock;
 use super::watch::Watch;
-use super::{
-    Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, about, bytes_per_particle,
-};
+use super::{Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, about, check_memory};
 use crate::checkpoint::{
     BeforeEnd, Checkpoint, CheckpointError, Found, Held, Identity, Position, Store, Written,
 };
 use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
+use psidpd_formats::About;
 use psidpd_formats::files::{Protected, open_inside, protect, there};
-use psidpd_formats::{About, memory};
 use psidpd_observe::Observers;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -117,8 +115,7 @@ impl<'a> Runner<'a> {
         {
             return Err(RunError::OwnInput { path: path.clone() });
         }
-        let particles = scene.initial.parts().iter().map(|part| part.count).sum();
-        memory::check(particles, bytes_per_particle(scene))?;
+        check_memory(scene)?;
         let state = scene.initial_state();
         let simulation = scene.simulation_of_run(state.clone(), NonZeroUsize::MIN)?;
         store.clear()?;

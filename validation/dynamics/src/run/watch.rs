@@ -11,9 +11,8 @@
 
 use super::advice::MOST;
 use super::{RunError, Simulation};
-use crate::scene::{Scene, Stage};
+use crate::scene::Stage;
 use psidpd_core::engine::pair_sums::Evaluator;
-use psidpd_formats::memory::PARTICLE;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
 use psidpd_observe::statistics::MINIMUM_SAMPLES;
@@ -22,7 +21,7 @@ use std::fmt;
 
 /// Largest and smallest number of steps between samples.
 const INTERVAL: u64 = 250;
-const LEAST: u64 = 10;
+pub(super) const LEAST: u64 = 10;
 
 /// Target number of samples in a short stage.
 const SAMPLES: u64 = 24;
@@ -59,13 +58,6 @@ const FACES: f64 = 1.2;
 /// A stage of at least this many steps is sampled for its configurational temperature. If the thermostat
 /// keeps velocities right at any time step, only this temperature reveals a step that is too long.
 const WORTH_A_LOOK: u64 = 1000;
-
-/// Bytes per particle of the pairs of a thermostat, listed once, and of an evaluation for a configurational temperature.
-const PAIRS: f64 = 900.0;
-const EVALUATION: f64 = 2300.0;
-
-/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles.
-const APART: f64 = 1500.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
@@ -202,21 +194,6 @@ impl Configurational {
         let mean = (self.a - ratio * self.b) / self.blocks;
         (squares - self.blocks * mean * mean).max(0.0) * self.blocks / (self.blocks - 1.0)
     }
-}
-
-/// Bytes per particle at the peak of a run of a scene, about those of Warren's liquid (docs/bench.md). The watch lists the
-/// pairs of the thermostat; where there are few particles, watch or advice evaluate forces with all their pairs too.
-pub fn bytes_per_particle(scene: &Scene) -> f64 {
-    let particles: usize = scene.initial.parts().iter().map(|part| part.count).sum();
-    let heated = || scene.stages.iter().filter(|stage| stage.thermostat && stage.integrator.has_time());
-    let pairs = if heated().any(|stage| !stage.integrator.properties().drag_in_forces) {
-        APART
-    } else if particles <= MOST || heated().any(|stage| stage.steps >= LEAST) {
-        PAIRS
-    } else {
-        0.0
-    };
-    PARTICLE + pairs + if particles <= MOST { EVALUATION } else { 0.0 }
 }
 
 impl Watch {
@@ -488,18 +465,6 @@ mod tests {
         };
         let (right, high, low) = (alarms(1.02, 1000), alarms(1.06, 200), alarms(0.94, 200));
         assert!(right <= 6 && high >= 190 && low >= 190, "{right} {high} {low}");
-    }
-
-    /// The pairs of all forces are stored for as many particles as watch and advice evaluate, and for no more.
-    #[test]
-    fn memory_counts_the_evaluations_of_the_watch() {
-        let bytes = |edge: f64| {
-            let text = format!(
-                "model = \"m.toml\"\nkT = 1.0\nbox = {edge:?}\ndensity = 6.05\ndt = 0.005\nsteps = 1000\n"
-            );
-            bytes_per_particle(&scene(SET6, &text).unwrap())
-        };
-        assert_eq!(bytes(4.0) - bytes(50.0), EVALUATION);
     }
 
     /// Forty seeds of a slab in the plane, where ∇²U nearly cancels and single configurations scatter by 15

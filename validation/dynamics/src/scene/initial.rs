@@ -32,6 +32,14 @@ impl Initial {
         }
     }
 
+    /// The number of particles.
+    pub fn count(&self) -> usize {
+        match self {
+            Initial::Parts(parts) => parts.iter().map(|part| part.count).sum(),
+            Initial::File { state, .. } => state.len(),
+        }
+    }
+
     /// The normal of the first slab that is not frozen, if there is one.
     pub fn slab_axis(&self) -> Option<usize> {
         self.parts().iter().filter(|part| !part.frozen).find_map(|part| part.normal)

@@ -1,10 +1,9 @@
 //! What a scene will take on this machine, from a short trial of it.
 
 use crate::bulk::{Bulk, Sampling};
-use psidpd_dynamics::run::{Begin, RunError, Runner, bytes_per_particle};
+use psidpd_dynamics::run::{Begin, RunError, Runner, bytes};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::temporary_folder;
-use psidpd_formats::memory;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -28,10 +27,7 @@ const SAMPLE: usize = 20_000;
 const TRIAL: Duration = Duration::from_millis(250);
 
 pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
-    let particles = match scene.initial.parts() {
-        [] => scene.initial_state().len(),
-        parts => parts.iter().map(|p| p.count).sum(),
-    };
+    let particles = scene.initial.count();
     let steps = scene.steps();
     let each = if particles > LARGE {
         let sampling = Sampling {
@@ -51,8 +47,7 @@ pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
     } else {
         trial(scene)?
     };
-    let bytes = memory::need(particles, bytes_per_particle(scene));
-    Ok(Cost { particles, steps, bytes, seconds: each * steps as f64 })
+    Ok(Cost { particles, steps, bytes: bytes(scene), seconds: each * steps as f64 })
 }
 
 /// Seconds of a step of the last stage.

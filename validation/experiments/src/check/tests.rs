@@ -81,6 +81,22 @@ fn bounds_are_those_of_the_variable_and_must_exclude_the_pole() {
     }
 }
 
+/// Bounds hold the part of each species: the pole of a sum stays open where two parts together reach it.
+#[test]
+fn bounds_of_parts_leave_a_pole_of_their_sum_open() {
+    let of = |high: f64| {
+        let text = format!(
+            "title = \"t\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\nbounds = [0, {high}]\n\
+             [excess_free_energy]\nA = \"-kT*ln(1 - 0.1*n)\"\nB = \"n^2\"\n"
+        );
+        // Nearly pure A never reaches the pole within the bounds.
+        let findings = found(&text, 1.0, Some(vec![5.9, 0.1]));
+        findings.warnings.iter().filter(|w| w.id == "singular").map(|w| w.severity).collect::<Vec<_>>()
+    };
+    assert_eq!(of(9.5), [Severity::Warning]);
+    assert_eq!(of(4.9), [Severity::Note]);
+}
+
 /// A particle without neighbours has the corrected density that the correction gives it.
 #[test]
 fn corrected_densities_keep_particles_from_the_origin() {

@@ -129,8 +129,10 @@ fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, Ex
         list.iter().any(|t| t.species == s.species && (t.density - s.density).abs() <= 1e-6 * s.density)
     };
     all.extend(singular_densities(&unbounded, &composition, range)?.into_iter().filter(|s| !among(&left, s)));
+    let corner = singular_in_sums(&bounded)?;
     let warnings = all.iter().enumerate().map(|(place, s)| {
         let excluded = place >= left.len();
+        let open = corner.contains(&s.species);
         let bounds: Vec<&str> = bounds_of(fluid, s.species);
         let name = &fluid.species[s.species];
         let (what, advice) = match s.kind {
@@ -153,18 +155,41 @@ fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, Ex
                 "{what}: bounds of {} put another psi in its place, and this density is nothing but that; lower the density",
                 bounds.join(", ")
             ),
+            (true, _) if open => format!(
+                "{what}; the bounds of {} hold for the part of each species, and a mixture of parts within them still reaches \
+                 it: a run can stop there; lower the upper bound to a share of the sum",
+                bounds.join(", ")
+            ),
             (true, _) => format!("{what}; the bounds of {} keep runs away from it", bounds.join(", ")),
             (false, true) => format!("{what}; {advice}"),
             (false, false) => format!("{what}; {advice} that leave it out: those of {} do not", bounds.join(", ")),
         };
         let severity = match (excluded, inside) {
             (_, true) => Severity::Error,
-            (true, false) => Severity::Note,
-            (false, false) => Severity::Warning,
+            (true, false) if !open => Severity::Note,
+            (_, false) => Severity::Warning,
         };
         Warning { id: "singular", severity, message }
     });
     Ok(warnings.collect())
+}
+
+/// The species whose ψ is singular in a mixture of equal parts that each are within the bounds: bounds hold the part of each
+/// species, not their sum.
+fn singular_in_sums(fluid: &Fluid) -> Result<Vec<usize>, ExperimentError> {
+    let count = fluid.species.len();
+    let highest = fluid
+        .densities
+        .iter()
+        .filter_map(|d| d.bounds)
+        .map(|bounds| bounds.high)
+        .filter(|high| high.is_finite());
+    let highest = highest.fold(0.0, f64::max);
+    if count == 1 || highest == 0.0 {
+        return Ok(Vec::new());
+    }
+    let found = singular_densities(fluid, &vec![1.0; count], [0.0, highest * count as f64])?;
+    Ok(found.iter().filter(|s| s.kind != SingularityKind::Origin).map(|s| s.species).collect())
 }
 
 /// The densities with bounds that ψ of `species` depends on.

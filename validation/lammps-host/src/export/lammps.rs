@@ -55,7 +55,7 @@ impl Default for Script<'_> {
 /// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
 pub fn write(scene: &Scene, out: &Path, existing: Existing) -> Result<Vec<PathBuf>, LammpsError> {
     let script = script_of(scene, Script::default())?;
-    let particles = scene.initial.parts().iter().map(|part| part.count).sum();
+    let particles = scene.initial.count();
     memory::check(particles, memory::PARTICLE)?;
     let _inputs = protect(scene.inputs());
     // No file is written unless all can be: existing files may be somebody's work.

@@ -54,8 +54,11 @@ impl Meter for Clusters {
         self.series.push(&[frame.view.time, count, largest, mean])
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
+    }
+
+    fn restart(&mut self) {
         self.distance.forget();
     }
 

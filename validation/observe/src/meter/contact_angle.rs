@@ -279,8 +279,11 @@ impl Meter for ContactAngle {
         self.series.push(&field)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
+    }
+
+    fn restart(&mut self) {
         self.distance.forget();
         self.found = None;
     }

@@ -76,8 +76,8 @@ impl Meter for DensityField {
         self.series.push(&field)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -267,9 +267,11 @@ impl Meter for Drop {
         self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares, percolates])
     }
 
-    fn forget(&mut self) {
-        self.shells.clear();
-        self.size.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.shells, &mut self.size]
+    }
+
+    fn restart(&mut self) {
         self.distance.forget();
     }
 

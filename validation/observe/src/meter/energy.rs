@@ -38,8 +38,8 @@ impl Meter for Energy {
         self.series.push(&all)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -42,8 +42,8 @@ impl Meter for InterfaceWidth {
         self.series.push(&counts)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -145,9 +145,12 @@ impl Meter for LocalDensity {
         self.series.push(&row)
     }
 
-    fn forget(&mut self) {
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
+    }
+
+    fn restart(&mut self) {
         self.found = None;
-        self.series.clear();
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -61,8 +61,16 @@ pub trait Meter: Sized {
     /// Takes a sample; returns false if the configuration allows none.
     fn sample(&mut self, frame: &Frame) -> bool;
 
-    /// Forgets every sample and keeps the settings.
-    fn forget(&mut self);
+    /// The series that hold its samples.
+    fn series(&mut self) -> Vec<&mut Series>;
+
+    /// Forgets what it keeps of samples apart from [`Meter::series`]; settings stay.
+    fn restart(&mut self) {}
+
+    /// About how many bytes so many samples of so many particles take.
+    fn bytes(&mut self, _particles: f64, samples: f64) -> f64 {
+        self.series().iter().map(|series| series.bytes(samples)).sum()
+    }
 
     fn finish(&self) -> Vec<Observation>;
 }
@@ -102,8 +110,16 @@ macro_rules! meters {
                 match self { $(AnyMeter::$variant(meter) => meter.sample(frame)),+ }
             }
 
+            /// Forgets every sample and keeps the settings.
             pub fn forget(&mut self) {
-                match self { $(AnyMeter::$variant(meter) => meter.forget()),+ }
+                match self { $(AnyMeter::$variant(meter) => {
+                    meter.series().into_iter().for_each(Series::clear);
+                    meter.restart();
+                }),+ }
+            }
+
+            pub fn bytes(&mut self, particles: f64, samples: f64) -> f64 {
+                match self { $(AnyMeter::$variant(meter) => meter.bytes(particles, samples)),+ }
             }
 
             pub fn finish(&self) -> Vec<Observation> {

@@ -161,11 +161,20 @@ impl Meter for Msd {
         self.record(x, &species, view.masses)
     }
 
-    fn forget(&mut self) {
+    fn series(&mut self) -> Vec<&mut Series> {
+        self.lags.iter_mut().chain([&mut self.diffusion]).collect()
+    }
+
+    fn restart(&mut self) {
         self.clock = Clock::default();
         self.origins.clear();
-        self.lags.iter_mut().for_each(Series::clear);
-        self.diffusion.clear();
+    }
+
+    fn bytes(&mut self, particles: f64, samples: f64) -> f64 {
+        let origins = (samples.min(self.length as f64) / self.spacing as f64).ceil();
+        let of_origin =
+            size_of::<[f64; 3]>() as f64 * particles + 8.0 * (self.length * self.species.len()) as f64;
+        origins * of_origin + self.series().iter().map(|series| series.bytes(samples)).sum::<f64>()
     }
 
     fn finish(&self) -> Vec<Observation> {

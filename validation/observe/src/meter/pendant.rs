@@ -184,8 +184,11 @@ impl Meter for Pendant {
         self.series.push(&counts)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
+    }
+
+    fn restart(&mut self) {
         self.distance.forget();
     }
 

@@ -112,8 +112,8 @@ impl Meter for Poiseuille {
         self.series.push(&sums)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

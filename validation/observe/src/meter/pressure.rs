@@ -46,8 +46,8 @@ impl Meter for Pressure {
         self.series.push(&[&total[..], &conservative, &carried, &[configurational]].concat())
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -108,8 +108,8 @@ impl<Q: Quantity> Meter for Profile<Q> {
         self.0.sample(frame)
     }
 
-    fn forget(&mut self) {
-        self.0.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.0.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

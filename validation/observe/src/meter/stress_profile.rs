@@ -72,8 +72,8 @@ impl Meter for StressProfile {
         self.pressures(frame).is_some_and(|sums| self.series.push(&sums))
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

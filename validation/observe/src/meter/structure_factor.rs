@@ -142,8 +142,8 @@ impl Meter for StructureFactor {
         self.series.push(&sums)
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

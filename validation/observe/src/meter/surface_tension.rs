@@ -100,9 +100,12 @@ impl Meter for SurfaceTension {
         self.series.push(&sample)
     }
 
-    fn forget(&mut self) {
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
+    }
+
+    fn restart(&mut self) {
         self.kt = 0.0;
-        self.series.clear();
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -39,8 +39,8 @@ impl Meter for Temperature {
         self.series.push(&[kinetic, squares, laplacian])
     }
 
-    fn forget(&mut self) {
-        self.series.clear();
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
     }
 
     fn finish(&self) -> Vec<Observation> {

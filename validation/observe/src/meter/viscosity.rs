@@ -101,10 +101,13 @@ impl Meter for Viscosity {
         self.record(frame.view.time, view.pressure, view.temperature)
     }
 
-    fn forget(&mut self) {
+    fn series(&mut self) -> Vec<&mut Series> {
+        vec![&mut self.series]
+    }
+
+    fn restart(&mut self) {
         self.clock = Clock::default();
         self.recent.clear();
-        self.series.clear();
     }
 
     fn finish(&self) -> Vec<Observation> {

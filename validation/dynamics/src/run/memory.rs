@@ -1,0 +1,87 @@
+//! The memory that a run of a scene takes.
+
+use super::advice::MOST;
+use super::watch::LEAST;
+use crate::scene::Scene;
+use psidpd_formats::memory::{self, MemoryError, PARTICLE};
+
+/// Bytes per particle of the pairs of a thermostat, listed once, and of an evaluation for a configurational temperature.
+const PAIRS: f64 = 900.0;
+const EVALUATION: f64 = 2300.0;
+
+/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles.
+const APART: f64 = 1500.0;
+
+/// A checkpoint is made in memory, and a vector that grows has up to twice the length that it needs.
+const COPIES: f64 = 3.0;
+
+/// Bytes at the peak of a run, about.
+pub fn bytes(scene: &Scene) -> f64 {
+    memory::need(scene.initial.count(), bytes_per_particle(scene)) + COPIES * bytes_of_samples(scene)
+}
+
+/// Checks that a run fits into the memory.
+pub fn check_memory(scene: &Scene) -> Result<(), MemoryError> {
+    let (particles, samples) = (scene.initial.count(), COPIES * bytes_of_samples(scene));
+    memory::fits(bytes(scene), || {
+        let of_particles = memory::need(particles, bytes_per_particle(scene));
+        match samples > of_particles {
+            true => format!(
+                "the samples of [observe] ({}) and {particles} particles need",
+                memory::shown(samples)
+            ),
+            false => format!("{particles} particles need"),
+        }
+    })
+}
+
+fn bytes_of_samples(scene: &Scene) -> f64 {
+    let steps =
+        |name: &str| scene.stages.iter().filter(|stage| stage.name == name).map(|stage| stage.steps).sum();
+    scene.observe.bytes(scene.initial.count() as f64, steps)
+}
+
+/// Bytes per particle, about those of Warren's liquid (docs/bench.md). The watch lists the pairs of the thermostat; where there are
+/// few particles, watch or advice evaluate forces with all their pairs too.
+fn bytes_per_particle(scene: &Scene) -> f64 {
+    let particles = scene.initial.count();
+    let heated = || scene.stages.iter().filter(|stage| stage.thermostat && stage.integrator.has_time());
+    let pairs = if heated().any(|stage| !stage.integrator.properties().drag_in_forces) {
+        APART
+    } else if particles <= MOST || heated().any(|stage| stage.steps >= LEAST) {
+        PAIRS
+    } else {
+        0.0
+    };
+    PARTICLE + pairs + if particles <= MOST { EVALUATION } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::support::{SET6, scene};
+
+    fn of(edge: f64, observe: &str) -> Scene {
+        let text = format!(
+            "model = \"m.toml\"\nkT = 1.0\nbox = {edge:?}\ndensity = 6.05\ndt = 0.005\nsteps = 1000\n{observe}"
+        );
+        scene(SET6, &text).unwrap()
+    }
+
+    /// The pairs of all forces are stored for as many particles as watch and advice evaluate, and for no more.
+    #[test]
+    fn evaluations_of_the_watch_are_counted() {
+        let bytes = |edge: f64| bytes_per_particle(&of(edge, ""));
+        assert_eq!(bytes(4.0) - bytes(50.0), EVALUATION);
+    }
+
+    /// Rows of 8 bytes for each cell: 64 of a map, or as many as there are samples; 2000 origins of 387 particles.
+    #[test]
+    fn samples_of_observables_are_counted() {
+        let samples = |observe: &str| bytes_of_samples(&of(4.0, &format!("[observe]\n{observe}\n")));
+        assert_eq!(samples("density_field = { bins = [500, 1000], every = 1 }"), 65.0 * 8.0 * 500_000.0);
+        assert_eq!(samples("density_field = { bins = [500, 1000], every = 100 }"), 11.0 * 8.0 * 500_000.0);
+        let long = samples("msd = { length = 500, spacing = 1, every = 2 }");
+        assert!(long > 500.0 * 387.0 * 24.0 && long < 510.0 * 387.0 * 24.0 + 500.0 * 9000.0, "{long}");
+    }
+}
