@@ -40,8 +40,8 @@ def run(
         least one line break. Paths in a text or a dictionary start from `base`, or else from the present folder.
     out : the folder for all files; left out, a temporary one that lives as long as the Result.
     threads : how many share the work. What a run writes does not depend on it.
-    precision : "mixed" or "double"; as the scene says if left out, or else mixed.
-    device : "cpu", "gpu" or "gpu:N"; as the scene says if left out, or else the CPU. GPUs need a package that was built for
+    precision : "mixed" or "double". If left out, that of the scene, or else mixed.
+    device : "cpu", "gpu" or "gpu:N". If left out, that of the scene, or else the CPU. GPUs need a package that was built for
         them: docs/gpu.md.
     resume : go on from the last checkpoint in `out`. A run that is finished is read, or prolonged if the last stage of the scene has
         more steps than it had.

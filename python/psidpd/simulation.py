@@ -24,8 +24,8 @@ class Simulation:
     scene : path of a scene file, its text, or a dictionary with its keys, as for `psidpd.run`.
     base : the folder from which paths in a text or a dictionary start, else the present one.
     threads : how many share the work. Numbers do not depend on it.
-    precision : "mixed" or "double"; as the scene says if left out, or else mixed.
-    device : "cpu", "gpu" or "gpu:N"; as the scene says if left out, or else the CPU.
+    precision : "mixed" or "double". If left out, that of the scene, or else mixed.
+    device : "cpu", "gpu" or "gpu:N". If left out, that of the scene, or else the CPU.
 
     The trajectory is that of `psidpd.run`, to the last bit. Output and observables of the scene are left out.
 

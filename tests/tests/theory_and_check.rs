@@ -298,7 +298,7 @@ fn check_judges_every_part_and_says_what_is_wrong() {
     let words = said(&psidpd(here, &["check", "ramp.toml"]));
     assert_eq!(words.lines().filter(|line| line.starts_with("time step")).count(), 2, "{words}");
     assert!(!words.contains("[time-step]"), "{words}");
-    // At 0.01 the pressure that steps carry is off by 16.6(3) % of ρkT, which docs/force-gradient.md has measured: above 10 % there is
+    // At 0.01 the pressure of the momentum flux is off by 16.6(3) % of ρkT, which docs/force-gradient.md has measured: above 10 % there is
     // a warning.
     std::fs::write(here.join("somewhat.toml"), text(0.01)).unwrap();
     let words = said(&psidpd(here, &["check", "somewhat.toml"]));

@@ -90,7 +90,7 @@ impl Coupling {
 pub struct Accuracy {
     /// Of the temperature of configurations, relative: `a` and `b` of `a (ωΔt)⁴ + b κΔt`.
     pub temperature: [f64; 2],
-    /// Of the pressure that steps carry, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
+    /// Of the pressure of the momentum flux, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
     pub pressure: [f64; 3],
 }
 

@@ -153,7 +153,7 @@ fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
         id: "time-step",
         severity: Severity::Warning,
         message: format!(
-            "dt = {} of stage \"{}\" puts temperatures off by {} and the pressure that steps carry by {} of rho kT: {} \
+            "dt = {} of stage \"{}\" changes temperatures by {} and the pressure of the momentum flux by {} of rho kT: {} \
              (docs/integrators.md)",
             worst.dt,
             worst.stage,
@@ -174,14 +174,17 @@ fn two_digits(x: f64) -> String {
 fn print_step(step: &StepEstimate, which: &str) {
     let told = step.carried >= step.resolution.max(LEAST) && step.carried <= FAR_OFF;
     let thinner = step.thinner.filter(|by| told && *by >= LEAST).map(|by| {
-        format!(", a liquid in equilibrium with its vapour too thin by about {} %", two_digits(100.0 * by))
+        format!(
+            ", and makes a liquid in equilibrium with its vapour about {} % less dense",
+            two_digits(100.0 * by)
+        )
     });
     let one_percent = match step.one_percent {
         Some(dt) => format!("about 1 % of both, or less, at dt = {}", two_digits(dt)),
         None => "no step with 1 % is known".to_owned(),
     };
     say!(
-        "time step     {} of stage \"{}\"{which}, {}: temperatures off by {}, the pressure that steps carry by {} of rho kT{}; \
+        "time step     {} of stage \"{}\"{which}, {}: changes temperatures by {} and the pressure of the momentum flux by {} of rho kT{}; \
          {one_percent} (estimate: frequency {:.1} of the fastest species, drag rate {:.2})",
         step.dt,
         step.stage,

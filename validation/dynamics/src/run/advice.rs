@@ -145,7 +145,7 @@ impl fmt::Display for Advice {
         write!(
             f,
             "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate the configurational temperature is off by {}, and \
-             the pressure that steps carry, which sets the density of a liquid in equilibrium with its vapour, by {} of rho kT. \
+             the pressure of the momentum flux, which sets the density of a liquid in equilibrium with its vapour, by {} of rho kT. \
              integrator = \"{}\", lambda = {lambda}, thermostat_every = 2, dt = {better_dt} was off by {better} in a trial with a \
              piece of the fluid, in {} of the time; psidpd pareto measures it",
             percent(errors[0]),

@@ -50,7 +50,7 @@ impl StepErrors {
         self.kinetic.value.abs().max(self.told().unwrap_or(0.0))
     }
 
-    /// Of the pressure that steps carry, in ρkT. The heat that a step adds presses like heat; half of an error of
+    /// Of the pressure of the momentum flux, in ρkT. The heat that a step adds presses like heat; half of an error of
     /// the configurations alone does, over fluids and steps of `docs/force-gradient.md`.
     pub fn carried(&self) -> f64 {
         self.thermal_pressure * self.kinetic.value.abs().max(0.5 * self.told().unwrap_or(0.0))

@@ -36,11 +36,11 @@ pub struct StepEstimate {
     pub drag: f64,
     /// Relative error of the temperatures, the larger of the kinetic and the configurational one; infinite where the fluid does not last.
     pub error: f64,
-    /// Error of the pressure that steps carry, in ρkT.
+    /// Error of the pressure of the momentum flux, in ρkT.
     pub carried: f64,
     /// Errors below this are not told from none.
     pub resolution: f64,
-    /// By how much of its density a liquid in equilibrium with its vapour is too thin, if the fluid resists compression.
+    /// By what share a liquid in equilibrium with its vapour is not dense enough, if the fluid resists compression.
     pub thinner: Option<f64>,
     /// The longest Δt with errors of about 0.01, if one is known.
     pub one_percent: Option<f64>,

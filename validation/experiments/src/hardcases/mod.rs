@@ -1,4 +1,4 @@
-//! Hard cases: what must happen in each, and what did, by integrator and precision.
+//! Hard cases: the required and the actual result of each, by integrator and precision.
 //!
 //! A file for each group of cases; [`case`] says what a case is and judges, [`native`] and [`plugin`] carry it out.
 

@@ -202,9 +202,9 @@ pub fn explanation(outcome: &Comparison) -> String {
     format!(
         "Errors are in percent: of u and of temperatures in percent of kT, of pressures of ρkT, of densities of the liquid's, of \
          others of themselves. They are those {temperature}, of all else from the reference ({}, {} samples over {:.1} time \
-         units or sweeps){dynamics}; the references' own errors are in their rows. ± is one standard deviation, and \"<\" an \
-         error below twice that, with what it is likely to be below. \"worst\" is the error that is most of its tolerance. \
-         p_carried is the momentum that steps carry, which walls and coexisting phases feel. Points of the plugin have the \
+         units or sweeps){dynamics}; the references' own errors are in their rows. ± is one standard deviation. \"<\" marks \
+         an error that is smaller than twice its uncertainty; the number is an upper limit. \"worst\" is the error that is most of its tolerance. \
+         p_carried is the pressure of the momentum flux, which walls and coexisting phases feel. Points of the plugin have the \
          errors of the native steps, which they are. Points of LAMMPS's own many-body style are another force law, compared \
          with small steps of its own; they are not on the front.",
         outcome.reference.what, outcome.reference.samples, outcome.reference.time
@@ -215,7 +215,8 @@ pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
     for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {
-        let caption = "Without a bar: not resolved, at what the error is likely to be below.";
+        let caption =
+            "Points without a bar: the error was not resolved; it is probably below the value shown.";
         plots.push(Item::figure(&plot, caption)?);
     }
     let mut settings = vec![Item::Prose(explanation(outcome)), Item::Table(table(outcome))];

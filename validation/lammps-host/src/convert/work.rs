@@ -364,7 +364,10 @@ impl<'a> Work<'a> {
         };
         self.column =
             Some(if style == ["mdpd"] { Some(Column::OF_MDPD) } else { Column::of_hybrid(&style[1..]) });
-        self.changed(command, format!("atom_style {}: the style needs none of its own", new.join(" ")));
+        self.changed(
+            command,
+            format!("atom_style {}: the pair style of psidpd needs no special atom style", new.join(" ")),
+        );
         Some(command.with("atom_style", &new))
     }
 

@@ -18,7 +18,7 @@ impl Meter for InterfaceWidth {
                 proportion to their noise. `width`, `thickness` (2 z₀). `liquid` and `vapour` are not those of the fit, \
                 which averages over the layers near the surface: they are means of the profile over its plateaus, \
                 farther from each interface than four times `width_10_90`. Where less than a fifth such distance is \
-                left, a note says by how much its layers may change a density; errors are those of chance alone. Where the interface is no tanh \
+                left, a note says by how much its layers may change a density; errors are those of chance alone. Where the interface is not a tanh \
                 the fit misleads, so the profile's own widths are given too: `width_10_90`, between the places where \
                 10 and 90 % of the way between the plateaus are made (1.10 w of a tanh), and `width_slope`, w with the \
                 slope of a straight line through three tenths of the interface. If nothing can be fitted `width` has no \

@@ -39,7 +39,7 @@ fn an_ideal_gas_has_the_step_of_its_drag() {
 }
 
 /// A gas at four times the temperature, with twice the drag and half the step, is the same gas in other units of time: its steps err
-/// as much, and a liquid of it would be as much too thin.
+/// as much, and its liquid would be less dense by as much.
 #[test]
 fn units_of_energy_change_no_estimate() {
     let of = |kt: f64, dt: f64, gamma: f64| {
