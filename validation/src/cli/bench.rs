@@ -26,7 +26,7 @@ pub struct Arguments {
     /// 0.5].
     #[arg(long, value_name = "S", value_parser = positive)]
     seconds: Option<f64>,
-    /// Steps of every timed run, whatever time they take; no skin is looked for.
+    /// Steps of every timed run, whatever time they take; the skin is not optimised.
     #[arg(long, value_name = "N", value_parser = at_least(1))]
     steps: Option<u64>,
     /// Above this many particles few codes are timed: see docs/bench.md.

@@ -3,7 +3,7 @@ use super::*;
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
 
-/// Find the corrected density with which a model has the pressure it was made for.
+/// Find the corrected density with which a model has its target pressure.
 ///
 /// Runs the fluid at several densities, fits a polynomial with <rho~(n)> = rho, and repeats until it holds and
 /// the pressure is the required one: linear if that suffices, else fitted to the pressures, quadratic, or cubic.
@@ -15,7 +15,7 @@ pub struct Arguments {
     /// kT.
     #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true, value_parser = temperature)]
     kt: f64,
-    /// Total number densities over which the pressure is to be right: LOW:HIGH, or one.
+    /// Total number densities at which the pressure must be right: LOW:HIGH, or one.
     #[arg(long, value_name = "LOW:HIGH", default_value = "3:10", value_parser = range)]
     density: [f64; 2],
     /// How many densities are run.
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     };
     let found = calibrate(&a.model, &options, &command(a), &mut |line| say!("{line}"))?;
     write_bytes(&a.out, told.existing, found.text.as_bytes())?;
-    let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
+    let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p target", "p measured", "off by"]);
     let pm = |v: &psidpd_observe::Measured| format!("{:.5} ± {:.5}", v.value, v.error);
     for r in &found.residuals {
         table.push([

@@ -7,12 +7,12 @@ use psidpd_experiments::check::{
 use psidpd_formats::memory::shown;
 use psidpd_report::quantity::{decimal, number, with_error};
 
-/// What a model or scene will compute, what mean field says of it, and what cannot work.
+/// Say what a model or scene will compute, what mean field predicts, and what cannot work.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A model file, or a scene file, which brings kT and densities along.
+    /// A model file, or a scene file, which states kT and densities.
     file: PathBuf,
-    /// kT; 1 if neither this nor a scene gives it.
+    /// kT. If left out, that of the scene, or 1 for a model.
     #[arg(long = "kT", value_name = "T", allow_negative_numbers = true, value_parser = temperature)]
     kt: Option<f64>,
     /// Number density, total or one for each species, as 6.05 or 8,8.

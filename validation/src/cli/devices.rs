@@ -2,7 +2,7 @@ use super::*;
 use psidpd_dynamics::device::{self, Found};
 use psidpd_dynamics::run::RunError;
 
-/// The GPUs that can make the steps of a run, for `psidpd run --device` and the key `device` of a scene.
+/// List the GPUs that can compute a run, for `psidpd run --device` and the key `device` of a scene.
 ///
 /// The program must be built for them. If it is not, or if there are none, the exit code is 2.
 #[derive(Debug, clap::Args)]

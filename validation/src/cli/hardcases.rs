@@ -1,7 +1,7 @@
 use super::*;
 use psidpd_experiments::hardcases::{self, Extent};
 
-/// Run cases that are hard for a simulation, and compare what happens with what must happen, by integrator and precision.
+/// Run cases that are hard for a simulation, with each integrator and precision, and check that each ends as required.
 ///
 /// The exit code is 1 if a case does not do what it must. docs/hardcases.md has the cases.
 #[derive(Debug, clap::Args)]

@@ -62,16 +62,16 @@ struct Arguments {
     /// Write machine-readable results to a file.
     #[arg(long, global = true, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Replace files that psidpd did not make, and start over in folders that hold runs; never an input.
+    /// Replace files that psidpd did not make, and start over in folders that hold runs. Inputs are never replaced.
     #[arg(long, global = true)]
     overwrite: bool,
 }
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Write a scene to begin with, and its model.
+    /// Write a scene and its model as a starting point.
     New(new::Arguments),
-    /// What a model or scene will compute, and what cannot work.
+    /// Say what a model or scene will compute, and what cannot work.
     Check(check::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
@@ -79,34 +79,34 @@ enum Verb {
     Report(report::Arguments),
     /// Run a scene at many values of its keys.
     Sweep(sweep::Arguments),
-    /// A picture of the particles, or of their density, in a data, dump or XYZ file.
+    /// Draw the particles, or their density, in a data, dump or XYZ file.
     Snapshot(snapshot::Arguments),
-    /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
+    /// Compute mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),
-    /// Energy, virial, densities and forces of one configuration.
+    /// Compute energy, virial, densities and forces of one configuration.
     Forces(forces::Arguments),
     /// Make a model file of a real liquid.
     #[command(subcommand)]
     Model(model::Verb),
-    /// Find the corrected density with which a model has the pressure it was made for.
+    /// Find the corrected density with which a model has its target pressure.
     Calibrate(calibrate::Arguments),
-    /// What a unit of simulated time costs with each integrator, time step and precision, and how far off its results are.
+    /// Measure what a unit of simulated time costs with each integrator, time step and precision, and the errors of the results.
     Pareto(pareto::Arguments),
     /// Write a fluid for another code.
     #[command(subcommand)]
     Export(export::Verb),
-    /// Install LAMMPS into a local environment, or build the plugin for it.
+    /// Install LAMMPS into a local environment, build the plugin for it, or convert a script.
     #[command(subcommand)]
     Lammps(lammps::Verb),
     /// Compare the native runner, the LAMMPS plugin, LAMMPS's mdpd and eam/alloy in one fluid.
     Validate(validate::Arguments),
-    /// Figures and tables of the papers: measured, and compared with what is published.
+    /// Measure figures and tables of the papers, and compare with the published values.
     Reproduce(reproduce::Arguments),
     /// Time LAMMPS, the plugin and the native runner side by side.
     Bench(bench::Arguments),
-    /// Run cases that are hard for a simulation, and compare what happens with what must happen.
+    /// Run cases that are hard for a simulation, and check that each ends as required.
     Hardcases(hardcases::Arguments),
-    /// The GPUs that can make the steps of a run.
+    /// List the GPUs that can compute a run.
     Devices(devices::Arguments),
     /// Print a script that completes verbs and options in a shell.
     Completions(shell::Completions),

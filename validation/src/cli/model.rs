@@ -6,7 +6,7 @@ use psidpd_experiments::from_eos::{Options, Substance, from_eos};
 /// Make a model file.
 #[derive(Debug, clap::Subcommand)]
 pub enum Verb {
-    /// Of a real liquid, from its equation of state (PC-SAFT), with its units in SI.
+    /// Make a model of a real liquid from its equation of state (PC-SAFT), with its units in SI.
     ///
     /// Density, compressibility and surface tension are those of the equation of state within the tolerance; exits
     /// with 1 if not. Needs a psidpd that was built with `--features eos`.

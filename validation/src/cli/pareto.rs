@@ -2,7 +2,7 @@ use super::run::thread_count;
 use super::*;
 use psidpd_experiments::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
 
-/// What a unit of simulated time costs with each setting, and how far off its results are.
+/// Measure what a unit of simulated time costs with each setting, and the errors of the results.
 ///
 /// Errors are those of energy, pressures, temperatures, g(r), diffusion and what the scene measures of interfaces and viscosities, against a
 /// Monte Carlo without a time step. docs/pareto.md says how to read the table. The machine should be idle.
@@ -10,11 +10,11 @@ use psidpd_experiments::pareto::{self, Choice, Effort, Options, Pace, Tolerance,
 pub struct Arguments {
     /// The scene file.
     scene: PathBuf,
-    /// What error is accepted: u=0.2%,p=2%,rho_L=0.1% for one; 1% of all that is resolved so well if left out. u and T are in kT, p in
-    /// ρkT, densities in that of the liquid.
+    /// Errors that you accept, such as u=0.2%,p=2%,rho_L=0.1%. If left out, each quantity has the smallest of 1, 2 and 5% that can be
+    /// resolved in the time. Errors of u and T are in units of kT, of p in ρkT, of densities in that of the liquid.
     #[arg(long, value_name = "NAME=BOUND,…", value_delimiter = ',')]
     tolerance: Vec<Tolerance>,
-    /// Minutes that all of it may take, roughly; 20 with --full.
+    /// Approximate duration in minutes; 20 with --full.
     #[arg(long, value_name = "N", value_parser = minutes)]
     minutes: Option<f64>,
     /// Samples of every setting, whatever time they take, instead of as many as the minutes allow.

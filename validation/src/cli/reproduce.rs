@@ -17,7 +17,7 @@ pub struct Arguments {
     /// Small and short runs, half an hour for all cases; what is done if --full is left out.
     #[arg(long, conflicts_with = "full")]
     quick: bool,
-    /// Boxes of the papers and long runs; those that were interrupted go on.
+    /// Boxes of the papers and long runs; interrupted runs continue.
     #[arg(long)]
     full: bool,
     /// Folder for runs, plots and results.

@@ -21,12 +21,12 @@ pub struct Arguments {
     /// Folder for thermo.csv, dump.lammpstrj, final.data, summary.json, timing.json and checkpoints.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Go on from the last checkpoint in the folder, to the last bit as if nothing had happened; from the
-    /// first step if there is none.
+    /// Continue from the last checkpoint in the folder, or from the first step if there is none. The files become those of an
+    /// uninterrupted run, byte for byte.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// Prolong the run of the folder, finished or not: its last stage gets N steps, or N more. The files are those of a run that was
-    /// as long from the start.
+    /// Prolong the run in the folder, finished or not: its last stage gets N steps, or N more. The files become those of a run that
+    /// was this long from the start.
     #[arg(long, value_name = "N|+N", requires = "resume")]
     steps: Option<Length>,
     /// Threads that share the work; what a run writes does not depend on their number.

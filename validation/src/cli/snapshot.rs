@@ -23,7 +23,7 @@ pub struct Arguments {
     /// The model file, for names of species and the weight function of the density.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// From where; two-dimensional systems are seen along z.
+    /// Direction of view. Two-dimensional systems are seen along z.
     #[arg(long, default_value = "oblique", value_parser = view())]
     view: View,
     /// Shows only particles in a slice of this thickness through the middle of the box, across the line of sight.
@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Range of the weight function; default: that of the model's first density, else 1.
     #[arg(long, value_name = "LENGTH", requires = "density")]
     range: Option<f64>,
-    /// Most pixels in width and in height.
+    /// Largest width and height in pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = clap::value_parser!(u32).range(16..=8192))]
     size: u32,
 }

@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Range of kT in which a critical point is looked for, as multiples of kT.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1..=2, default_values_t = [0.05, 20.0])]
     search: Vec<f64>,
-    /// Measure the fluid in short runs, and put that beside mean field: homogeneous at --density, and a slab of liquid if
+    /// Measure the fluid in short runs, and compare with mean field: homogeneous at --density, and a slab of liquid if
     /// there should be one. Some seconds for each kT.
     #[arg(long)]
     measure: bool,
