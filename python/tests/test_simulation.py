@@ -159,3 +159,32 @@ def test_a_sweep_is_a_table(tmp_path):
     assert counts == [320, 384]
     with pytest.raises(psidpd.InputError):
         psidpd.sweep(tmp_path / "scene.toml", {"densty": [5.0]}, tmp_path / "other")
+
+
+def test_other_integrators_are_those_of_a_run():
+    """Trial moves before and after time steps, whose length the first stage tunes, and a thermostat at every third step."""
+    stages = [
+        {"name": "rest", "steps": 6, "integrator": "monte-carlo", "kT": 1.5},
+        {"name": "slow", "steps": 7, "dt": 0.02, "integrator": "aboba", "thermostat_every": 3, "kT": 0.7},
+        {"name": "moves", "steps": 4, "integrator": "monte-carlo", "sweeps": 2, "kT": 0.7},
+        {"name": "last", "steps": 5, "dt": 0.03, "integrator": "aboba"},
+    ]
+    scene = {**SCENE, "stage": stages, "output": {"thermo": 1}}
+    result = psidpd.run(scene)
+    assert result.summary["steps"] == 22
+    for piece in (1, 5, 22):
+        simulation = psidpd.Simulation(scene)
+        seen = []
+        while simulation.step < 22:
+            simulation.run(min(piece, 22 - simulation.step))
+            seen.append((simulation.step, simulation.stage, simulation.time))
+        # A step of trial moves counts as a time of 1.
+        ends = {6: ("rest", 6.0), 13: ("slow", 6.14), 17: ("moves", 10.14), 22: ("last", 10.29)}
+        for step, stage, at in seen:
+            if step in ends:
+                assert (stage, at) == (ends[step][0], pytest.approx(ends[step][1], abs=1e-12))
+        assert simulation.time == pytest.approx(result.thermo["time"].iloc[-1], abs=1e-12)
+        assert numpy.array_equal(simulation.positions, result.positions)
+        last = result.thermo.iloc[-1]
+        assert simulation.temperature == last["temperature"] and simulation.pressure[0] == last["pxx"]
+        assert simulation.potential_energy == pytest.approx(last["potential"], rel=1e-12)

@@ -300,6 +300,51 @@ mod tests {
         assert!(GsdFile::reopen(&path, 0, 4).is_err());
     }
 
+    /// The numbers of a chunk of the first frame, as the specification has them: the index names the place of each.
+    fn singles(file: &[u8], name: &str) -> Vec<f32> {
+        let number = |at: usize| u64::from_le_bytes(file[at..at + 8].try_into().unwrap()) as usize;
+        let place = number(8) + 32 * NAMES.iter().position(|n| *n == name).unwrap();
+        let columns = u32::from_le_bytes(file[place + 24..place + 28].try_into().unwrap()) as usize;
+        let (start, count) = (number(place + 16), number(place + 8) * columns);
+        let bytes = &file[start..start + 4 * count];
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+    }
+
+    /// A tilted box and a tilted plane whose numbers are all different and exact in single precision: lengths, then xy, xz and yz,
+    /// each the tilt over the height of its edge. Positions are those from the middle of the box; a plane has no height.
+    #[test]
+    fn boxes_are_those_of_the_schema() {
+        let edges = Matrix3::new(8.0, 2.0, 4.0, 0.0, 4.0, 2.0, 0.0, 0.0, 16.0);
+        let domain = PeriodicBox::new([1.0, -2.0, 3.0], edges, [true; 3]).unwrap();
+        // From the origin and the three edges: 1 + (8 + 2 + 4)/2, -2 + (4 + 2)/2 and 3 + 16/2.
+        let middle = [8.0, 1.0, 11.0];
+        let flat_edges = Matrix3::new(8.0, 1.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 1.0);
+        let flat = PeriodicBox::new([1.0, -2.0, 0.0], flat_edges, [true; 3]).unwrap();
+        let names = ["A".to_owned(), "B".to_owned()];
+        let (x, v) = ([[7.5, 1.5, 9.0], [3.0, -1.0, 11.5]], [[0.25, -0.5, 0.75], [1.25, 1.5, -1.75]]);
+        let expected = |dimensions: usize, middle: [f64; 3]| -> Vec<f32> {
+            let part = |x: &[f64; 3]| -> [f32; 3] {
+                std::array::from_fn(|k| if k < dimensions { (x[k] - middle[k]) as f32 } else { 0.0 })
+            };
+            x.iter().flat_map(part).collect()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        for (dimensions, domain, middle, shape) in [
+            (3, &domain, middle, [8.0f32, 4.0, 16.0, 0.5, 0.25, 0.125]),
+            (2, &flat, [5.5, 0.0, 0.0], [8.0, 4.0, 0.0, 0.25, 0.0, 0.0]),
+        ] {
+            let path = folder.path().join(format!("{dimensions}.gsd"));
+            let frame = Frame { dimensions, v: Some(&v), ..frame(0, domain, &names, &x) };
+            GsdFile::create(&path, 1).unwrap().write(&frame, &[1.0, 2.5]).unwrap();
+            let file = std::fs::read(&path).unwrap();
+            assert_eq!(singles(&file, "configuration/box"), shape, "{dimensions}");
+            assert_eq!(singles(&file, "particles/position"), expected(dimensions, middle), "{dimensions}");
+            let fast: Vec<f32> = v.iter().flatten().map(|v| *v as f32).collect();
+            assert_eq!(singles(&file, "particles/velocity"), fast, "{dimensions}");
+            assert_eq!(singles(&file, "particles/mass"), [1.0f32, 2.5], "{dimensions}");
+        }
+    }
+
     #[test]
     fn a_box_that_leans_otherwise_is_refused() {
         let folder = tempfile::tempdir().unwrap();

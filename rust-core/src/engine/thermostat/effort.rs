@@ -40,3 +40,27 @@ impl std::ops::AddAssign for Effort {
         self.inaccurate += other.inaccurate;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Updates of 3, 7 and 5 iterations, one after the other and as the sum of two records, in both orders.
+    #[test]
+    fn records_of_updates_add_up() {
+        let record = |updates: &[(usize, bool, bool)]| {
+            let mut effort = Effort::default();
+            updates.iter().for_each(|update| effort.add(update.0, update.1, update.2));
+            effort
+        };
+        let (first, last) = ([(3, true, false), (7, true, true)], [(5, false, false)]);
+        let expected = Effort { updates: 3, iterations: 15, most: 7, listed: 2, inaccurate: 1 };
+        assert_eq!(record(&[first[0], first[1], last[0]]), expected);
+        for [a, b] in [[&first[..], &last[..]], [&last[..], &first[..]]] {
+            let mut sum = record(a);
+            sum += record(b);
+            assert_eq!(sum, expected);
+        }
+        assert_eq!((expected.mean(), Effort::default().mean()), (Some(5.0), None));
+    }
+}

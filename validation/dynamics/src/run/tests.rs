@@ -13,6 +13,7 @@ mod force_gradient;
 mod gpu;
 mod held;
 mod integrators;
+mod live;
 mod monte_carlo;
 mod order;
 mod rates;
