@@ -399,3 +399,62 @@ fn lammps_finds_the_energies_of_the_series_again() {
     let x: Vec<[f64; 3]> = data.atoms.iter().map(|a| a.x).collect();
     assert_eq!(Some(x), frames[2].vectors(["x", "y", "z"]));
 }
+
+/// A box that is tilted in all three ways and a tilted plane, as other programs read them: GSD has the edges' ratios, a dump the
+/// edges. GSD has no height of a plane. Velocities and positions from the middle of the box are those of the dump.
+#[test]
+fn other_programs_see_tilted_boxes() {
+    for (flat, edges, middle, shape) in [
+        (
+            false,
+            [[8.0, 0.0, 0.0], [1.0, 4.0, 0.0], [-2.0, 1.5, 8.0]],
+            [4.5, 0.75, 7.0],
+            [8.0, 4.0, 8.0, 0.25, -0.25, 0.1875],
+        ),
+        (
+            true,
+            [[8.0, 0.0, 0.0], [1.0, 4.0, 0.0], [0.0, 0.0, 1.0]],
+            [5.5, 0.0, 0.0],
+            [8.0, 4.0, 0.0, 0.25, 0.0, 0.0],
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (dimensions, bounds, tilt) = match flat {
+            true => ("dimensions = 2\n", "-0.5 0.5 zlo zhi", "1 0 0"),
+            false => ("", "3 11 zlo zhi", "1 -2 1.5"),
+        };
+        let model = format!(
+            "title = \"gas\"\n{dimensions}species = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n"
+        );
+        let height = if flat { 0.0 } else { 6.5 };
+        let data = format!(
+            "tilted\n\n4 atoms\n2 atom types\n\n1 9 xlo xhi\n-2 2 ylo yhi\n{bounds}\n{tilt} xy xz yz\n\nMasses\n\n1 1.0\n\
+             2 3.0\n\nAtoms # atomic\n\n1 1 2.0 -1.0 {height}\n2 2 4.5 0.5 {height}\n3 1 6.0 1.25 {height}\n4 2 5.0 -0.75 {height}\n"
+        );
+        let scene = "title = \"t\"\nmodel = \"model.toml\"\nkT = 0.7\nseed = 1\n[initial]\nkind = \"data\"\nfile = \"start.data\"\n\
+                     velocities = \"thermal\"\n[[stage]]\nname = \"run\"\nsteps = 2\ndt = 0.01\n[output]\ngsd = 1\ndump = 1\n";
+        for (name, text) in [("model.toml", &model[..]), ("start.data", &data[..]), ("scene.toml", scene)] {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        let output = psidpd(folder.path(), &["run", "scene.toml", "--out", "out"]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        let out = folder.path().join("out");
+        let script = psidpd_tests::root().join("tests/python/read_tilted.py");
+        let read = Command::new(python()).arg(script).arg(&out).output().expect("python starts");
+        assert!(read.status.success(), "{}", said(&read));
+        let seen: Value = serde_json::from_slice(&read.stdout).expect("the script writes JSON");
+        assert_eq!(numbers(&seen["gsd"]), shape);
+        assert_eq!(seen["dimensions"].as_i64(), Some(if flat { 2 } else { 3 }));
+        assert_eq!(numbers(&seen["mass"]), [1.0, 3.0, 1.0, 3.0]);
+        assert_near("ase", &vectors(&seen["ase"]), &edges, 1e-12);
+        // Single precision, by way of lengths and angles.
+        assert_near("mda", &vectors(&seen["mda"]), &edges, 1e-5);
+        let mut frame = dump::read(&out.join("dump.lammpstrj")).unwrap().pop().unwrap();
+        assert!(frame.sort_by_id());
+        let x = frame.vectors(["x", "y", "z"]).unwrap();
+        let from_middle: Vec<[f64; 3]> =
+            x.iter().map(|x| std::array::from_fn(|k| x[k] - middle[k])).collect();
+        assert_near("gsd x", &vectors(&seen["x"]), &from_middle, 1e-6);
+        assert_near("gsd v", &vectors(&seen["v"]), &frame.vectors(["vx", "vy", "vz"]).unwrap(), 1e-6);
+    }
+}

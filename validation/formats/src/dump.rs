@@ -236,7 +236,7 @@ impl<R: BufRead> Iterator for DumpReader<R> {
 
 /// Writes a frame with the columns `id type x y z vx vy vz` as LAMMPS does, with the digits that restore the exact values.
 /// Particles keep their order; types are species from 1. Unknown velocities are written as 0. Slices of different lengths are
-/// an error of kind `InvalidInput`.
+/// an error of kind `InvalidInput`, and so is a box that LAMMPS cannot hold.
 pub fn write_dump(frame: &super::Frame, out: &mut impl Write) -> io::Result<()> {
     let n = frame.tag.len();
     if [frame.species.len(), frame.x.len(), frame.v.map_or(n, <[_]>::len)] != [n; 3] {
@@ -245,11 +245,31 @@ pub fn write_dump(frame: &super::Frame, out: &mut impl Write) -> io::Result<()> 
             "ids, types, positions and velocities differ in number",
         ));
     }
+    let [a, b, c] = [0, 1, 2].map(|k| frame.domain.edge(k));
+    if [a[1], a[2], b[2]] != [0.0; 3] {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "a dump needs a box with its first edge along x and its second in the plane of x and y",
+        ));
+    }
     let boundary = frame.periodic().map(|p| if p { "pp" } else { "ff" }).join(" ");
     writeln!(out, "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{n}", frame.step)?;
-    writeln!(out, "ITEM: BOX BOUNDS {boundary}")?;
-    for (low, length) in frame.domain.origin().into_iter().zip(frame.domain.lengths()) {
-        writeln!(out, "{low:.16e} {:.16e}", low + length)?;
+    let (tilt, origin) = ([b[0], c[0], c[1]], frame.domain.origin());
+    if tilt == [0.0; 3] {
+        writeln!(out, "ITEM: BOX BOUNDS {boundary}")?;
+        for (low, length) in origin.into_iter().zip(frame.domain.lengths()) {
+            writeln!(out, "{low:.16e} {:.16e}", low + length)?;
+        }
+    } else {
+        // The bounding box of the tilted box.
+        let [xy, xz, yz] = tilt;
+        writeln!(out, "ITEM: BOX BOUNDS xy xz yz {boundary}")?;
+        let ranges = [[0.0, xy, xz, xy + xz], [0.0, yz, 0.0, 0.0], [0.0; 4]];
+        for (k, length) in [a[0], b[1], c[2]].into_iter().enumerate() {
+            let low = origin[k] + ranges[k].into_iter().fold(0.0, f64::min);
+            let high = origin[k] + length + ranges[k].into_iter().fold(0.0, f64::max);
+            writeln!(out, "{low:.16e} {high:.16e} {:.16e}", tilt[k])?;
+        }
     }
     writeln!(out, "ITEM: ATOMS id type x y z vx vy vz")?;
     for i in 0..n {
@@ -265,6 +285,7 @@ pub fn write_dump(frame: &super::Frame, out: &mut impl Write) -> io::Result<()> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix3;
     use proptest::prelude::*;
     use psidpd_core::engine::PeriodicBox;
 
@@ -306,6 +327,36 @@ mod tests {
             let frame = read_all(&text).unwrap().remove(0);
             assert_eq!((frame.boxlo, frame.boxhi), ([1.0, 2.0, 3.0], [5.0, 7.0, 9.0]), "{text}");
         }
+    }
+
+    /// The bounds that are written hold all corners of a tilted box, and the box is read back as it was. Numbers are exact in binary.
+    #[test]
+    fn tilted_boxes_are_written_with_their_tilt() {
+        for ([xy, xz, yz], bounds) in [
+            ([1.5, 0.5, 2.0], [[1.0, 7.0], [2.0, 9.0]]),
+            ([-1.5, -0.5, -2.0], [[-1.0, 5.0], [0.0, 7.0]]),
+            ([1.5, -0.5, 0.0], [[0.5, 6.5], [2.0, 7.0]]),
+            ([0.0, -0.5, 0.0], [[0.5, 5.0], [2.0, 7.0]]),
+        ] {
+            let edges = Matrix3::new(4.0, xy, xz, 0.0, 5.0, yz, 0.0, 0.0, 6.0);
+            let domain = PeriodicBox::new([1.0, 2.0, 3.0], edges, [true; 3]).unwrap();
+            let mut text = Vec::new();
+            write_dump(&frame(7, &domain, &[0], &[1], &[[1.5, 2.5, 3.5]], &[[0.0; 3]]), &mut text).unwrap();
+            let text = String::from_utf8(text).unwrap();
+            let mut lines = text.lines().skip_while(|line| !line.starts_with("ITEM: BOX BOUNDS"));
+            assert_eq!(lines.next(), Some("ITEM: BOX BOUNDS xy xz yz pp pp pp"));
+            for ([low, high], tilt) in bounds.into_iter().chain([[3.0, 9.0]]).zip([xy, xz, yz]) {
+                let numbers = lines.next().unwrap().split(' ').map(|word| word.parse::<f64>().unwrap());
+                assert_eq!(numbers.collect::<Vec<f64>>(), [low, high, tilt], "{text}");
+            }
+            let read = read_all(&text).unwrap().remove(0);
+            assert_eq!((read.boxlo, read.boxhi), ([1.0, 2.0, 3.0], [5.0, 7.0, 9.0]), "{text}");
+            assert_eq!(read.tilt, Some([xy, xz, yz]));
+        }
+        let edges = Matrix3::new(4.0, 0.0, 0.0, 1.0, 4.0, 0.0, 0.0, 0.0, 4.0);
+        let domain = PeriodicBox::new([0.0; 3], edges, [true; 3]).unwrap();
+        let made = write_dump(&frame(0, &domain, &[0], &[1], &[[0.0; 3]], &[[0.0; 3]]), &mut Vec::new());
+        assert_eq!(made.unwrap_err().kind(), io::ErrorKind::InvalidInput);
     }
 
     #[test]
