@@ -246,6 +246,27 @@ fn the_temperature_of_pairs_knows_their_masses() {
     }
 }
 
+/// Noises of a step are independent: both of every stream and that of the forces have keys of their own, for every seed and step.
+#[test]
+fn streams_share_no_noise() {
+    let (pool, cloud) = (pool(1), Cloud::new(1, Matrix3::from_diagonal_element(3.0), [true; 3], 1.0));
+    let mut thermostat = ready(ONE, 1.0, &cloud, &pool);
+    let mut keys = Vec::new();
+    for seed in [1, 2, 1 << 40] {
+        for step in [1, 2, 3, 1 << 33] {
+            keys.push(PairNoise::new(seed, step).key());
+            for stream in [0, 1, 2, 3, 4, 127, 254, 255] {
+                thermostat.draw(&pool, seed, step, Stream(stream), Law::Gaussian);
+                keys.extend(thermostat.noise.map(|noise| noise.key()));
+            }
+        }
+    }
+    let all = keys.len();
+    keys.sort_unstable();
+    keys.dedup();
+    assert_eq!((keys.len(), all), (all, 3 * 4 * 17));
+}
+
 /// Checks `M (v′ − v) = Δt F((v + v′)/2)` with the forces of drag and noise.
 #[test]
 fn the_midpoint_rule_is_solved() {
