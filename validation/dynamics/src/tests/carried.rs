@@ -5,7 +5,7 @@ use crate::integrator::Integrator;
 use crate::particles::State;
 use crate::run::Simulation;
 use crate::scene::Scene;
-use crate::tests::support::IDEAL_MIXTURE;
+use crate::tests::support::{self, IDEAL_MIXTURE, SET6};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_core::model::Model;
@@ -112,6 +112,44 @@ fn slices_of_stress_add_up_to_the_momentum_flux() {
                     assert!(off < 1e-12, "{name} {table} {boundary}: {mean} {expected}");
                 }
             }
+        }
+    }
+}
+
+/// The same where a layer of frozen particles and a reflecting face confine a driven flow, in means over steps with and without an
+/// action of the thermostat.
+#[test]
+fn slices_beside_a_wall_add_up_to_the_momentum_flux() {
+    for (name, integrator) in Integrator::ALL {
+        // Body forces have no energy in a periodic box.
+        let force =
+            if integrator.has_time() { "[[body_force]]\nacceleration = [0.1, 0.0, -0.2]\n" } else { "" };
+        for (axis, column) in [("x", "carried_xx"), ("z", "carried_zz")] {
+            let text = format!(
+                "model = \"m.toml\"\nkT = 0.7\nseed = 7\ndensity = 6.05\nprecision = \"double\"\n[box]\n\
+                 lengths = [3.0, 3.0, 4.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+                 [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
+                 [[part]]\nshape = \"rest\"\n{force}[[stage]]\nname = \"run\"\nsteps = 8\n{}dt = 0.02\n\
+                 [observe]\nevery = 1\npressure = true\nstress_profile = {{ axis = \"{axis}\", bins = 7 }}\n",
+                steps(name, integrator)
+            );
+            let text = if integrator.has_time() { text } else { text.replace("dt = 0.02\n", "") };
+            let scene = support::scene(SET6, &text).unwrap();
+            let stage = &scene.stages[0];
+            let mut simulation = scene.simulation(scene.initial_state()).unwrap();
+            scene.enter(stage, &mut simulation).unwrap();
+            simulation.prepare_for(stage.integrator, stage.dt, Want::FORCES).unwrap();
+            simulation.record_flux(true);
+            let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
+            for _ in 0..8 {
+                simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+                observers.sample(simulation.view(0.0), &stage.name);
+            }
+            let out = observers.finish();
+            let normal = &find(&out, "stress_profile").get("normal").unwrap().values;
+            let mean = normal.iter().sum::<f64>() / normal.len() as f64;
+            let carried = find(&out, "pressure").get(column).unwrap().values[0];
+            assert!((mean / carried - 1.0).abs() < 1e-11, "{name} {axis}: {mean} {carried}");
         }
     }
 }
