@@ -5,8 +5,10 @@
 //! the middle of a frame is continued. Numbers are those of the schema: single precision. The box is centred at the
 //! origin, so positions are shifted by the middle of the box.
 
-use super::Frame;
+use super::configuration::Configuration;
 use super::files::{create_inside, draft_inside, open_inside_to_write};
+use super::open::domain;
+use super::{FormatError, Frame, PathError};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
@@ -210,6 +212,131 @@ impl GsdFile {
     }
 }
 
+/// Whether the first bytes of a file are those of GSD.
+pub(super) fn is_gsd(start: &[u8]) -> bool {
+    start.starts_with(&MAGIC.to_le_bytes())
+}
+
+/// An entry of the index.
+struct Entry {
+    rows: u64,
+    place: u64,
+    columns: u32,
+}
+
+/// Reads a frame of a file that [`GsdFile`] wrote: the one with a number, counted from 0, or the last complete one; `None` if
+/// the file does not have it. The box is centred at the origin, and periodic, except along z in two dimensions: the format has
+/// no more.
+pub(super) fn read_gsd(
+    path: &Path,
+    file: &File,
+    which: Option<usize>,
+) -> Result<Option<Configuration>, FormatError> {
+    let wrong = |what: &str| FormatError::content(path)(what);
+    let length = file.metadata().map_err(PathError::at("read", path))?.len();
+    // Sizes in a file are not trusted: nothing is larger than the file.
+    let read = |at: u64, size: u64| -> Result<Vec<u8>, FormatError> {
+        if at.checked_add(size).is_none_or(|end| end > length) {
+            return Err(wrong("the file ends within a frame"));
+        }
+        let mut bytes = vec![0; size as usize];
+        file.read_exact_at(&mut bytes, at).map_err(PathError::at("read", path))?;
+        Ok(bytes)
+    };
+    let head = read(0, INDEX.min(length))?;
+    let names: Vec<u8> = NAMES.iter().flat_map(|name| name.bytes().chain([0])).collect();
+    if !head.get(HEADER as usize..).is_some_and(|list| list.starts_with(&names)) || long(&head, 8) != INDEX {
+        return Err(wrong("this is a GSD file of another program; psidpd reads only its own"));
+    }
+    let room = long(&head, 16);
+    if room.checked_mul(ENTRY).and_then(|size| size.checked_add(INDEX)).is_none_or(|end| end > length) {
+        return Err(wrong("the file ends within its index"));
+    }
+    let entry = |frame: u64, name: u64| -> Result<Option<Entry>, FormatError> {
+        // A number of a frame that no file has room for.
+        let Some(at) =
+            frame.checked_mul(ENTRY * LATER).map(|_| entries(frame) + name).filter(|at| *at < room)
+        else {
+            return Ok(None);
+        };
+        let bytes = read(INDEX + ENTRY * at, ENTRY)?;
+        let columns = u32::from_le_bytes([bytes[24], bytes[25], bytes[26], bytes[27]]);
+        let found = Entry { rows: long(&bytes, 8), place: long(&bytes, 16), columns };
+        Ok((found.place != 0).then_some(found))
+    };
+    let is_complete = |frame: u64| -> Result<bool, FormatError> {
+        let last = if frame == 0 { NAMES.len() as u64 } else { LATER } - 1;
+        Ok(entry(frame, last)?.is_some())
+    };
+    let frame = match which {
+        Some(number) => number as u64,
+        None => {
+            let mut count = 0;
+            while is_complete(count)? {
+                count += 1;
+            }
+            count.saturating_sub(1)
+        }
+    };
+    if !is_complete(frame)? {
+        return Ok(None);
+    }
+    let chunk = |frame: u64, name: &str, size: u64| -> Result<(Vec<u8>, u32), FormatError> {
+        let number = NAMES.iter().position(|known| *known == name).unwrap_or(0) as u64;
+        let Entry { rows, place, columns } =
+            entry(frame, number)?.ok_or_else(|| wrong("the file ends within a frame"))?;
+        let bytes = rows.checked_mul(u64::from(columns)).and_then(|n| n.checked_mul(size));
+        Ok((read(place, bytes.unwrap_or(u64::MAX))?, columns))
+    };
+    let singles = |frame: u64, name: &str| -> Result<Vec<f64>, FormatError> {
+        let (bytes, _) = chunk(frame, name, 4)?;
+        Ok(bytes.as_chunks::<4>().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect())
+    };
+    let vectors = |frame: u64, name: &str| -> Result<Vec<[f64; 3]>, FormatError> {
+        Ok(singles(frame, name)?.as_chunks::<3>().0.to_vec())
+    };
+    let (x, v) = (vectors(frame, "particles/position")?, vectors(frame, "particles/velocity")?);
+    let flat = chunk(0, "configuration/dimensions", 1)?.0 == [2];
+    let shape = singles(frame, "configuration/box")?;
+    let [lx, ly, lz, xy, xz, yz] = shape[..] else { return Err(wrong("the box is not six numbers")) };
+    let lz = if flat { 1.0 } else { lz };
+    let (xy, xz, yz) = (xy * ly, xz * lz, yz * lz);
+    let low = [-0.5 * (lx + xy + xz), -0.5 * (ly + yz), -0.5 * lz];
+    let high = [low[0] + lx, low[1] + ly, low[2] + lz];
+    let domain =
+        domain(low, high, Some([xy, xz, yz]), [true, true, !flat]).map_err(FormatError::content(path))?;
+    let (types, width) = chunk(0, "particles/types", 1)?;
+    let name_of =
+        |row: &[u8]| String::from_utf8_lossy(row.split(|b| *b == 0).next().unwrap_or(row)).into_owned();
+    let names: Vec<String> = types.chunks(width.max(1) as usize).map(name_of).collect();
+    let species = chunk(0, "particles/typeid", 4)?.0;
+    let species: Vec<i32> = species.as_chunks::<4>().0.iter().map(|b| i32::from_le_bytes(*b)).collect();
+    let known = |s: &i32| usize::try_from(*s).is_ok_and(|s| s < names.len());
+    if species.len() != x.len() || v.len() != x.len() || !species.iter().all(known) {
+        return Err(wrong("a frame does not have a species and a velocity for each particle"));
+    }
+    if x.iter().flatten().any(|c| !c.is_finite()) {
+        return Err(wrong("a position is not finite"));
+    }
+    let (step, time) = (chunk(frame, "configuration/step", 8)?.0, chunk(frame, "log/time", 8)?.0);
+    Ok(Some(Configuration {
+        step: (step.len() == 8).then(|| long(&step, 0)),
+        time: (time.len() == 8).then(|| f64::from_bits(long(&time, 0))),
+        dimensions: if flat { 2 } else { 3 },
+        domain,
+        names,
+        tag: (1..=x.len() as i32).collect(),
+        v: Some(v),
+        x,
+        species,
+    }))
+}
+
+/// The number of eight bytes at a place; 0 beyond the end.
+fn long(bytes: &[u8], at: usize) -> u64 {
+    bytes.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |bytes| u64::from_le_bytes(*bytes))
+}
+
 /// The chunks of a frame in the order of [`NAMES`]; `None` for a box that the format cannot hold.
 fn chunks(frame: &Frame, masses: &[f64], first: bool) -> Option<Vec<Chunk>> {
     let [a, b, c] = [0, 1, 2].map(|k| frame.domain.edge(k));
@@ -343,6 +470,54 @@ mod tests {
             assert_eq!(singles(&file, "particles/velocity"), fast, "{dimensions}");
             assert_eq!(singles(&file, "particles/mass"), [1.0f32, 2.5], "{dimensions}");
         }
+    }
+
+    /// A frame comes back in single precision, about the middle of the box; a file that was cut or has wrong sizes is an
+    /// error or lacks the frame, at whatever byte.
+    #[test]
+    fn frames_are_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.gsd");
+        let edges = Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -0.25, 0.0, 0.0, 6.0);
+        let domain = PeriodicBox::new([1.0, 2.0, 3.0], edges, [true; 3]).unwrap();
+        let names = ["A".to_owned(), "long".to_owned()];
+        let x = [[1.5, 3.0, 5.0], [3.0, 2.25, 8.5]];
+        let mut file = GsdFile::create(&path, 4).unwrap();
+        (0..3).for_each(|step| file.write(&frame(step, &domain, &names, &x), &[1.0, 2.0]).unwrap());
+        drop(file);
+        let middle = domain.point([0.5; 3]);
+        for (number, step) in [(None, 2), (Some(0), 0), (Some(1), 1), (Some(2), 2)] {
+            let read = Configuration::open(&path, number).unwrap();
+            assert_eq!((read.step, read.time, read.dimensions), (Some(step), Some(0.1 * step as f64), 3));
+            assert_eq!((&read.names[..], &read.species[..], read.tag.len()), (&names[..], &[0, 1][..], 2));
+            for (found, real) in read.x.iter().zip(&x) {
+                assert!((0..3).all(|k| (found[k] - real[k] + middle[k]).abs() < 1e-6), "{found:?}");
+            }
+            let same = |k: usize| (0..3).all(|c| (read.domain.edge(k)[c] - domain.edge(k)[c]).abs() < 1e-6);
+            assert!((0..3).all(same) && read.v.as_deref().is_some_and(|v| (v[1][2] - 8.5).abs() < 1e-6));
+        }
+        assert_eq!(Configuration::count(&path).unwrap(), 3);
+        let error = Configuration::open(&path, Some(3)).unwrap_err().to_string();
+        assert!(error.contains("no frame 3; the first one is 0, the last one 2"), "{error}");
+        assert!(Configuration::open(&path, Some(usize::MAX)).is_err());
+
+        let whole = std::fs::read(&path).unwrap();
+        for length in (0..whole.len()).step_by(7) {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            let _ = Configuration::open(&path, None);
+        }
+        // A wrong size in the index.
+        for at in (0..whole.len().min(2500)).step_by(3) {
+            let mut wrong = whole.clone();
+            wrong[at..(at + 8).min(whole.len())].fill(0xFE);
+            std::fs::write(&path, &wrong).unwrap();
+            let _ = Configuration::open(&path, None);
+        }
+        let mut other = whole;
+        other[HEADER as usize..HEADER as usize + 8].copy_from_slice(b"whatever");
+        std::fs::write(&path, &other).unwrap();
+        let error = Configuration::open(&path, None).unwrap_err().to_string();
+        assert!(error.contains("another program"), "{error}");
     }
 
     #[test]

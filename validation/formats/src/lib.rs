@@ -2,7 +2,7 @@
 //!
 //! This crate does not depend on how a run is made. A writer is a function of one [`Frame`] and has no memory between
 //! frames, so a file that was cut at the end of a frame can be continued; a [`GsdFile`] keeps its number of frames. A
-//! [`Configuration`] is a frame that was read from a LAMMPS data file, a LAMMPS dump or an extended XYZ file.
+//! [`Configuration`] is a frame that was read from a LAMMPS data file, a LAMMPS dump, an extended XYZ file or psidpd's own GSD.
 
 pub mod about;
 mod configuration;

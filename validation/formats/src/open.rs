@@ -4,6 +4,7 @@ use super::configuration::dimensions_of;
 use super::{Configuration, FormatError, PathError, read_xyz};
 use crate::data::DataFile;
 use crate::dump::{self, DumpReader};
+use crate::gsd::{is_gsd, read_gsd};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::document::open_regular;
 use psidpd_core::engine::PeriodicBox;
@@ -11,7 +12,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 impl Configuration {
-    /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file; the content tells the format. The
+    /// Reads a LAMMPS data file, a LAMMPS text dump, an extended XYZ file or psidpd's own GSD; the content tells the format. The
     /// frame is the one with a number, counted from 0, or the last complete frame.
     pub fn open(path: &Path, number: Option<usize>) -> Result<Configuration, FormatError> {
         if let Some(found) = Configuration::find(path, number)? {
@@ -43,6 +44,9 @@ impl Configuration {
         let mut file = BufReader::new(open_regular(path).map_err(PathError::at("read", path))?);
         // Trajectories may be larger than memory, so their frames are read one by one.
         let start = file.fill_buf().map_err(PathError::at("read", path))?;
+        if is_gsd(start) {
+            return Ok(read_gsd(path, file.get_ref(), number)?.filter(|c| !c.x.is_empty()));
+        }
         let start = String::from_utf8_lossy(start);
         let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
         let found = if first.starts_with("ITEM:") {

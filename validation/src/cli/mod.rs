@@ -79,7 +79,7 @@ enum Verb {
     Report(report::Arguments),
     /// Run a scene at many values of its keys.
     Sweep(sweep::Arguments),
-    /// Draw the particles, or their density, in a data, dump or XYZ file.
+    /// Draw the particles, or their density, in a data, dump, XYZ or GSD file.
     Snapshot(snapshot::Arguments),
     /// Compute mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),

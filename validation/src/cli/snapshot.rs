@@ -8,10 +8,10 @@ use psidpd_formats::{Configuration, FormatError, Frame};
 use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
 use psidpd_report::{Figure, extremes};
 
-/// A picture of the particles, or of their density, in a data, dump or XYZ file; or a film of all its frames.
+/// A picture of the particles, or of their density, in a data, dump, XYZ or GSD file; or a film of all its frames.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A LAMMPS data file, a LAMMPS text dump or an extended XYZ file.
+    /// A LAMMPS data file, a LAMMPS text dump, an extended XYZ file, or a GSD file that psidpd wrote.
     file: PathBuf,
     /// The picture: .png for the picture alone, .svg for one with axes and legend, .gif for a film of the frames of the
     /// file; default: the name of the file with .svg.
