@@ -1,5 +1,6 @@
 //! Pictures made of pixels, with axes, legends and colour bars, as SVG.
 
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -25,6 +26,16 @@ pub struct Figure {
     pub legend: Vec<(String, Rgb)>,
     /// The lowest value, the highest value and the label of a colour bar on the right.
     pub bar: Option<(f64, f64, String)>,
+    /// Lines over a picture with axes, through points of these.
+    pub lines: Vec<Outline>,
+}
+
+/// A line over a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outline {
+    pub colour: Rgb,
+    pub dashed: bool,
+    pub points: Vec<(f64, f64)>,
 }
 
 /// The decoration that shows directions and lengths.
@@ -53,12 +64,16 @@ impl Figure {
             .names
             .iter()
             .enumerate()
-            .map(|(k, name)| (format!("{name} ({})", counts[k]), colour::of_species(k)));
+            // A slice does not show all particles.
+            .map(|(k, name)| match options.slice {
+                Some(_) => (name.clone(), colour::of_species(k)),
+                None => (format!("{name} ({})", counts[k]), colour::of_species(k)),
+            });
         let border = match view.names() {
-            Some(names) => Border::Axes(names.map(str::to_owned), projection.ranges()),
+            Some(names) => Border::Axes(names.map(of_length), projection.ranges()),
             None => Border::Arrows(view),
         };
-        Figure { title: title.into(), image, border, legend: legend.collect(), bar: None }
+        Figure { title: title.into(), image, border, legend: legend.collect(), bar: None, lines: Vec::new() }
     }
 
     /// Draws the particles of a frame in the colours of values between two ends.
@@ -85,9 +100,10 @@ impl Figure {
         Figure {
             title: title.into(),
             image: paint_field(&field, 0.0, high),
-            border: Border::Axes(names.map(str::to_owned), field.projection.ranges()),
+            border: Border::Axes(names.map(of_length), field.projection.ranges()),
             legend: Vec::new(),
             bar: Some((0.0, high, label.into())),
+            lines: Vec::new(),
         }
     }
 
@@ -114,7 +130,10 @@ impl Figure {
             match &self.border {
                 Border::Axes(names, ends) => {
                     let [x, y] = ends.map(|[low, high]| Scale::exact(low, high));
-                    chart(area, [TOP, right], [&names[0], &names[1]], [&x, &y], false)?;
+                    let mut chart = chart(area, [TOP, right], [&names[0], &names[1]], [&x, &y], false)?;
+                    for line in &self.lines {
+                        draw_outline(&mut chart, line, [&x, &y])?;
+                    }
                 }
                 Border::Arrows(view) => arrows(area, *view, [40.0, TOP + h + 10.0])?,
             }
@@ -163,11 +182,38 @@ pub(super) fn field_of_values(
         border: Border::Axes(names, ranges),
         legend: Vec::new(),
         bar: Some((low, high, label.into())),
+        lines: Vec::new(),
     }
+}
+
+/// The name of an axis of the box with its unit.
+fn of_length(name: &str) -> String {
+    format!("{name} [length]")
 }
 
 fn rgb([r, g, b]: Rgb) -> RGBColor {
     RGBColor(r, g, b)
+}
+
+/// Draws a line without its points beyond the axes.
+fn draw_outline(chart: &mut Chart, line: &Outline, scales: [&Scale; 2]) -> Fallible {
+    let is_within = |scale: &Scale, value: f64| {
+        let (low, high) = scale.ends();
+        (low..=high).contains(&value)
+    };
+    let inside = line.points.iter().filter(|p| is_within(scales[0], p.0) && is_within(scales[1], p.1));
+    let points: Vec<(f64, f64)> = inside.copied().collect();
+    let pen = pen(rgb(line.colour), 2.0);
+    match line.dashed {
+        _ if points.len() < 2 => {}
+        true => {
+            chart.draw_series([DashedPathElement::new(points, px(7.0), px(5.0), pen)])?;
+        }
+        false => {
+            chart.draw_series([PathElement::new(points, pen)])?;
+        }
+    }
+    Ok(())
 }
 
 /// Draws the colours from a lowest value to a highest, with numbers on the right.
@@ -239,11 +285,17 @@ mod tests {
 
         let slice = ParticleOptions { view: View::Y, slice: Some(1.0), ..Default::default() };
         let found = texts(&Figure::particles("", &frame, &slice).render().unwrap());
-        assert!(found.iter().any(|t| t == "x") && !found.iter().any(|t| t == "y"), "{found:?}");
+        assert!(
+            found.iter().any(|t| t == "x [length]") && !found.iter().any(|t| t == "y [length]"),
+            "{found:?}"
+        );
+        // The numbers of all particles are not those of a slice.
+        let sliced = Figure::particles("", &frame, &slice);
+        assert!(sliced.legend.iter().all(|(name, _)| !name.contains('(')), "{:?}", sliced.legend);
 
         let field = Figure::field("density", "n", &frame, &FieldOptions::coarse(3));
         let found = texts(&field.render().unwrap());
-        for text in ["density", "n", "x", "z", "0", "8"] {
+        for text in ["density", "n", "x [length]", "z [length]", "0", "8"] {
             assert!(found.iter().any(|t| t == text), "{text} is not in {found:?}");
         }
     }
@@ -258,5 +310,11 @@ mod tests {
         assert_eq!(figure.image.get(side - 1, 0), Some(colour::of_value(1.0)));
         assert_eq!(figure.image.get(0, 0), Some(colour::of_value(f64::NAN)));
         assert_eq!(figure.bar, Some((0.0, 3.0, "l".into())));
+        let line =
+            Outline { colour: [255; 3], dashed: false, points: vec![(0.5, 0.5), (1.5, 1.0), (9.0, 1.0)] };
+        let lined = Figure { lines: vec![line], ..figure.clone() }.render().unwrap();
+        // The point outside is not drawn.
+        let added = |svg: &str| svg.matches("<polyline").count();
+        assert_eq!(added(&lined), added(&figure.render().unwrap()) + 1);
     }
 }

@@ -24,6 +24,7 @@ pub use progress::{Bar, Progress};
 pub use results::{Check, Results};
 pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
+pub use text::typeset;
 
 /// The lowest and the highest of the values that are finite; infinity and its negative if there are none.
 pub fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -48,6 +48,8 @@ pub struct Plot {
     pub levels: Vec<(f64, String)>,
     /// Vertical reference lines, such as the ends of stages, with labels above the plot.
     pub marks: Vec<(f64, String)>,
+    /// What the ordinates cannot be beyond, such as 0 and 1 of fractions: bars and bands end there.
+    pub bounds: Option<[f64; 2]>,
 }
 
 const WIDTH: f64 = 720.0;
@@ -115,7 +117,7 @@ impl Plot {
                 ))?;
             }
             let mut chart = chart(area, [top, 20.0], [&self.x_label, &self.y_label], [x, y], true)?;
-            let runs: Vec<_> = self.series.iter().map(|s| runs(s, x, y)).collect();
+            let runs: Vec<_> = self.series.iter().map(|s| self.runs(s, x, y)).collect();
             // Errors are drawn behind all data.
             for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
                 draw_errors(&mut chart, k, series, runs)?;
@@ -158,12 +160,36 @@ impl Plot {
             for (k, &(x, y)) in series.points.iter().enumerate() {
                 if finite(x, self.log_x) && finite(y, self.log_y) {
                     let error = series.error(k).unwrap_or(0.0);
+                    let [low, high] = self.within(y, error);
                     xs.push(x);
-                    ys.extend([y - error, y, y + error]);
+                    ys.extend([low, y, high]);
                 }
             }
         }
         [Scale::around(xs.into_iter(), self.log_x), Scale::around(ys.into_iter(), self.log_y)]
+    }
+
+    /// The ends of the error bar of an ordinate.
+    fn within(&self, y: f64, error: f64) -> [f64; 2] {
+        let [least, most] = self.bounds.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        [(y - error).max(least.min(y)), (y + error).min(most.max(y))]
+    }
+
+    /// Uninterrupted runs of points that can be shown.
+    fn runs(&self, series: &Series, x: &Scale, y: &Scale) -> Vec<Vec<Shown>> {
+        let shown = |(k, &(a, b)): (usize, &(f64, f64))| {
+            let at = (x.clamp(a)?, y.clamp(b)?);
+            let error = series.error(k).unwrap_or(0.0);
+            let [low, high] = self.within(b, error);
+            let (low, high) = (y.clamp(low).unwrap_or(y.ends().0), y.clamp(high).unwrap_or(y.ends().1));
+            Some(Shown { at, low, high })
+        };
+        let points: Vec<Option<Shown>> = series.points.iter().enumerate().map(shown).collect();
+        points
+            .split(Option::is_none)
+            .filter(|run| !run.is_empty())
+            .map(|run| run.iter().flatten().copied().collect())
+            .collect()
     }
 
     /// Draws horizontal lines, whose names are in the legend, and vertical lines with names above them if there is room.
@@ -186,23 +212,6 @@ impl Plot {
         }
         Ok(())
     }
-}
-
-/// Uninterrupted runs of points that can be shown.
-fn runs(series: &Series, x: &Scale, y: &Scale) -> Vec<Vec<Shown>> {
-    let shown = |(k, &(a, b)): (usize, &(f64, f64))| {
-        let at = (x.clamp(a)?, y.clamp(b)?);
-        let error = series.error(k).unwrap_or(0.0);
-        let (low, high) =
-            (y.clamp(b - error).unwrap_or(y.ends().0), y.clamp(b + error).unwrap_or(y.ends().1));
-        Some(Shown { at, low, high })
-    };
-    let points: Vec<Option<Shown>> = series.points.iter().enumerate().map(shown).collect();
-    points
-        .split(Option::is_none)
-        .filter(|run| !run.is_empty())
-        .map(|run| run.iter().flatten().copied().collect())
-        .collect()
 }
 
 /// Draws a band along a line, and bars at single points.
@@ -360,7 +369,7 @@ mod tests {
         ) {
             let (title, x_label, y_label) = labels;
             let marks = levels.clone();
-            let plot = Plot { title, x_label, y_label, series, log_x: logs.0, log_y: logs.1, levels, marks };
+            let plot = Plot { title, x_label, y_label, series, log_x: logs.0, log_y: logs.1, levels, marks, bounds: None };
             texts(&plot.render().unwrap());
         }
     }

@@ -62,8 +62,22 @@ pub(super) fn superscript(n: i32) -> String {
     n.to_string().chars().map(raised).collect()
 }
 
+/// A unit of an observable in powers of the length: the volume, the area and `r_c` of the model, in a number of dimensions.
+pub(super) fn of_lengths(unit: &str, dimensions: usize) -> String {
+    let (volume, area) = match dimensions {
+        2 => ("length^2", "length"),
+        _ => ("length^3", "length^2"),
+    };
+    match (unit, dimensions) {
+        // The viscosity of two dimensions is a force over a length and a rate.
+        ("mass/(r_c time)", 2) => "mass/time".to_owned(),
+        ("(energy/volume)^2", _) => format!("(energy/{volume})^2"),
+        _ => unit.replace("volume", volume).replace("area", area).replace("r_c", "length"),
+    }
+}
+
 /// Powers as superscripts: `r_c^-3` becomes `r_c⁻³`. Other exponents stay unchanged.
-pub(super) fn typeset(text: &str) -> String {
+pub fn typeset(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
     while let Some((before, after)) = rest.split_once('^') {

@@ -2,16 +2,19 @@
 
 use super::{Axis, Point};
 use psidpd_report::quantity::with_error;
-use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table, distinct};
+use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table, distinct, typeset};
 
-/// Names of the results that any run has, in the order in which they come first.
-fn quantities(points: &[Point]) -> Vec<String> {
-    distinct(points.iter().flat_map(|p| &p.headline.values).map(|value| value.name.clone()))
+/// Names of the results that any run has, in the order in which they come first. A key whose values are given, such as the
+/// density, is not a result.
+fn quantities(axes: &[Axis], points: &[Point]) -> Vec<String> {
+    let given = |name: &String| axes.iter().any(|a| a.key == *name);
+    let names = points.iter().flat_map(|p| &p.headline.values).map(|value| value.name.clone());
+    distinct(names.filter(|name| !given(name)))
 }
 
 /// A row for each run: the keys, each result with its error, whether it is finished, and how many notes there are.
 pub fn csv(axes: &[Axis], points: &[Point]) -> String {
-    let names = quantities(points);
+    let names = quantities(axes, points);
     let mut header: Vec<String> = axes.iter().map(|a| quoted(&a.key)).collect();
     header.extend(names.iter().flat_map(|n| [n.clone(), format!("{n}_error")]));
     header.extend(["finished", "notes", "folder"].map(String::from));
@@ -43,7 +46,7 @@ fn folder_name(p: &Point) -> String {
 }
 
 pub fn table(axes: &[Axis], points: &[Point]) -> Table {
-    let names = quantities(points);
+    let names = quantities(axes, points);
     let keys = axes.iter().map(|a| a.key.clone());
     let mut table = Table::new(keys.chain(names.iter().cloned()).chain(["notes".to_owned()]));
     for p in points {
@@ -66,7 +69,7 @@ pub fn page(title: &str, axes: &[Axis], points: &[Point]) -> Result<Report, Repo
     let mut sections = vec![Section::new("Results", vec![Item::Table(table(axes, points))])];
     let mut plots = Vec::new();
     if let Some(x) = axes.iter().position(Axis::is_numeric) {
-        for name in quantities(points) {
+        for name in quantities(axes, points) {
             let plot = plot(&name, x, axes, points);
             plots.push(Item::figure(&plot, "Bars are one standard deviation.")?);
         }
@@ -112,6 +115,47 @@ fn plot<'a>(name: &str, x: usize, axes: &[Axis], points: &'a [Point]) -> Plot {
         series[0].name = "measured".into();
         series.push(Series::new("mean field", theory, Style::Dashed));
     }
-    let y_label = if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
+    let y_label = match unit {
+        "" | "1" => name.to_owned(),
+        unit => format!("{name} [{}]", typeset(unit)),
+    };
     Plot::new(name, [axes[x].key.clone(), y_label], series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_report::{Headline, HeadlineValue};
+
+    /// A density that the sweep sets is one column; what the runs measured are the others, with their errors.
+    #[test]
+    fn a_key_is_not_a_result_too() {
+        let value = |name: &str, value, error| HeadlineValue {
+            name: name.into(),
+            value,
+            error,
+            unit: "1/length^3".into(),
+            source: String::new(),
+            mean_field: None,
+            published: None,
+        };
+        let axes: Vec<Axis> = vec!["density=3,4".parse().unwrap()];
+        let point = |k: usize| Point {
+            edits: vec![axes[0].edits[k].clone()],
+            folder: format!("run-{k}").into(),
+            headline: Headline {
+                values: vec![value("density", 3.0 + k as f64, None), value("viscosity", 0.8, Some(0.1))],
+                notes: Vec::new(),
+            },
+            error: None,
+            finished: true,
+        };
+        let points = [point(0), point(1)];
+        let table = csv(&axes, &points);
+        let header = table.lines().next().unwrap();
+        assert_eq!(header, "density,viscosity,viscosity_error,finished,notes,folder");
+        assert_eq!(table.lines().nth(2).unwrap(), "4,0.8,0.1,true,0,run-1");
+        let page = page("t", &axes, &points).unwrap().render();
+        assert!(page.contains("viscosity [1/length³]") && !page.contains("density [1/length"), "{page}");
+    }
 }

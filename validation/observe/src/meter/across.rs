@@ -71,6 +71,10 @@ impl Across {
         }
     }
 
+    pub fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
     pub fn bin_height(&self) -> f64 {
         self.height / self.bins as f64
     }

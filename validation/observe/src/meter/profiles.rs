@@ -3,6 +3,7 @@
 use super::across::Across;
 use super::*;
 use crate::keys::RECENTRE;
+use crate::profile::slab_edges;
 use std::marker::PhantomData;
 
 const KEYS: &[crate::keys::Key] = &[AXIS, BINS, RECENTRE];
@@ -89,6 +90,11 @@ pub trait Quantity: Sized {
     const OF_MOTION: bool = false;
 
     fn columns(profile: &Profile<Self>) -> Observation;
+
+    /// Single numbers that the profile gives.
+    fn scalars(_: &Profile<Self>) -> Vec<Observation> {
+        Vec::new()
+    }
 }
 
 /// The profile of a quantity along an axis.
@@ -113,7 +119,7 @@ impl<Q: Quantity> Meter for Profile<Q> {
     }
 
     fn finish(&self) -> Vec<Observation> {
-        vec![Q::columns(self)]
+        [vec![Q::columns(self)], Q::scalars(self)].concat()
     }
 }
 
@@ -152,7 +158,11 @@ impl Quantity for Composition {
     const TABLE: Table = Table {
         path: "composition_profile",
         title: "composition along an axis",
-        about: "`fraction_SPECIES`: the mean number of particles of a species in a slice over that of all.",
+        about: "`fraction_SPECIES`: the mean number of particles of a species in a slice over that of all. Where two \
+                phases lie one above the other in a periodic box, `coexistence` has their compositions: `rich_SPECIES` \
+                and `poor_SPECIES`, the mean fractions on the two plateaus, as `interface_width` takes them; of two \
+                species those of the first. Jackknife errors. It is left out where the plateaus differ by less than \
+                five standard errors or by less than 0.02: one phase.",
         keys: KEYS,
         ..PLAIN
     };
@@ -167,6 +177,53 @@ impl Quantity for Composition {
         }
         out
     }
+
+    fn scalars(Profile(bins, _): &Profile<Self>) -> Vec<Observation> {
+        let count = bins.species.len();
+        // The fraction of the second of two species follows from that of the first.
+        let names = &bins.species[..if count == 2 { 1 } else { count }];
+        if count < 2 || !bins.across.is_periodic() {
+            return Vec::new();
+        }
+        let mut out = Observation::new("coexistence", "Coexisting phases", Kind::Scalar, &bins.series);
+        for (s, name) in names.iter().enumerate() {
+            let plateaus = bins.series.jackknife(|means| {
+                let fraction = |at: &[f64]| at[s] / at.iter().sum::<f64>();
+                let fractions: Vec<f64> = means.chunks_exact(count).map(fraction).collect();
+                plateaus(&fractions, bins.across.height).map(Vec::from)
+            });
+            let [rich, poor] = plateaus[..] else { continue };
+            let doubt = 5.0 * rich.error.hypot(poor.error);
+            if doubt.is_finite() && rich.value - poor.value > doubt.max(0.02) {
+                out = out.column(&format!("rich_{name}"), "1", [rich]);
+                out = out.column(&format!("poor_{name}"), "1", [poor]);
+            }
+        }
+        if out.columns.is_empty() { Vec::new() } else { vec![out] }
+    }
+}
+
+/// The values of the two plateaus of a periodic profile with one step up and one step down, the higher first.
+fn plateaus(values: &[f64], length: f64) -> Option<[f64; 2]> {
+    let count = values.len() as f64;
+    let angle = |k: usize| std::f64::consts::TAU * (k as f64 + 0.5) / count;
+    let sum = |f: fn(f64) -> f64| values.iter().enumerate().map(|(k, x)| x * f(angle(k))).sum::<f64>();
+    let (sine, cosine) = (sum(f64::sin), sum(f64::cos));
+    // A bin that is empty has no fraction.
+    if !sine.is_finite() || !cosine.is_finite() {
+        return None;
+    }
+    let middle = (sine.atan2(cosine) / std::f64::consts::TAU).rem_euclid(1.0);
+    // By whole bins, so that the distances from the middle stay even.
+    let shift = (middle * count).round() as usize + values.len() - values.len() / 2;
+    let half = (values.len() / 2) as f64;
+    let moved = |k: usize| {
+        let z = (k as f64 + 0.5 - half) * length / count;
+        (z, values[(k + shift) % values.len()])
+    };
+    let profile: Vec<(f64, f64)> = (0..values.len()).map(moved).collect();
+    let found = slab_edges(&profile)?;
+    Some([found.liquid, found.vapour])
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -222,5 +279,33 @@ impl Quantity for Velocity {
             out = out.column(&format!("velocity_{name}"), "r_c/time", velocity);
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The plateaus of a layer are found wherever it lies, also across the end of the box; a flat profile has no step, and
+    /// one with an empty bin no fractions.
+    #[test]
+    fn the_plateaus_of_a_layer_are_found_wherever_it_lies() {
+        let layer = |bins: usize, middle: f64| -> Vec<f64> {
+            let value = |k: usize| {
+                let from_middle = ((k as f64 + 0.5) / bins as f64 - middle + 0.5).rem_euclid(1.0) - 0.5;
+                0.5 - 0.4 * ((from_middle.abs() - 0.2) / 0.02).tanh()
+            };
+            (0..bins).map(value).collect()
+        };
+        for bins in [100, 121] {
+            for middle in [0.0, 0.01, 0.3, 0.5, 0.77, 0.99] {
+                let [rich, poor] = plateaus(&layer(bins, middle), 12.0).unwrap();
+                assert!((rich - 0.9).abs() < 0.005 && (poor - 0.1).abs() < 0.005, "{middle}: {rich} {poor}");
+            }
+        }
+        assert!(plateaus(&[0.5; 100], 12.0).is_none_or(|[rich, poor]| (rich - poor).abs() < 1e-9));
+        let mut hollow = layer(100, 0.5);
+        hollow[3] = f64::NAN;
+        assert_eq!(plateaus(&hollow, 12.0), None);
     }
 }

@@ -1,10 +1,13 @@
 //! The main results of a run, with warnings about them.
 
 use super::super::Table;
+use super::super::text::of_lengths;
 use super::series::{self, last_stage};
 use super::{About, Item, Observation, Path, Section, Value, read_json_if_there, with_error};
 use psidpd_formats::Expected;
+use psidpd_observe::Kind;
 use psidpd_observe::drift::drift;
+use psidpd_observe::observation::Column;
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::Serialize;
 
@@ -25,7 +28,8 @@ pub struct Headline {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeadlineValue {
-    /// The name is `density`, `temperature`, `pressure`, `liquid`, `vapour`, `tension`, `width` or `radius`.
+    /// The name is `density`, `temperature`, `pressure`, `liquid`, `vapour`, `tension`, `width`, `radius`, `contact_angle`,
+    /// `viscosity`, or the name of a column of an observable that has no other name here.
     pub name: String,
     pub value: f64,
     /// One standard deviation; `None` if the value is exact or the error is unknown.
@@ -62,14 +66,13 @@ pub fn gather(
     let scalar = |from: &[(&str, &str)]| {
         from.iter().find_map(|(name, column)| {
             let found = observables.iter().filter(of_stage).find(|o| o.name == *name)?;
-            let found = found.scalar(column)?;
+            let found = found.scalar(column).filter(|found| found.value.is_finite())?;
             Some((found.value, Some(found.error), format!("{name}.{column}")))
         })
     };
     let d = about.map_or(3, |a| a.dimensions);
-    let per_volume = format!("1/length^{d}");
-    let energy_density = format!("energy/length^{d}");
-    let per_area = format!("energy/length^{}", d - 1);
+    let [per_volume, energy_density, per_area, of_viscosity] =
+        ["1/volume", "energy/volume", "energy/area", "mass/(r_c time)"].map(|unit| of_lengths(unit, d));
     let mut add = |name: &str, unit: &str, found: Option<(f64, Option<f64>, String)>| {
         let Some((value, error, source)) = found.filter(|f| f.0.is_finite()) else { return };
         let expected = about.and_then(|a| a.expected.iter().find(|e| e.name == name));
@@ -102,18 +105,25 @@ pub fn gather(
     add("temperature", "energy", scalar(&[("temperature", "kinetic")]).or_else(|| from_rows("temperature")));
     add("pressure", &energy_density, scalar(&[("pressure", "carried")]).or_else(|| from_rows("pressure")));
     let both = |c| [("interface_width", c), ("drop", c)];
-    add("liquid", &per_volume, scalar(&both("liquid")));
+    let liquid = ["interface_width", "drop", "pendant", "contact_angle"].map(|name| (name, "liquid"));
+    add("liquid", &per_volume, scalar(&liquid));
     add("vapour", &per_volume, scalar(&both("vapour")));
     // Of the two routes to the tension of a slab the one with the smaller error.
     let routes = ["stress", "free_energy"].map(|route| scalar(&[("surface_tension", route)]));
     let error = |found: &(f64, Option<f64>, String)| found.1.filter(|e| *e > 0.0).unwrap_or(f64::INFINITY);
     let tension = routes.into_iter().flatten().min_by(|a, b| error(a).total_cmp(&error(b)));
-    add("tension", &per_area, tension.or_else(|| scalar(&[("drop", "tension")])));
+    add("tension", &per_area, tension.or_else(|| scalar(&[("drop", "tension"), ("pendant", "tension")])));
     let width =
         scalar(&both("width")).map(|(w, error, from)| (w, error, format!("{from}: 2 d of tanh(z/d)")));
     add("width", "length", width);
     add("radius", "length", scalar(&[("drop", "radius")]));
     add("contact_angle", "degree", scalar(&[("contact_angle", "angle")]));
+    add("viscosity", &of_viscosity, scalar(&[("poiseuille", "viscosity"), ("viscosity", "viscosity")]));
+    for (name, observable, column) in others(observables.iter().filter(of_stage)) {
+        let source = format!("{}.{}", observable.name, column.name);
+        let value = observable.scalar(&column.name).map(|found| (found.value, Some(found.error), source));
+        add(&name, &of_lengths(&column.unit, d), value);
+    }
 
     let mut note = |text: String| all.notes.push(text);
     let thermo =
@@ -177,6 +187,37 @@ pub fn gather(
         }
     }
     all
+}
+
+/// Scalars that have no name of their own among the results: all coexisting compositions and diffusion coefficients, and the
+/// first number of any other observable.
+fn others<'a>(all: impl Iterator<Item = &'a Observation>) -> Vec<(String, &'a Observation, &'a Column)> {
+    const NAMED: [&str; 8] = [
+        "temperature",
+        "pressure",
+        "interface_width",
+        "drop",
+        "surface_tension",
+        "contact_angle",
+        "poiseuille",
+        "viscosity",
+    ];
+    let scalars =
+        all.filter(|o| o.kind == Kind::Scalar && o.x.is_none() && !NAMED.contains(&o.name.as_str()));
+    let mut found = Vec::new();
+    for observable in scalars {
+        let whole = ["coexistence", "diffusion"].contains(&observable.name.as_str());
+        for column in observable.columns.iter().take(if whole { usize::MAX } else { 1 }) {
+            let name = match whole {
+                true => column.name.clone(),
+                // `stress_profile_integral` has the column `integral`.
+                false if observable.name.ends_with(&column.name) => observable.name.clone(),
+                false => format!("{}_{}", observable.name, column.name),
+            };
+            found.push((name, observable, column));
+        }
+    }
+    found
 }
 
 /// The warning about a drop that interacts with its own image through a face of the box.
@@ -319,6 +360,53 @@ mod tests {
             let tension = found.get("tension").unwrap();
             assert_eq!((tension.source.as_str(), tension.value, tension.error), (source, value, Some(0.1)));
             assert_eq!(found.get("width").unwrap().source, "interface_width.width: 2 d of tanh(z/d)");
+        }
+    }
+
+    /// Each observable has a number among the results, in one spelling of units; a mixture has all compositions. Numbers that
+    /// do not exist are left out.
+    #[test]
+    fn every_observable_has_a_result() {
+        let observed = |name: &str, columns: &[(&str, &str, Option<f64>)]| -> Observation {
+            let column = |(name, unit, value): &(&str, &str, Option<f64>)| serde_json::json!({"name": name, "unit": unit, "values": [value], "errors": [0.1]});
+            let columns: Vec<_> = columns.iter().map(column).collect();
+            serde_json::from_value(serde_json::json!({"name": name, "kind": "scalar", "columns": columns}))
+                .unwrap()
+        };
+        let all = [
+            observed(
+                "poiseuille",
+                &[("viscosity", "mass/(r_c time)", Some(0.8)), ("deviation", "1", Some(0.1))],
+            ),
+            observed("coexistence", &[("rich_oil", "1", Some(0.9)), ("poor_oil", "1", Some(0.2))]),
+            observed(
+                "diffusion",
+                &[("diffusion_oil", "r_c^2/time", Some(0.3)), ("diffusion_water", "r_c^2/time", None)],
+            ),
+            observed("clusters", &[("count", "1", Some(3.0)), ("largest", "1", Some(40.0))]),
+            observed("contact_angle", &[("angle", "degree", Some(100.0)), ("liquid", "1/volume", Some(6.0))]),
+            observed("interface_width", &[("liquid", "1/volume", None)]),
+        ];
+        let mut about = super::super::tests::about();
+        for (dimensions, volume) in [(3, "1/length^3"), (2, "1/length^2")] {
+            about.dimensions = dimensions;
+            about.stages.clear();
+            let found = gather(Some(&about), None, None, &all);
+            let names: Vec<_> =
+                found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect();
+            assert_eq!(
+                names,
+                [
+                    ("liquid", 6.0, volume),
+                    ("contact_angle", 100.0, "degree"),
+                    ("viscosity", 0.8, if dimensions == 3 { "mass/(length time)" } else { "mass/time" }),
+                    ("rich_oil", 0.9, "1"),
+                    ("poor_oil", 0.2, "1"),
+                    ("diffusion_oil", 0.3, "length^2/time"),
+                    ("clusters_count", 3.0, "1"),
+                ]
+            );
+            assert!(found.values.iter().all(|v| v.error == Some(0.1)));
         }
     }
 

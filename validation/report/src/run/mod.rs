@@ -61,6 +61,7 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
     let table = keep(series::Table::read(&folder.join("thermo.csv")), &mut notes).flatten();
     let observables =
         keep(read_json_if_there::<Vec<Observation>>(&folder.join("observables.json")), &mut notes).flatten();
+    let observables = observables.map(|all| spelled(all, about.as_ref()));
     let state = state::State::find(folder, about.as_ref(), &mut notes);
 
     let title = about
@@ -76,8 +77,8 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
         observables.as_deref().unwrap_or_default(),
     );
     let mut sections = vec![
-        state::section(folder, state.as_ref(), about.as_ref()),
         observables::section(observables.as_deref()),
+        state::section(folder, state.as_ref(), about.as_ref()),
         series::section(table.as_ref(), about.as_ref(), state.as_ref().map(|s| s.configuration.x.len())),
         files_section(folder),
     ];
@@ -96,6 +97,18 @@ pub fn run_report(folder: &Path) -> Result<Report, ReportError> {
         passed: 0,
         failed: 0,
     })
+}
+
+/// Observables whose units are powers of the length, as in all other parts of the page.
+fn spelled(mut all: Vec<Observation>, about: Option<&About>) -> Vec<Observation> {
+    let dimensions = about.map_or(3, |a| a.dimensions);
+    for observable in &mut all {
+        let columns = observable.columns.iter_mut().map(|c| &mut c.unit);
+        for unit in columns.chain(observable.x.iter_mut().map(|x| &mut x.unit)) {
+            *unit = super::text::of_lengths(unit, dimensions);
+        }
+    }
+    all
 }
 
 /// A value; an error is added to the notes instead.

@@ -1,6 +1,6 @@
 //! The content of `observables.json`: each observable as a number with its error, or as a plot.
 
-use super::super::figure::field_of_values;
+use super::super::figure::{Figure, Outline, field_of_values};
 use super::super::text::typeset;
 use super::super::{Plot, Series, Style, Table};
 use super::{Item, Observation, Section, with_error};
@@ -27,9 +27,9 @@ pub fn section(observables: Option<&[Observation]>) -> Section {
     }
     for observable in all.iter().filter(|o| !is_scalar(o)) {
         if observable.x.is_some() {
-            draw_curve(observable, &mut items);
+            draw_curve(observable, all, &mut items);
         } else {
-            draw_field(observable, &mut items);
+            draw_field(observable, all, &mut items);
         }
     }
     Section::new(heading, items)
@@ -92,10 +92,47 @@ fn figure(o: &Observation, plot: Result<String, super::ReportError>) -> Item {
     }
 }
 
-const COORDINATES: [&str; 4] = ["x", "y", "z", "r"];
+const COORDINATES: [&str; 5] = ["x", "y", "z", "r", "height"];
+
+const WHITE: [u8; 3] = [255; 3];
+const RED: [u8; 3] = [0xFF, 0x5A, 0x36];
+
+/// The surface in the field of a drop, and of a drop on a wall the circle that was fitted, as lines over the field, with what
+/// they are.
+fn surfaces(o: &Observation, all: &[Observation]) -> (Vec<Outline>, String) {
+    let Some(drop) = o.name.strip_suffix("_field") else { return (Vec::new(), String::new()) };
+    let of = |name: &str| all.iter().find(|other| other.name == name && other.stage == o.stage);
+    let Some((heights, radii)) =
+        of(&format!("{drop}_profile")).and_then(|p| Some((p.x.as_ref()?, p.get("radius")?)))
+    else {
+        return (Vec::new(), String::new());
+    };
+    let points = radii.values.iter().copied().zip(heights.values.iter().copied());
+    let points = points.filter(|p| p.0.is_finite()).collect();
+    let mut lines = vec![Outline { colour: WHITE, dashed: false, points }];
+    let mut caption = "White: the surface.".to_owned();
+    if let Some(points) = circle(drop, o, all) {
+        lines.push(Outline { colour: RED, dashed: true, points });
+        caption += " Red, dashed: the fitted circle.";
+    }
+    (lines, caption)
+}
+
+/// The circle that was fitted to a drop on a wall, from its top to the wall's surface, as distances from the vertical and
+/// heights above the surface.
+fn circle(drop: &str, o: &Observation, all: &[Observation]) -> Option<Vec<(f64, f64)>> {
+    let fit = all.iter().find(|other| other.name == drop && other.stage == o.stage)?;
+    let [angle, radius] = ["angle", "radius"].map(|column| fit.scalar(column).map(|found| found.value));
+    let (angle, radius) = (angle?.to_radians(), radius?);
+    let at = |k: u32| {
+        let turned = angle * f64::from(k) / 120.0;
+        (radius * turned.sin(), radius * (turned.cos() - angle.cos()))
+    };
+    (angle.is_finite() && radius.is_finite()).then(|| (0..=120).map(at).collect())
+}
 
 /// Draws values on a grid as a map, and other values as points.
-fn draw_field(o: &Observation, items: &mut Vec<Item>) {
+fn draw_field(o: &Observation, all: &[Observation], items: &mut Vec<Item>) {
     let coordinates = o.columns.iter().take_while(|c| COORDINATES.contains(&c.name.as_str())).count();
     let [first, second, ..] = o.columns.as_slice() else {
         let error = super::ReportError::Plot("a field needs columns of coordinates".into());
@@ -114,8 +151,13 @@ fn draw_field(o: &Observation, items: &mut Vec<Item>) {
         let (values, label) = (grid.sort(&c.values), named(&c.name, &c.unit));
         let size = [grid.x.len(), grid.y.len()];
         let ranges = [ends(&grid.x), ends(&grid.y)];
-        let map = field_of_values(&title, &label, axes.clone(), ranges, size, &values);
-        items.push(figure(o, map.render()));
+        let (lines, told) = surfaces(o, all);
+        let map = Figure { lines, ..field_of_values(&title, &label, axes.clone(), ranges, size, &values) };
+        let mut item = figure(o, map.render());
+        if let Item::Figure { caption, .. } = &mut item {
+            *caption = format!("{caption} {told}").trim().to_owned();
+        }
+        items.push(item);
     }
 }
 
@@ -154,24 +196,39 @@ impl Grid {
     }
 }
 
-fn draw_curve(o: &Observation, items: &mut Vec<Item>) {
+fn draw_curve(o: &Observation, all: &[Observation], items: &mut Vec<Item>) {
     let Some(x) = &o.x else { return };
     let mut push = |svg| items.push(figure(o, svg));
     // Each unit gets its own plot, because a shared axis would be meaningless.
+    // So does a number of drops, which is far from their sizes.
     let unit_of = |c: &Column| if c.unit == "1" { String::new() } else { c.unit.clone() };
-    let units = crate::distinct(o.columns.iter().map(unit_of));
-    if units.is_empty() {
+    let group = |c: &Column| (unit_of(c), c.name == "count");
+    let groups = crate::distinct(o.columns.iter().map(group));
+    if groups.is_empty() {
         push(Err(super::ReportError::Plot("there are no values".into())));
     }
     let is_line = o.kind == Kind::Series || x.values.len() > SINGLE_POINTS;
     let style = if is_line { Style::Line } else { Style::Points };
-    for unit in &units {
-        let columns: Vec<&Column> = o.columns.iter().filter(|c| unit_of(c) == *unit).collect();
+    for of in &groups {
+        let unit = &of.0;
+        let columns: Vec<&Column> = o.columns.iter().filter(|c| group(c) == *of).collect();
         let single = columns.len() == 1;
-        let y_label = if single { named(&columns[0].name, unit) } else { named("", unit).trim().to_owned() };
+        let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+        let y_label = if names.len() <= 3 { named(&names.join(", "), unit) } else { named(&label(o), unit) };
         let name = |c: &Column| if single { String::new() } else { c.name.clone() };
-        let series = columns.iter().map(|c| with_errors(c, &x.values, name(c), style)).collect();
-        push(Plot::new(label(o), [named(&x.name, &x.unit), y_label], series).render());
+        let mut series: Vec<Series> =
+            columns.iter().map(|c| with_errors(c, &x.values, name(c), style)).collect();
+        if x.name == "height"
+            && let Some(points) = o.name.strip_suffix("_profile").and_then(|drop| circle(drop, o, all))
+        {
+            series[0].name = "measured".into();
+            let points = points.into_iter().map(|(r, height)| (height, r)).collect();
+            series.push(Series::new("fitted circle", points, Style::Dashed));
+        }
+        let shares = columns.iter().all(|c| c.name.starts_with("fraction_"));
+        let bounds = shares.then_some([0.0, 1.0]);
+        let plot = Plot { bounds, ..Plot::new(label(o), [named(&x.name, &x.unit), y_label], series) };
+        push(plot.render());
     }
 }
 

@@ -16,7 +16,7 @@ pub struct State {
 impl State {
     /// Searches the files of a run, the latest first.
     pub fn find(folder: &Path, about: Option<&About>, notes: &mut Vec<String>) -> Option<State> {
-        for file in ["final.data", "last-good.data", "dump.lammpstrj", "trajectory.xyz"] {
+        for file in ["final.data", "last-good.data", "dump.lammpstrj", "trajectory.xyz", "trajectory.gsd"] {
             let path = folder.join(file);
             if !there(&path) {
                 continue;
@@ -54,7 +54,7 @@ pub fn section(folder: &Path, state: Option<&State>, about: Option<&About>) -> S
     let mut items = Vec::new();
     match state {
         None => items.push(Item::prose(
-            "There is no final.data, dump or XYZ file that could be read: no picture of the particles.",
+            "There is no final.data, dump, XYZ or GSD file that could be read: no picture of the particles.",
         )),
         Some(state) => figures(state, about, &mut items),
     }
@@ -98,15 +98,20 @@ fn figures(state: &State, about: Option<&About>, items: &mut Vec<Item>) {
         );
     }
     let (options, name) = density(about, frame.dimensions);
+    let unit = super::super::text::of_lengths("1/volume", frame.dimensions);
+    let named = |name: &str| super::super::text::typeset(&format!("{name} [{unit}]"));
     let (kernel, range) = (options.kernel.kind().name(), options.kernel.range());
     let place = if frame.dimensions == 3 { ", in the plane through the middle of the box" } else { "" };
     let caption = format!("Weighted local density with the {kernel} kernel of range {range}{place}.");
-    push(Figure::field("Local density", &name, &frame, &options), caption.clone());
+    push(Figure::field("Local density", &named(&name), &frame, &options), caption.clone());
     if frame.names.len() > 1 {
         for (k, species) in frame.names.iter().enumerate() {
             let options = FieldOptions { species: Some(k), ..options };
             let title = format!("Local density of {species}");
-            push(Figure::field(&title, &format!("{name}_{species}"), &frame, &options), caption.clone());
+            push(
+                Figure::field(&title, &named(&format!("{name}_{species}")), &frame, &options),
+                caption.clone(),
+            );
         }
     }
 }

@@ -56,6 +56,19 @@ const OBSERVABLES: &str = r#"[
      {"name": "rho", "unit": "1", "values": [1, 2, 3, 4, 5, null], "errors": []}], "samples": 3, "note": ""},
     {"name": "surface", "title": "Points of a surface", "kind": "field", "x": null, "columns": [
      {"name": "r", "unit": "length", "values": [0, 0.5, 2]}, {"name": "z", "unit": "length", "values": [4, 5, 7], "errors": [0.5, 0.5, 0.5]}]},
+    {"name": "contact_angle", "title": "Cap", "kind": "scalar", "columns": [
+     {"name": "angle", "unit": "degree", "values": [120.0], "errors": [2.0]},
+     {"name": "radius", "unit": "length", "values": [2.0], "errors": [0.1]}]},
+    {"name": "contact_angle_profile", "title": "Contour", "kind": "profile",
+     "x": {"name": "height", "unit": "length", "values": [0.5, 1.5, 2.5]},
+     "columns": [{"name": "radius", "unit": "length", "values": [1.9, 2.0, 1.3], "errors": [0.1, 0.1, 0.1]}]},
+    {"name": "contact_angle_field", "title": "Cap of liquid", "kind": "field", "columns": [
+     {"name": "r", "unit": "length", "values": [0.5, 1.5, 2.5, 0.5, 1.5, 2.5]},
+     {"name": "height", "unit": "length", "values": [0.5, 0.5, 0.5, 2.5, 2.5, 2.5]},
+     {"name": "density", "unit": "1/volume", "values": [6, 6, 0, 6, 5, 0]}]},
+    {"name": "clusters_series", "title": "Clusters of drops", "kind": "series",
+     "x": {"name": "time", "unit": "time", "values": [1, 2]},
+     "columns": [{"name": "count", "unit": "1", "values": [3, 4]}, {"name": "largest", "unit": "1", "values": [4241, 4000]}]},
     {"name": "flat", "title": "Bad map", "kind": "field", "columns": [{"name": "x", "values": [0, 1]}]}
 ]"#;
 
@@ -106,7 +119,8 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
     let has = |text: &str| assert!(texts.iter().any(|t| t.contains(text)), "{text} is not in the page");
     // The observables, which the scene asks for, come before the totals.
     let place = |heading: &str| texts.iter().position(|t| t == heading).expect(heading);
-    assert!(place("Results") < place("Observables") && place("Observables") < place("Series"));
+    assert!(place("Results") < place("Observables") && place("Observables") < place("Pictures"));
+    assert!(place("Pictures") < place("Series"));
     for text in [
         "A title",
         "A model",
@@ -122,6 +136,9 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
         "rho_oil",
         "rho_water",
         "kT [energy]",
+        "rho_oil, rho_water [length⁻³]",
+        "x [length]",
+        "n [1/length³]",
         "[length⁻³]",
         "Radial distribution",
         "Density map",
@@ -142,6 +159,20 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
     ] {
         has(text);
     }
+    // A drop on a wall is a map with its surface and the fitted circle, not a grid of points.
+    let figure = |title: &str| {
+        let start = page.find(&format!("<title>{title}</title>")).expect(title);
+        &page[start..start + page[start..].find("</svg>").unwrap()]
+    };
+    let map = figure("Cap of liquid");
+    assert!(
+        map.contains("<image") && map.contains("1/length³") && map.to_lowercase().contains("#ff5a36"),
+        "{map}"
+    );
+    assert!(figure("Contour").contains("fitted circle"));
+    has("Red, dashed: the fitted circle.");
+    // The number of drops does not share an axis with their sizes.
+    assert_eq!(page.matches("<title>Clusters of drops</title>").count(), 2);
     // Five points of the profile have error bars, each with a stroke and two caps.
     let start = page.find("<title>Density profile</title>").unwrap();
     let plot = &page[start..start + page[start..].find("</svg>").unwrap()];
