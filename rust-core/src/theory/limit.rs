@@ -4,6 +4,7 @@ use super::{MeanField, TheoryError};
 use crate::model::Fluid;
 use crate::model::pair::PairForm;
 use nalgebra::{DMatrix, DVector};
+use std::fmt;
 
 /// An arrangement that puts more and more particles into the same volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,13 +28,28 @@ pub enum Structure {
     },
 }
 
+impl fmt::Display for Structure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Structure::Uniform => write!(f, "spread evenly"),
+            Structure::Cubic { spacing } => write!(f, "on a simple cubic lattice of spacing {spacing:.4}"),
+            Structure::BodyCentred { spacing } => {
+                write!(f, "on a body-centred cubic lattice of spacing {spacing:.4}")
+            }
+            Structure::ClosePacked { spacing } => {
+                write!(f, "on a close-packed lattice of spacing {spacing:.4}")
+            }
+        }
+    }
+}
+
 /// The error of a fluid without thermodynamic limit: its energy per particle falls without bound as
 /// more particles are put into the same volume, at least in this arrangement.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "no thermodynamic limit: with species in proportions {composition:?} and {structure:?} structure the \
-     energy per particle falls without bound as the density grows (pair energy {pair} per particle and \
-     density, energy per particle {energy} at density {density})"
+    "no thermodynamic limit: with its particles {structure}, and fractions {composition:?} of its species, the energy \
+     per particle falls without bound as the density grows (it is {energy:.3e} at a density of {density:.3e}; that of \
+     pairs is {pair:.4e} times the density)"
 )]
 pub struct NoLimit {
     /// Fractions of the species.
@@ -290,4 +306,27 @@ fn distances(structure: Structure, dimensions: usize, range: f64) -> Vec<f64> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers have as many digits as a reader needs.
+    #[test]
+    fn the_message_has_short_numbers() {
+        let limit = NoLimit {
+            composition: vec![1.0],
+            structure: Structure::Cubic { spacing: 1.0 / 3.0 },
+            pair: -261799387.79914954,
+            density: 1e8,
+            energy: -2.618e16,
+        };
+        assert_eq!(
+            limit.to_string(),
+            "no thermodynamic limit: with its particles on a simple cubic lattice of spacing 0.3333, and fractions [1.0] of \
+             its species, the energy per particle falls without bound as the density grows (it is -2.618e16 at a density of \
+             1.000e8; that of pairs is -2.6180e8 times the density)"
+        );
+    }
 }
