@@ -2,7 +2,7 @@
 
 use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, composition_critical_point, critical_point};
-use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style};
+use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, typeset};
 
 const TEMPERATURES: usize = 25;
 
@@ -22,6 +22,15 @@ pub struct Scope<'a> {
     pub tension: Vec<(f64, [f64; 2], &'static str)>,
     /// What is to be known of the theory of this fluid.
     pub doubts: Vec<String>,
+}
+
+/// The name of an axis with its unit in the dimensions of the model.
+fn unit(name: &str, model: &Model) -> String {
+    let (volume, area) = match model.dimensions() {
+        2 => ("length^2", "length"),
+        _ => ("length^3", "length^2"),
+    };
+    typeset(&name.replace("length^(d−1)", area).replace("length^d", volume))
 }
 
 pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
@@ -62,9 +71,11 @@ fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         mean_field.push(line(format!("mean field, kT = {kt}"), points));
         if let Some(c) = theory.correlations().ok().flatten() {
             let points =
-                (1..=DENSITIES / 5).map(|k| (at(5 * k), c.at(at(5 * k)).map_or(f64::NAN, |c| c.pressure)));
+                (1..=DENSITIES / 2).map(|k| (at(2 * k), c.at(at(2 * k)).map_or(f64::NAN, |c| c.pressure)));
             let name = format!("with correlations, kT = {kt}");
-            correlated.push(Series::new(name, points.collect(), Style::Dashed));
+            // In the colour of the same temperature.
+            let colour = Some(mean_field.len() - 1);
+            correlated.push(Series { colour, ..Series::new(name, points.collect(), Style::Dashed) });
         }
     }
     mean_field.extend(correlated);
@@ -75,7 +86,7 @@ fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         }
     }
     let equal = if species > 1 { ", the species in equal shares" } else { "" };
-    let plot = Plot::new("Pressure", [DENSITY, "p [energy/length^d]"], mean_field);
+    let plot = Plot::new("Pressure", [unit(DENSITY, model), unit("p [energy/length^d]", model)], mean_field);
     let caption = format!(
         "p(ρ) of the homogeneous fluid{equal}; where it falls, or is below the pressure of coexistence, the fluid \
          separates. Dashed: with correlations to first order (random-phase approximation)."
@@ -141,7 +152,7 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         Err(error) => reasons.push(format!("kT = {kt:.4}: {error}")),
     });
     series.push(Series::new("critical point", vec![top], Style::Points));
-    let diagram = Plot::new("Phase diagram", [DENSITY, TEMPERATURE], series);
+    let diagram = Plot::new("Phase diagram", [unit(DENSITY, model), TEMPERATURE.into()], series);
     let mut items = vec![Item::figure(
         &diagram,
         "Vapour and liquid coexist on the binodal; within the spinodal a homogeneous fluid is unstable.",
@@ -156,7 +167,7 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         }
     }
     if series.iter().any(|s| !s.points.is_empty()) {
-        let plot = Plot::new("Surface tension", [TEMPERATURE, TENSION], series);
+        let plot = Plot::new("Surface tension", [TEMPERATURE.into(), unit(TENSION, model)], series);
         items.push(Item::figure(&plot, "Square-gradient theory, Pagonabarraga and Frenkel, eq. 29.")?);
     }
     if !width.is_empty() {
@@ -199,7 +210,11 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
     );
     let mut items = vec![Item::figure(&diagram, caption)?];
     if !tension.is_empty() {
-        let plot = Plot::new("Tension between the phases", [TEMPERATURE, TENSION], vec![line("", tension)]);
+        let plot = Plot::new(
+            "Tension between the phases",
+            [TEMPERATURE.into(), unit(TENSION, model)],
+            vec![line("", tension)],
+        );
         items.push(Item::figure(
             &plot,
             "Square-gradient theory, Pagonabarraga and Frenkel, eqs. 36 to 41, which hold the total density: only where phases of \

@@ -32,6 +32,8 @@ pub struct Series {
     /// The errors of the ordinates. Missing, negative and non-finite errors are not drawn.
     pub errors: Option<Vec<f64>>,
     pub style: Style,
+    /// The number of its colour, such as that of a series that belongs to it; its place in the plot if left out.
+    pub colour: Option<usize>,
 }
 
 /// A plot with linear or logarithmic axes.
@@ -69,7 +71,7 @@ fn colour_of(k: usize) -> RGBColor {
 impl Series {
     /// Points without errors.
     pub fn new(name: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Series {
-        Series { name: name.into(), points, errors: None, style }
+        Series { name: name.into(), points, errors: None, style, colour: None }
     }
 
     pub fn with_errors(self, errors: Vec<f64>) -> Series {
@@ -120,11 +122,11 @@ impl Plot {
             let runs: Vec<_> = self.series.iter().map(|s| self.runs(s, x, y)).collect();
             // Errors are drawn behind all data.
             for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
-                draw_errors(&mut chart, k, series, runs)?;
+                draw_errors(&mut chart, series.colour.unwrap_or(k), series, runs)?;
             }
             self.draw_references(&mut chart, x, y)?;
             for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
-                draw_series(&mut chart, k, series, runs)?;
+                draw_series(&mut chart, series.colour.unwrap_or(k), series, runs)?;
             }
             Ok(())
         })
@@ -133,7 +135,11 @@ impl Plot {
     /// The entries of the legend, in rows above the chart, where they cover no data, and the number of rows.
     fn legend(&self) -> (Vec<([f64; 2], String, Sample)>, usize) {
         let levels = self.levels.iter().filter(|(level, _)| level.is_finite());
-        let series = self.series.iter().enumerate().map(|(k, s)| (&s.name, Sample::Series(k, s.style)));
+        let series = self
+            .series
+            .iter()
+            .enumerate()
+            .map(|(k, s)| (&s.name, Sample::Series(s.colour.unwrap_or(k), s.style)));
         let entries = series.chain(levels.map(|(_, name)| (name, Sample::Level)));
         let (mut placed, mut rows, mut free) = (Vec::new(), 0, f64::INFINITY);
         for (name, sample) in entries {
@@ -310,6 +316,18 @@ mod tests {
     }
 
     #[test]
+    fn series_that_belong_together_share_a_colour() {
+        let line = |colour, style| Series { colour, ..Series::new("s", vec![(0.0, 0.0), (1.0, 1.0)], style) };
+        let second = |shared: Option<usize>| {
+            let series = vec![line(None, Style::Line), line(shared, Style::Dashed)];
+            let svg = Plot::new("t", ["x", "y"], series).render().unwrap().to_lowercase();
+            let [r, g, b] = colour::of_species(1);
+            svg.contains(&format!("#{r:02x}{g:02x}{b:02x}"))
+        };
+        assert!(second(None) && !second(Some(0)));
+    }
+
+    #[test]
     fn everything_named_is_shown() {
         let plot = Plot {
             title: "Title".into(),
@@ -321,6 +339,7 @@ mod tests {
                     points: vec![(0.0, 1.0), (f64::NAN, 2.0), (2.0, 3.0), (3.0, 2.0)],
                     errors: Some(vec![0.5, 0.1]),
                     style: Style::Line,
+                    colour: None,
                 },
                 Series { name: "none".into(), ..Series::default() },
             ],
@@ -354,7 +373,7 @@ mod tests {
             errors in prop::option::of(prop::collection::vec(any::<f64>(), 0..8)),
             style in style(),
         ) -> Series {
-            Series { name, points, errors, style }
+            Series { name, points, errors, style, colour: None }
         }
     }
 
