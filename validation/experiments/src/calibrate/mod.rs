@@ -24,7 +24,7 @@ pub use search::{Batch, DUMMY_SLOPE, Failed, Goal, Round, Trial, Wish, search};
 pub use text::with_correction;
 
 use crate::ExperimentError;
-use crate::bulk::{Bulk, Sampling};
+use crate::bulk::{Bulk, Observed, Sampling};
 use psidpd_core::model::{Model, Polynomial};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
@@ -93,8 +93,23 @@ impl Calibration {
 /// difference of the pressure means nothing, and one of a tenth of the bulk modulus is one of the density.
 const SLOPE_SHARE: f64 = 0.1;
 
+/// Runs a fluid and gives what was observed.
+type Measure<'a> = &'a dyn Fn(&Bulk) -> Result<Observed, RunError>;
+
 /// Calibrates the model in the file `path`; `command` goes into its comment.
 pub fn calibrate(
+    path: &Path,
+    options: &Options,
+    command: &str,
+    told: &mut dyn FnMut(&str),
+) -> Result<Calibration, ExperimentError> {
+    let folder = temporary_folder()?;
+    calibrate_by(&|bulk| bulk.run(path, &folder.path().join("run")), path, options, command, told)
+}
+
+/// The same with the fluid measured by `run`.
+fn calibrate_by(
+    run: Measure,
     path: &Path,
     options: &Options,
     command: &str,
@@ -141,7 +156,6 @@ pub fn calibrate(
                 .ok_or(ExperimentError::NoTarget(*total))
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let folder = temporary_folder()?;
     let observe = format!("local_density = {{ density = \"{name}\", bins = 1000 }}");
     let told = RefCell::new(told);
     told.borrow_mut()("measuring with rho~ = rho");
@@ -167,7 +181,7 @@ pub fn calibrate(
             };
             let Options { kt, sampling, .. } = *options;
             let bulk = Bulk { model: &model, kt, densities: &rho, observe: &observe, sampling };
-            match bulk.run(path, &folder.path().join("run")) {
+            match run(&bulk) {
                 Ok(observed) => {
                     batch.points.push(Point::of(&observed, species, &rho));
                     batch.of.push(k);
@@ -321,5 +335,7 @@ pub fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
     (0..points).map(|k| low + (high - low) * k as f64 / (points - 1) as f64).collect()
 }
 
+#[cfg(test)]
+mod known_fluids;
 #[cfg(test)]
 mod tests;

@@ -82,6 +82,16 @@ pub struct Found {
 
 const TRIALS: usize = 5;
 
+/// What is measured of the model in a file.
+trait Measures {
+    /// The model with its corrected density, and whether its pressures met the tolerance.
+    fn calibrated(&mut self, path: &Path, command: &str) -> Result<(String, bool), ExperimentError>;
+    /// Density of the liquid and tension of a slab.
+    fn slab(&mut self, path: &Path) -> Result<[Measured; 2], ExperimentError>;
+    /// The pressure at a density.
+    fn pressure(&mut self, path: &Path, density: f64) -> Result<Measured, ExperimentError>;
+}
+
 pub fn from_eos(
     substance: &Substance,
     options: &Options,
@@ -89,7 +99,22 @@ pub fn from_eos(
     told: &mut dyn FnMut(&str),
 ) -> Result<Found, ExperimentError> {
     let liquid = equation::liquid(substance, options.temperature)?;
-    let units = Units::new(substance, &liquid, options);
+    let folder = temporary_folder()?;
+    let mut runs = Runs { options, folder: folder.path() };
+    model_of(&liquid, substance, options, command, told, folder.path(), &mut runs)
+}
+
+/// The model of a liquid that is known, by trials in a folder.
+fn model_of(
+    liquid: &Liquid,
+    substance: &Substance,
+    options: &Options,
+    command: &str,
+    told: &mut dyn FnMut(&str),
+    folder: &Path,
+    measures: &mut dyn Measures,
+) -> Result<Found, ExperimentError> {
+    let units = Units::new(substance, liquid, options);
     let wanted = liquid.tension / units.tension;
     told(&format!(
         "liquid of {:.1} kg/m3; r_c = {:.3} nm; targets in reduced units: dp/drho = {:.1}, tension = {wanted:.2}",
@@ -97,40 +122,28 @@ pub fn from_eos(
         units.length * 1e9,
         1.0 / (liquid.compressibility * units.pressure * options.density),
     ));
-    let folder = temporary_folder()?;
-    let path = folder.path().join("trial.toml");
+    let path = folder.join("trial.toml");
     let mut trials: Vec<Trial> = Vec::new();
     // Between these the tension of Warren's fluids is 5 to 15.
     let mut attraction = -40.0;
     loop {
-        let text = fluid::model(substance, &liquid, &units, options, attraction, command)?;
+        let text = fluid::model(substance, liquid, &units, options, attraction, command)?;
         write_bytes(&path, Existing::Keep, text.as_bytes())?;
-        let calibration = calibrate(
-            &path,
-            &Calibrate {
-                kt: 1.0,
-                densities: spaced(options.density, 1.15 * options.density, 5),
-                composition: vec![1.0],
-                name: None,
-                tolerance: options.tolerance,
-                sampling: options.sampling,
-            },
-            command,
-            &mut |_| {},
-        )?;
-        write_bytes(&path, Existing::Keep, calibration.text.as_bytes())?;
-        let [dense, tension] = slab(&path, options, folder.path())?;
+        let (text, calibrated) = measures.calibrated(&path, command)?;
+        write_bytes(&path, Existing::Keep, text.as_bytes())?;
+        let [dense, tension] = measures.slab(&path)?;
         told(&format!(
             "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",
             tension.value,
             tension.error,
-            if calibration.converged { "" } else { "not " }
+            if calibrated { "" } else { "not " }
         ));
-        trials.push(Trial { attraction, tension, calibrated: calibration.converged });
+        trials.push(Trial { attraction, tension, calibrated });
         let met = (tension.value / wanted - 1.0).abs() <= options.tolerance;
         let next = next(&trials, wanted);
         if met || trials.len() == TRIALS || next.is_none() {
-            let (compressibility, by_eos) = compressibility(&path, &liquid, options, &units, folder.path())?;
+            let (compressibility, by_eos) =
+                compressibility(liquid, options, &units, &mut |rho| measures.pressure(&path, rho))?;
             let property = |name, wanted, measured| Property { name, wanted, measured };
             let mass = liquid.density * substance.molar_mass;
             let squeezed = "isothermal compressibility up to 5 % denser, 1/GPa";
@@ -144,13 +157,50 @@ pub fn from_eos(
                 temperature: options.temperature,
                 molecules: options.molecules,
                 units,
-                converged: met && calibration.converged,
+                converged: met && calibrated,
                 trials,
                 compared,
-                text: calibration.text,
+                text,
             });
         }
         attraction = next.unwrap_or(attraction);
+    }
+}
+
+/// Measures by runs, in a folder.
+struct Runs<'a> {
+    options: &'a Options,
+    folder: &'a Path,
+}
+
+impl Measures for Runs<'_> {
+    fn calibrated(&mut self, path: &Path, command: &str) -> Result<(String, bool), ExperimentError> {
+        let Options { density, tolerance, sampling, .. } = *self.options;
+        let calibration = calibrate(
+            path,
+            &Calibrate {
+                kt: 1.0,
+                densities: spaced(density, 1.15 * density, 5),
+                composition: vec![1.0],
+                name: None,
+                tolerance,
+                sampling,
+            },
+            command,
+            &mut |_| {},
+        )?;
+        Ok((calibration.text, calibration.converged))
+    }
+
+    fn slab(&mut self, path: &Path) -> Result<[Measured; 2], ExperimentError> {
+        slab(path, self.options, self.folder)
+    }
+
+    fn pressure(&mut self, path: &Path, density: f64) -> Result<Measured, ExperimentError> {
+        let model = Model::open(path)?;
+        let sampling = Sampling { steps: 3 * self.options.sampling.steps, ..self.options.sampling };
+        let bulk = Bulk { model: &model, kt: 1.0, densities: &[density], observe: "", sampling };
+        Ok(bulk.run(path, &self.folder.join("bulk"))?.pressure())
     }
 }
 
@@ -188,18 +238,11 @@ fn next(trials: &[Trial], wanted: f64) -> Option<f64> {
 
 /// Δ ln ρ/Δp in 1/Pa between the liquid and its first compressed state, of the model and by the equation of state.
 fn compressibility(
-    path: &Path,
     liquid: &Liquid,
     options: &Options,
     units: &Units,
-    folder: &Path,
+    pressure: &mut dyn FnMut(f64) -> Result<Measured, ExperimentError>,
 ) -> Result<(Measured, f64), ExperimentError> {
-    let model = Model::open(path)?;
-    let pressure = |rho: f64| -> Result<Measured, ExperimentError> {
-        let sampling = Sampling { steps: 3 * options.sampling.steps, ..options.sampling };
-        let bulk = Bulk { model: &model, kt: 1.0, densities: &[rho], observe: "", sampling };
-        Ok(bulk.run(path, &folder.join("bulk"))?.pressure())
-    };
     let Some((denser, compressed)) = liquid.compressed.first() else {
         return Err(ExperimentError::Equation("no pressures of the compressed liquid".into()));
     };
@@ -208,6 +251,9 @@ fn compressibility(
     let found = Measured::from(factor.ln()).over(b.minus(a).times(units.pressure));
     Ok((found, factor.ln() / (compressed - liquid.pressure)))
 }
+
+#[cfg(test)]
+mod known_liquids;
 
 #[cfg(test)]
 mod tests {
