@@ -339,6 +339,7 @@ fn configurational(simulation: &Simulation) -> Option<Configurational> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::Integrator;
     use crate::run::{Begin, Outcome, Runner};
     use crate::tests::support::{SET6, SOFT, scene};
     use rand::{SeedableRng, rngs::StdRng};
@@ -543,5 +544,129 @@ mod tests {
         let error = watched(SET6, text).unwrap_err();
         let RunError::Stopped { cause, .. } = &error else { panic!("{error}") };
         assert!(matches!(**cause, RunError::TooHot { dt: 0.04, .. }), "{error}");
+    }
+
+    fn stage(steps: u64, integrator: Integrator) -> Stage {
+        let name = "run".to_owned();
+        Stage { name, level: None, steps, dt: 0.01, integrator, kt: 2.0, thermostat: true, body_forces: true }
+    }
+
+    /// Four blocks with `a` of 1.1, 0.9, 1.3 and 0.7 for a `b` of 1: their ratio is 1, and the sum scatters by √(0.2 · 4/3), with the
+    /// share of faces 1.2 times that. Of two such configurations both sums are twice as large. kT is 2.
+    #[test]
+    fn the_error_of_few_configurations_is_the_scatter_of_their_blocks() {
+        let blocks = [[1.1, 1.0], [0.9, 1.0], [1.3, 1.0], [0.7, 1.0]];
+        let one = Configurational::of(&blocks);
+        for (count, samples) in [(1, 4), (2, 7)] {
+            let found = estimate_configurational(&vec![one; count], 2.0).unwrap();
+            let (n, variance) = (count as f64, 0.2 * 4.0 / 3.0);
+            let expected = 1.2 * (n * variance).sqrt() / (4.0 * n) / 2.0;
+            assert!((found.mean - 0.5).abs() < 1e-12 && (found.error - expected).abs() < 1e-12, "{found:?}");
+            assert_eq!(found.samples, samples);
+        }
+        // Blocks of another ratio that all agree have no scatter about it, and no error is known.
+        let alike = Configurational::of(&[[2.0, 1.0], [4.0, 2.0], [6.0, 3.0]]);
+        assert!(alike.variance(2.0).abs() < 1e-12 && estimate_configurational(&[alike], 2.0).is_none());
+        // A block with nearly all of the sum is nearly one block.
+        assert!((Configurational::of(&[[0.0, 3.0], [0.0, 1.0]]).blocks - 1.6).abs() < 1e-12);
+    }
+
+    /// Of many configurations it is their scatter in time: of forty that are 5 % off, up and down in turns of two, below 2 %, where their
+    /// blocks scatter by three times the sum.
+    #[test]
+    fn the_error_of_many_configurations_is_their_scatter_in_time() {
+        let of = |k: usize| {
+            let a = if (k / 2).is_multiple_of(2) { 1.05 } else { 0.95 };
+            Configurational::of(&[[a + 3.0, 1.0], [a - 3.0, 1.0]])
+        };
+        let of_blocks = estimate_configurational(&[of(0), of(2)], 1.0).unwrap();
+        let found = estimate_configurational(&(0..40).map(of).collect::<Vec<_>>(), 1.0).unwrap();
+        assert!((found.mean - 1.0).abs() < 1e-12 && found.samples == 40, "{found:?}");
+        assert!(found.error < 0.02 && of_blocks.error > 2.0, "{found:?} {of_blocks:?}");
+    }
+
+    fn kinetic(samples: impl IntoIterator<Item = f64>) -> Watch {
+        Watch { kinetic: samples.into_iter().collect(), ..Watch::default() }
+    }
+
+    /// Sixty temperatures that scatter by a hundredth: off by a tenth, high or low, they are told, with what they are; off by 1 % they
+    /// are not, nor are those of the first third, of a level of a ramp, or of too few samples.
+    #[test]
+    fn kinetic_temperatures_that_are_off_are_told() {
+        let scattered = |mean: f64| (0..60).map(move |k| mean + if k % 2 == 0 { 0.01 } else { -0.01 });
+        let usual = stage(600, Integrator::VelocityVerlet);
+        for mean in [1.1, 0.9] {
+            let found = kinetic(scattered(mean)).deviations(&usual);
+            let [one] = &found[..] else { panic!("{found:?}") };
+            assert!((one.mean - mean).abs() < 1e-12 && one.error < 0.002 && !one.falls, "{one:?}");
+            assert_eq!(
+                (one.thermometer, one.dt, one.stage.as_str()),
+                (Thermometer::Kinetic, Some(0.01), "run")
+            );
+            let level = Stage { level: Some([2, 5]), ..usual.clone() };
+            assert_eq!(kinetic(scattered(mean)).deviations(&level), []);
+        }
+        assert_eq!(kinetic(scattered(1.01)).deviations(&usual), []);
+        assert_eq!(kinetic((0..30).map(|_| 3.0).chain(scattered(1.0))).deviations(&usual), []);
+        assert_eq!(kinetic([9.0, 1.5]).deviations(&usual), []);
+    }
+
+    /// A tenth of kT = 2 is off, 1 % is not, and a temperature without error says nothing.
+    #[test]
+    fn measured_temperatures_are_judged_in_units_of_kt() {
+        let usual = stage(600, Integrator::VelocityVerlet);
+        let of = |value: f64, error: f64| Deviation::measured(&usual, Measured { value, error }, 50);
+        for value in [2.2, 1.8] {
+            let found = of(value, 0.01).unwrap();
+            assert!(
+                (found.mean - 0.5 * value).abs() < 1e-12 && (found.error - 0.005).abs() < 1e-12,
+                "{found:?}"
+            );
+            assert_eq!((found.thermometer, found.dt), (Thermometer::Configurational, Some(0.01)));
+        }
+        assert!(of(2.02, 1e-6).is_none() && of(1.98, 1e-6).is_none());
+        assert!(of(2.2, 0.0).is_none() && of(2.2, f64::NAN).is_none() && of(2.2, 0.2).is_none());
+    }
+
+    /// 24 samples of a short stage, ten steps apart at least and 250 at most; none without thermostat.
+    #[test]
+    fn samples_are_taken_when_the_page_says() {
+        let every = |stage: &Stage| (1..=stage.steps).find(|done| Watch::is_due(stage, *done));
+        for (steps, expected) in [(48, 10), (240, 10), (720, 30), (960, 40)] {
+            let mut usual = stage(steps, Integrator::VelocityVerlet);
+            assert_eq!(every(&usual), Some(expected));
+            usual.thermostat = false;
+            assert_eq!(every(&usual), None);
+        }
+        let looks = |steps: u64, name: &str| {
+            let integrator = Integrator::ALL.iter().find(|(known, _)| *known == name).unwrap().1;
+            let of = stage(steps, integrator);
+            (1..=steps).find(|done| looks_at_forces(&of, *done))
+        };
+        // Every 250 evaluations of forces, or sixty times, or every 1000 steps; odd.
+        for (steps, expected) in [(999, None), (1000, Some(251)), (30_000, Some(501)), (300_000, Some(1001))]
+        {
+            assert_eq!(looks(steps, "velocity-verlet"), expected);
+        }
+        assert_eq!((looks(1000, "two-stage"), looks(30_000, "two-stage")), (Some(125), Some(501)));
+        let level = Stage { level: Some([1, 3]), ..stage(30_000, Integrator::VelocityVerlet) };
+        assert!(!(1..=30_000).any(|done| looks_at_forces(&level, done)));
+    }
+
+    /// A liquid that a long step keeps hot is not stopped where a body force acts, which may drive a flow that is hot by itself; it is
+    /// where the stage has none of it.
+    #[test]
+    fn a_driven_flow_is_not_stopped() {
+        let run = |body_forces: bool| {
+            let text = format!(
+                "kT = 1.0\nseed = 1\nbox = 4.0\ndensity = 6.05\n[[body_force]]\nacceleration = [1e-6, 0.0, 0.0]\n\
+                 reversed_along = \"z\"\n[[stage]]\nname = \"hot\"\nsteps = 400\ndt = 0.04\nbody_forces = {body_forces}\n"
+            );
+            watched(SET6, &text)
+        };
+        let found = run(true).unwrap();
+        assert!(found.iter().any(|d| d.thermometer == Thermometer::Kinetic && d.mean > FAR_OFF), "{found:?}");
+        let RunError::Stopped { cause, .. } = run(false).unwrap_err() else { panic!("another error") };
+        assert!(matches!(*cause, RunError::TooHot { .. }), "{cause}");
     }
 }

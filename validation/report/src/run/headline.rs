@@ -292,6 +292,7 @@ fn rows_in_words(count: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use psidpd_formats::AboutStage;
 
     fn table(values: &[f64]) -> series::Table {
         let n = values.len();
@@ -437,5 +438,176 @@ mod tests {
         assert_eq!(small.notes, ["drop: It percolates."]);
         assert_eq!(small.get("tension").map(|v| (v.value, v.error)), Some((3.0, Some(0.1))));
         assert!(small.get("density").is_some_and(|v| v.error.is_none()));
+    }
+
+    /// A stage at kT = 0.7 whose temperature is what is given, constant but for what it scatters by; the rows of the stage before are
+    /// far off.
+    fn run_at(temperature: f64, scatter: f64) -> (About, series::Table) {
+        let mut about = super::super::tests::about();
+        about.stages.iter_mut().for_each(|s| s.kt = 0.7);
+        about.box_edges = [[4.0, 0.0, 0.0], [1.0, 5.0, 0.0], [0.5, -0.5, 6.0]];
+        let of = |before: f64, value: f64, scatter: f64| -> Vec<f64> {
+            let produced = |k| value + if k % 2 == 0 { scatter } else { -scatter };
+            (1..=50).map(|_| before).chain((0..100).map(produced)).collect()
+        };
+        let table = series::Table {
+            header: ["step", "temperature", "potential", "pressure"].map(String::from).to_vec(),
+            columns: vec![
+                (1..=150).map(f64::from).collect(),
+                of(50.0, temperature, scatter),
+                of(-1.0, -20.0, 0.1),
+                of(99.0, 1.25, 0.01),
+            ],
+        };
+        (about, table)
+    }
+
+    fn of_temperature(found: &Headline) -> Vec<&String> {
+        found.notes.iter().filter(|n| n.starts_with("the temperature is")).collect()
+    }
+
+    /// Means are of the last stage alone, the density is that of all particles in the tilted box of 4 · 5 · 6, and what was expected is
+    /// told as it was.
+    #[test]
+    fn values_are_those_of_the_last_stage() {
+        let (mut about, table) = run_at(0.7, 0.002);
+        let expected =
+            |name: &str, mean_field, published| Expected { name: name.into(), mean_field, published };
+        about.expected = vec![
+            expected("pressure", Some(1.3), Some([1.24, 0.03])),
+            expected("temperature", None, Some([0.71, 0.01])),
+            expected("tension", Some(4.0), Some([5.0, 0.5])),
+        ];
+        let found = gather(Some(&about), Some(360.0), Some(&table), &[]);
+        let value = |name: &str| found.get(name).unwrap();
+        let names: Vec<&str> = found.values.iter().map(|v| v.name.as_str()).collect();
+        assert_eq!(names, ["density", "temperature", "pressure"]);
+        assert!((value("density").value - 3.0).abs() < 1e-12 && value("density").error.is_none());
+        assert!(
+            (value("temperature").value - 0.7).abs() < 1e-12
+                && (value("pressure").value - 1.25).abs() < 1e-12
+        );
+        assert_eq!(
+            (value("pressure").mean_field, value("pressure").published),
+            (Some(1.3), Some([1.24, 0.03]))
+        );
+        assert_eq!(
+            (value("temperature").mean_field, value("temperature").published),
+            (None, Some([0.71, 0.01]))
+        );
+        assert_eq!((value("density").mean_field, value("density").published), (None, None));
+        let units = ["density", "temperature", "pressure"].map(|name| value(name).unit.as_str());
+        assert_eq!(units, ["1/length^3", "energy", "energy/length^3"]);
+        assert!(found.notes.is_empty(), "{:?}", found.notes);
+        let rows = found.table().rows;
+        assert!(
+            rows.iter().any(|row| row[0] == "pressure" && row.contains(&with_error(1.24, Some(0.03)))),
+            "{rows:?}"
+        );
+    }
+
+    /// At kT = 0.7 a temperature that is off by 2 % is noticed with its sign and part, one that is off by less than 1 % or by less
+    /// than four of its errors is not; nor is one without thermostat, or of Monte Carlo.
+    #[test]
+    fn a_temperature_that_is_off_is_told_in_parts_of_kt() {
+        let notes = |temperature: f64, scatter: f64, change: &dyn Fn(&mut AboutStage)| {
+            let (mut about, table) = run_at(temperature, scatter);
+            about.stages.iter_mut().for_each(change);
+            let found = gather(Some(&about), None, Some(&table), &[]);
+            of_temperature(&found).into_iter().cloned().collect::<Vec<String>>()
+        };
+        let nothing = |_: &mut AboutStage| {};
+        for (temperature, says) in [(0.714, "+2.0 % off the kT = 0.7 "), (0.6895, "-1.5 % off the kT = 0.7 ")]
+        {
+            let found = notes(temperature, 0.002, &nothing);
+            assert!(found.len() == 1 && found[0].contains(says), "{found:?}");
+        }
+        assert!(notes(0.7065, 0.002, &nothing).is_empty() && notes(0.6935, 0.002, &nothing).is_empty());
+        assert_eq!(notes(0.7075, 0.002, &nothing).len(), 1);
+        assert!(notes(0.714, 0.002, &|s| s.thermostat = false).is_empty());
+        assert!(notes(0.714, 0.002, &|s| s.integrator = "monte-carlo, sweeps = 2".into()).is_empty());
+    }
+
+    /// Of a temperature with a known error: 4 of it are 0.02, of a kT of 0.7.
+    #[test]
+    fn a_temperature_within_four_errors_is_not_off() {
+        let about = run_at(0.7, 0.0).0;
+        let noted = |value: f64| {
+            let observed: Observation = serde_json::from_value(serde_json::json!({
+                "name": "temperature", "kind": "scalar", "stage": "produce",
+                "columns": [{"name": "kinetic", "values": [value], "errors": [0.005]}]
+            }))
+            .unwrap();
+            let mut before = Observation { stage: "equilibrate".into(), ..observed.clone() };
+            before.columns[0].values[0] = 9.0;
+            let found = gather(Some(&about), None, None, &[before, observed]);
+            assert_eq!(found.get("temperature").map(|t| (t.value, t.error)), Some((value, Some(0.005))));
+            !of_temperature(&found).is_empty()
+        };
+        assert_eq!([0.679, 0.681, 0.719, 0.721].map(noted), [true, false, false, true]);
+    }
+
+    /// What observables measure, by the name that the headline has for it; each value is its own number.
+    #[test]
+    fn observables_have_their_names_in_the_headline() {
+        let of = |name: &str, columns: &[(&str, f64)]| -> Observation {
+            let column = |(name, value): &(&str, f64)| serde_json::json!({"name": name, "values": [value], "errors": [0.1 * value]});
+            let columns: Vec<_> = columns.iter().map(column).collect();
+            serde_json::from_value(serde_json::json!({"name": name, "kind": "scalar", "columns": columns}))
+                .unwrap()
+        };
+        let slab = [
+            of("temperature", &[("configurational", 1.0), ("kinetic", 2.0)]),
+            of("pressure", &[("conservative", 3.0), ("carried", 4.0)]),
+            of("interface_width", &[("liquid", 5.0), ("vapour", 6.0), ("width", 7.0)]),
+            of("contact_angle", &[("angle", 80.0)]),
+        ];
+        let found = gather(None, None, None, &slab);
+        let values: Vec<(&str, f64, &str)> =
+            found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect();
+        let expected = [
+            ("temperature", 2.0, "energy"),
+            ("pressure", 4.0, "energy/length^3"),
+            ("liquid", 5.0, "1/length^3"),
+            ("vapour", 6.0, "1/length^3"),
+            ("width", 7.0, "length"),
+            ("contact_angle", 80.0, "degree"),
+        ];
+        assert_eq!(values, expected);
+        assert!(found.values.iter().all(|v| v.error == Some(0.1 * v.value)), "{found:?}");
+        let drop = of(
+            "drop",
+            &[("radius", 1.0), ("liquid", 2.0), ("vapour", 3.0), ("width", 4.0), ("tension", 5.0)],
+        );
+        let mut plane = super::super::tests::about();
+        plane.dimensions = 2;
+        let found = gather(Some(&plane), None, None, &[drop]);
+        let values: Vec<(&str, f64, &str)> =
+            found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect();
+        let expected = [
+            ("liquid", 2.0, "1/length^2"),
+            ("vapour", 3.0, "1/length^2"),
+            ("tension", 5.0, "energy/length^1"),
+            ("width", 4.0, "length"),
+            ("radius", 1.0, "length"),
+        ];
+        assert_eq!(values, expected);
+    }
+
+    /// A drop is as wide as twice its radius and its interface; it touches its image where less than the longest range of the model
+    /// is left of the narrowest periodic edge.
+    #[test]
+    fn a_drop_needs_the_range_of_its_model_beside_it() {
+        let mut about = super::super::tests::about();
+        about.box_edges = [[9.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 4.0]];
+        about.box_periodic = [true, true, false];
+        let touches = |about: &About, radius: f64| {
+            let found = gather(Some(about), Some(100.0), None, &[drop(radius)]);
+            found.notes.iter().any(|n| n.contains("touches its image") && n.contains("in a box of 8.00"))
+        };
+        // 2 · 3.24 + 0.5 leaves 1.02 of 8, and the range is 1.
+        assert!(!touches(&about, 3.24) && touches(&about, 3.26));
+        about.densities[0].range = 1.5;
+        assert!(!touches(&about, 2.99) && touches(&about, 3.01));
     }
 }
