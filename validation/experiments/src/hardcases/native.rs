@@ -109,7 +109,7 @@ fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, Experime
 }
 
 /// |Σ m v| over Σ m |v|.
-fn momentum_of(state: &State) -> f64 {
+pub fn momentum_of(state: &State) -> f64 {
     let (mut sum, mut whole) = ([0.0; 3], 0.0);
     for (v, s) in state.v.iter().zip(&state.species) {
         let m = state.mass[*s as usize];
