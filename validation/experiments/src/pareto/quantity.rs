@@ -268,6 +268,7 @@ fn distance(a: &Structure, b: &Structure) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use psidpd_observe::{Kind, Series};
 
     fn run(kinetic: f64, error: f64) -> Quantities {
         Quantities::of([(Class::Temperature, "T_kin", Measured { value: kinetic, error })], &[], 3)
@@ -335,5 +336,95 @@ mod tests {
         assert!((d - 0.1).abs() < 1e-3, "{d}");
         // The mean of n differences, each ± √2 e, and half of them by the rounding of the sum of squares: √2 · 0.001/√400.
         assert!((error / (2f64.sqrt() * 0.001 / 20.0) - 1.0).abs() < 0.02, "{error}");
+    }
+
+    /// Every column of every observable has its own number: what a name stands for is read where it is.
+    #[test]
+    fn quantities_are_read_where_they_are_observed() {
+        let of = |name: &str, columns: &[(&str, f64)]| {
+            let new = Observation::new(name, name, Kind::Scalar, &Series::new(1));
+            columns.iter().fold(new, |o, (column, value)| {
+                o.column(column, "1", [Measured { value: *value, error: 0.01 * value }])
+            })
+        };
+        let observed = [
+            of("pressure", &[("conservative", 1.0), ("carried", 2.0), ("total", 3.0)]),
+            of("temperature", &[("kinetic", 4.0), ("configurational", 5.0)]),
+            of("interface_width", &[("liquid", 6.0), ("vapour", 7.0), ("width", 8.0)]),
+            of("drop", &[("liquid", 9.0), ("vapour", 10.0), ("tension", 11.0), ("radius", 12.0)]),
+            of("surface_tension", &[("stress", 13.0), ("free_energy", 14.0)]),
+            of("viscosity", &[("viscosity", 15.0)]),
+            of("poiseuille", &[("viscosity", 16.0)]),
+            of("diffusion", &[("diffusion", 17.0), ("diffusion_B", 18.0)]),
+        ];
+        let found =
+            Quantities::of([(Class::Energy, "u", Measured { value: -1.0, error: 0.1 })], &observed, 3);
+        let expected = [
+            ("u", "u", -1.0),
+            ("p", "p_conservative", 1.0),
+            ("p", "p_carried", 2.0),
+            ("T", "T_conf", 5.0),
+            ("rho", "rho_L", 6.0),
+            ("rho", "rho_V", 7.0),
+            ("rho", "rho_L_drop", 9.0),
+            ("rho", "rho_V_drop", 10.0),
+            ("sigma", "sigma", 14.0),
+            ("sigma", "sigma_stress", 13.0),
+            ("sigma", "sigma_drop", 11.0),
+            ("eta", "eta", 15.0),
+            ("eta", "eta_flow", 16.0),
+            ("D", "D", 17.0),
+            ("D", "D_B", 18.0),
+        ];
+        for (class, name, value) in expected {
+            let q = found.scalars.iter().find(|q| q.name == name).unwrap_or_else(|| panic!("{name}"));
+            let error = if name == "u" { 0.1 } else { 0.01 * value };
+            assert_eq!((q.class.name(), q.measured), (class, Measured { value, error }), "{name}");
+            // A tolerance for the kind, and for it alone, is one for this.
+            let d = Deviation::new(q.class, name, q.measured, 0.0, 0.0);
+            for (kind, _) in Class::ALL {
+                let tolerance: super::super::Tolerance = format!("{kind}=1%").parse().unwrap();
+                assert_eq!(tolerance.applies(&d), kind == class || kind == name, "{kind} {name}");
+            }
+        }
+        assert_eq!(found.scalars.len(), expected.len());
+        // What is known to nobody's error is not known.
+        let vague = [of("pressure", &[("carried", f64::NAN)])];
+        assert!(Quantities::of([], &vague, 3).scalars.is_empty());
+
+        // Diffusion and viscosities are another run's, or nobody's.
+        let other = Quantities::of(
+            [],
+            &[of("viscosity", &[("viscosity", 25.0)]), of("pressure", &[("carried", 26.0)])],
+            3,
+        );
+        let mixed = found.clone().with_dynamics_of(Some(&other));
+        let values =
+            ["eta", "p_carried", "sigma", "D", "eta_flow"].map(|name| mixed.get(name).map(|m| m.value));
+        assert_eq!(values, [Some(25.0), Some(2.0), Some(14.0), None, None]);
+        let none = found.clone().with_dynamics_of(None);
+        assert!(none.get("eta").is_none() && none.scalars.len() == expected.len() - 4);
+        let exact = found.as_if_exact();
+        assert!(
+            exact.scalars.iter().all(|q| q.measured.error == 0.0) && exact.get("rho_L").unwrap().value == 6.0
+        );
+    }
+
+    /// Two shells, at r = 1 and 2, of which the second alone is off, by a half of one: its weight is r^(d − 1), so the distance is
+    /// ½ √(4/5) in space, ½ √(2/3) in the plane.
+    #[test]
+    fn shells_count_by_their_size() {
+        let of = |g: [f64; 2], dimensions: usize| {
+            let rdf =
+                Observation::new("rdf", "g", Kind::Curve, &Series::new(1)).against("r", "1", vec![1.0, 2.0]);
+            let known = g.map(|value| Measured { value, error: 1e-9 });
+            Quantities::of([], &[rdf.column("g", "1", known)], dimensions)
+        };
+        let known = Known { kt: 2.0, temperature: true, ideal_pressure: 1.0 };
+        for (dimensions, share) in [(3, 0.8f64), (2, 2.0 / 3.0)] {
+            let found = deviations(&of([1.0, 1.5], dimensions), &of([1.0, 1.0], dimensions), known);
+            assert!(found.len() == 1 && found[0].name == "g" && found[0].class == Class::Structure);
+            assert!((found[0].value - 0.5 * share.sqrt()).abs() < 1e-6, "{found:?}");
+        }
     }
 }

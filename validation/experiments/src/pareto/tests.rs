@@ -307,3 +307,96 @@ fn steps_begin_where_the_fluid_allows_them() {
     let (heavy, light) = (unit(1.0), unit(0.25));
     assert!(heavy == 0.01 && (0.006..0.009).contains(&light), "{heavy} {light}");
 }
+
+/// Of two codes of equal cost and error neither beats the other; of two of equal cost the one with the larger error is beaten, of two
+/// of equal error the dearer one.
+#[test]
+fn equal_codes_share_the_front() {
+    let front = |codes: [(f64, f64); 3]| {
+        let mut points = codes.map(|(u, cost)| fake(Host::Native, 1.0, [u, 1e-6], [cost; 3]));
+        front::mark(&mut points, &["u=1%".parse().unwrap()]);
+        points.map(|p| p.front)
+    };
+    assert_eq!(front([(0.005, 1.0), (0.005, 1.0), (0.02, 3.0)]), [true, true, false]);
+    assert_eq!(front([(0.005, 1.0), (0.006, 1.0), (0.001, 2.0)]), [true, false, true]);
+    assert_eq!(front([(0.005, 1.0), (0.005, 2.0), (0.005, 0.5)]), [false, false, true]);
+}
+
+/// The cheapest of each host, within all tolerances; what was not measured is within none, and is named.
+#[test]
+fn a_setting_is_within_all_tolerances_or_none() {
+    let read = |texts: &[&str]| -> Vec<Tolerance> { texts.iter().map(|t| t.parse().unwrap()).collect() };
+    let mut points = vec![
+        fake(Host::Native, 1.0, [0.003, 0.001], [3.0; 3]),
+        fake(Host::Plugin, 2.0, [0.003, 0.001], [2.0; 3]),
+        fake(Host::Plugin, 3.0, [0.003, 0.001], [4.0; 3]),
+        fake(Host::Lammps, 4.0, [0.003, 0.001], [1.0; 3]),
+    ];
+    let u = read(&["u=1%"]);
+    let cheapest = |points: &[Point], hosts: &[Host]| front::cheapest(points, &u, hosts);
+    assert_eq!(cheapest(&points, &[Host::Native]), Some(0));
+    assert_eq!(cheapest(&points, &[Host::Plugin]), Some(1));
+    assert_eq!(cheapest(&points, &[Host::Native, Host::Plugin]), Some(1));
+    points[1].cost = None;
+    assert_eq!(cheapest(&points, &[Host::Plugin]), Some(2));
+    // 0.3 and two of 0.1 are 0.5 %.
+    assert!(points[0].is_within(&read(&["u=0.51%"])) && !points[0].is_within(&read(&["u=0.49%"])));
+    let both = read(&["u=1%", "T_kin=1%"]);
+    assert!(!points[0].is_within(&both));
+    assert_eq!(front::unmeasured(&points, &both).map(|t| t.name.as_str()), Some("T_kin"));
+    assert_eq!(front::unmeasured(&points, &u), None);
+    let temperature = |value: f64| {
+        let measured = psidpd_observe::Measured { value, error: 0.0 };
+        quantity::Deviation::new(quantity::Class::Temperature, "T_kin", measured, value, 0.001)
+    };
+    points[0].errors.push(temperature(0.02));
+    assert!(!points[0].is_within(&both) && points[0].is_within(&u));
+    front::mark(&mut points, &both);
+    let worst = points[0].worst.as_ref().unwrap();
+    assert!(worst.quantity == "T_kin" && (worst.ratio - 2.0).abs() < 1e-12, "{worst:?}");
+    points[0].errors[1] = temperature(-0.005);
+    assert!(points[0].is_within(&both));
+    assert_eq!((judged(&points[0].errors, &both), judged(&points[0].errors, &u)), (2, 1));
+    assert!(judges_dynamics(&read(&["u=1%", "D=5%"])) && judges_dynamics(&read(&["eta_flow=5%"])));
+    assert!(!judges_dynamics(&both));
+    assert_eq!(points[0].error(quantity::Class::Temperature).map(|d| d.value), Some(-0.005));
+}
+
+/// Longer runs renew the points of the native steps by the setting, those of the plugin too; those of LAMMPS's own are left.
+#[test]
+fn longer_runs_renew_points_of_their_setting() {
+    let code = |host, multiple| fake(host, multiple, [0.5, 0.1], [multiple; 3]);
+    let mut points = vec![
+        code(Host::Native, 1.0),
+        code(Host::Native, 2.0),
+        code(Host::Plugin, 2.0),
+        code(Host::Lammps, 2.0),
+    ];
+    points[1].cost = Cost::of(&[7.0]);
+    points[2].cost = Cost::of(&[5.0]);
+    let physics: Vec<Physics> =
+        [2.0, 1.0].map(|multiple| code(Host::Native, multiple).setting.physics).to_vec();
+    assert_eq!([0, 1].map(|k| cheapest_of(&points, &physics[k])), [Some(7.0), Some(1.0)]);
+    let found = |u: f64| fake(Host::Native, 1.0, [u, 0.001], [1.0; 3]).errors;
+    let made = Made { quantities: Quantities::default(), samples: 640, time: 32.0 };
+    renew(&mut points, &physics, &[Ok(made), Err("too hot".into())], &[Some(found(0.02)), None]);
+    let values = |p: &Point| p.errors.first().map(|d| (100.0 * d.value).round());
+    assert_eq!(points.iter().map(values).collect::<Vec<_>>(), [None, Some(2.0), Some(2.0), Some(50.0)]);
+    let runs: Vec<(bool, u64, f64)> = points.iter().map(|p| (p.stable, p.samples, p.time)).collect();
+    assert_eq!(runs, [(false, 0, 0.0), (true, 640, 32.0), (true, 640, 32.0), (true, 100, 10.0)]);
+    assert_eq!(points[0].unstable.as_deref(), Some("too hot"));
+}
+
+/// Most points decide the tolerance that is usual: of three, two.
+#[test]
+fn usual_tolerances_are_those_of_most_native_points() {
+    let of = |errors: [f64; 3]| {
+        let mut points: Vec<Point> = errors.map(|e| fake(Host::Native, 1.0, [0.0, e], [1.0; 3])).to_vec();
+        // Neither what stopped nor what LAMMPS ran counts.
+        points.push(Point { stable: false, ..fake(Host::Native, 1.0, [0.0, 0.5], [1.0; 3]) });
+        points.extend((0..3).map(|_| fake(Host::Plugin, 1.0, [0.0, 0.5], [1.0; 3])));
+        front::usual(&points, 1.0).0.first().map(|t| t.bound)
+    };
+    assert_eq!(of([0.002, 0.002, 0.012]), Some(0.01));
+    assert_eq!(of([0.002, 0.012, 0.012]), Some(0.05));
+}

@@ -29,9 +29,27 @@ pub fn time(
     pace: Pace,
     progress: &Progress,
 ) -> Result<Vec<Vec<f64>>, ExperimentError> {
+    let bar = progress.bar("cost", ((pace.rounds + 1) * settings.len()) as u64);
+    let clock = |setting: &Setting, steps: u64| {
+        bar.advance(1);
+        match (setting.host, lammps) {
+            (Host::Native, _) => native(origin, setting, steps).map(Some),
+            (_, Some(lammps)) => lammps.time(origin, setting, steps).map(Some),
+            (_, None) => Ok(None),
+        }
+    };
+    time_by(clock, settings, pace, |setting| origin.dt(&setting.physics))
+}
+
+/// The same by a clock that gives the seconds of a step from so many of them, if it has the setting, and with the Δt of settings.
+fn time_by(
+    mut clock: impl FnMut(&Setting, u64) -> Result<Option<f64>, ExperimentError>,
+    settings: &[Setting],
+    pace: Pace,
+    dt: impl Fn(&Setting) -> f64,
+) -> Result<Vec<Vec<f64>>, ExperimentError> {
     let mut steps = vec![CYCLE; settings.len()];
     let mut found = vec![Vec::new(); settings.len()];
-    let bar = progress.bar("cost", ((pace.rounds + 1) * settings.len()) as u64);
     for round in 0..=pace.rounds {
         let order: Vec<usize> = match round % 2 {
             0 => (0..settings.len()).collect(),
@@ -39,19 +57,14 @@ pub fn time(
         };
         for k in order {
             let setting = &settings[k];
-            let per_step = match (setting.host, lammps) {
-                (Host::Native, _) => native(origin, setting, steps[k])?,
-                (_, Some(lammps)) => lammps.time(origin, setting, steps[k])?,
-                (_, None) => continue,
-            };
+            let Some(per_step) = clock(setting, steps[k])? else { continue };
             // The first round finds how many steps there are in a slice.
             if round == 0 {
                 let fit = (pace.seconds / per_step) as u64;
                 steps[k] = (fit / CYCLE * CYCLE).clamp(CYCLE, MOST);
             } else {
-                found[k].push(per_step / origin.dt(&setting.physics));
+                found[k].push(per_step / dt(setting));
             }
-            bar.advance(1);
         }
     }
     Ok(found)
@@ -67,4 +80,44 @@ fn native(origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, Experim
     let begin = Instant::now();
     run.advance(steps, dt, physics.integrator).map_err(failed)?;
     Ok(begin.elapsed().as_secs_f64() / steps as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::setting::{self, Choice, Physics};
+    use super::*;
+    use std::num::NonZeroUsize;
+
+    /// Codes whose steps take what is known, in a machine that becomes slower by a tenth from one timing to the next: the cost of a
+    /// unit of time is that of a step over Δt, all of them are timed in turn there and back, and slices last as long as they may.
+    #[test]
+    fn codes_of_known_pace_are_timed_as_they_are() {
+        let of = |host, multiple| {
+            let physics = Physics { multiple, ..setting::physics(Choice::Few)[0] };
+            Setting { host, physics, threads: NonZeroUsize::MIN }
+        };
+        let settings = [of(Host::Native, 1.0), of(Host::Native, 4.0), of(Host::Lammps, 2.0)];
+        let dt = |setting: &Setting| 0.01 * setting.physics.multiple;
+        let mut asked: Vec<(f64, u64)> = Vec::new();
+        let clock = |setting: &Setting, steps: u64| {
+            let multiple = setting.physics.multiple;
+            asked.push((multiple, steps));
+            // Steps of 1 and 4 ms; nobody runs the third.
+            Ok((multiple != 2.0).then(|| 1e-3 * multiple * 1.1f64.powi(asked.len() as i32 - 1)))
+        };
+        let found = time_by(clock, &settings, Pace { rounds: 2, seconds: 4.0 }, dt).unwrap();
+        let order: Vec<f64> = asked.iter().map(|(multiple, _)| *multiple).collect();
+        assert_eq!(order, [1.0, 4.0, 2.0, 2.0, 4.0, 1.0, 1.0, 4.0, 2.0]);
+        assert!(asked[..3].iter().all(|(_, steps)| *steps == CYCLE), "{asked:?}");
+        // 4 s are 4000 steps of 1 ms, and 909 of 4.4 ms, in whole cycles.
+        for (k, fit) in [(5, 4000), (6, 4000), (4, 909), (7, 909)] {
+            assert_eq!(asked[k].1, (fit / CYCLE * CYCLE).max(CYCLE), "{asked:?}");
+        }
+        for (found, powers) in found.iter().zip([&[5, 6][..], &[4, 7], &[]]) {
+            assert_eq!(found.len(), powers.len());
+            for (seconds, power) in found.iter().zip(powers) {
+                assert!((seconds / (0.1 * 1.1f64.powi(*power)) - 1.0).abs() < 1e-12, "{found:?}");
+            }
+        }
+    }
 }
