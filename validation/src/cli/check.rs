@@ -283,3 +283,64 @@ fn print(findings: &Findings, species: &[String]) {
         say!("{kind:<13} [{}] {}", warning.id, warning.message);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(stage: &str, error: f64, carried: f64) -> StepEstimate {
+        StepEstimate {
+            stage: stage.into(),
+            integrator: "velocity-verlet".into(),
+            dt: 0.02,
+            frequency: 10.0,
+            mean_frequency: Some(10.0),
+            drag: 2.0,
+            error,
+            carried,
+            resolution: 0.0,
+            thinner: None,
+            one_percent: Some(0.0054321),
+        }
+    }
+
+    /// A temperature or a carried pressure that is more than a tenth off is warned of; of several steps the worst.
+    #[test]
+    fn steps_that_err_by_a_tenth_are_too_long() {
+        assert_eq!(too_long(&[step("a", 0.099, 0.099)]), None);
+        assert_eq!(too_long(&[]), None);
+        for (error, carried) in [(0.101, 0.0), (0.0, 0.101)] {
+            assert!(too_long(&[step("a", error, carried)]).is_some());
+        }
+        let steps = [step("a", 0.2, 0.1), step("b", 0.01, 0.3), step("c", 0.25, 0.15)];
+        let warning = too_long(&steps).unwrap();
+        assert!(warning.id == "time-step" && warning.severity == Severity::Warning);
+        let says = "dt = 0.02 of stage \"b\" puts temperatures off by about 1.0 % and the pressure that steps carry by about 30 % of \
+                    rho kT: use dt = 0.0054, ";
+        assert!(warning.message.starts_with(says), "{}", warning.message);
+        let unknown = StepEstimate { one_percent: None, ..step("a", 0.2, 0.1) };
+        assert!(too_long(&[unknown]).unwrap().message.contains("use a shorter step"));
+    }
+
+    #[test]
+    fn errors_are_told_as_far_as_they_are_known() {
+        for (error, resolution, expected) in [
+            (0.0123, 0.0, "about 1.2 %"),
+            (0.5, 0.002, "about 50 %"),
+            (1.5, 0.002, "more than 100 %"),
+            (f64::INFINITY, 0.0, "more than 100 %"),
+            (0.001, 0.002, "less than 0.20 %"),
+            (0.00001, 0.0, "less than 0.010 %"),
+            (0.1, 0.2, "what a short trial cannot tell"),
+        ] {
+            assert_eq!(percent(error, resolution), expected);
+        }
+        assert_eq!(
+            [119.0, 600.0, 9000.0, 200_000.0].map(duration),
+            ["119 s", "10 minutes", "2.5 hours", "2.3 days"]
+        );
+        assert_eq!([0.0, 1.0, 12.0, 1234.0].map(two_digits)[1..], ["1.0", "12", "1200"]);
+        assert_eq!(per_species(&[6.0], 3), Some(vec![2.0; 3]));
+        assert_eq!((per_species(&[1.0, 2.0], 2), per_species(&[], 2)), (Some(vec![1.0, 2.0]), None));
+    }
+}
