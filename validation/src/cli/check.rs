@@ -315,8 +315,8 @@ mod tests {
         let steps = [step("a", 0.2, 0.1), step("b", 0.01, 0.3), step("c", 0.25, 0.15)];
         let warning = too_long(&steps).unwrap();
         assert!(warning.id == "time-step" && warning.severity == Severity::Warning);
-        let says = "dt = 0.02 of stage \"b\" puts temperatures off by about 1.0 % and the pressure that steps carry by about 30 % of \
-                    rho kT: use dt = 0.0054, ";
+        let says = "dt = 0.02 of stage \"b\" changes temperatures by about 1.0 % and the pressure of the momentum flux by about \
+                    30 % of rho kT: use dt = 0.0054, ";
         assert!(warning.message.starts_with(says), "{}", warning.message);
         let unknown = StepEstimate { one_percent: None, ..step("a", 0.2, 0.1) };
         assert!(too_long(&[unknown]).unwrap().message.contains("use a shorter step"));

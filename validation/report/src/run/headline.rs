@@ -587,7 +587,7 @@ mod tests {
         let expected = [
             ("liquid", 2.0, "1/length^2"),
             ("vapour", 3.0, "1/length^2"),
-            ("tension", 5.0, "energy/length^1"),
+            ("tension", 5.0, "energy/length"),
             ("width", 4.0, "length"),
             ("radius", 1.0, "length"),
         ];
