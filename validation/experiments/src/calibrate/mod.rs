@@ -336,6 +336,4 @@ pub fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod known_fluids;
-#[cfg(test)]
 mod tests;

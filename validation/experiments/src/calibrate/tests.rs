@@ -1,3 +1,5 @@
+mod known_fluids;
+
 use super::search::HIGHEST_DEGREE;
 use super::*;
 use crate::bulk::Observed;

@@ -253,11 +253,10 @@ fn compressibility(
 }
 
 #[cfg(test)]
-mod known_liquids;
-
-#[cfg(test)]
 mod tests {
     use super::*;
+
+    mod known_liquids;
 
     #[test]
     fn the_strength_follows_the_tension() {

@@ -84,7 +84,8 @@ mod tests {
         let domain = scene.initial_state().domain;
         let mut end = State::at_rest(domain, vec![2.0], vec![[1.0; 3], [2.0; 3], [3.0; 3]]);
         end.v = vec![[2.0 + drift, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0]];
-        let row = |k: u32| format!("{} {} {} 3\n", 4 * k, if k.is_multiple_of(2) { 2.1 } else { 1.9 }, k / 20);
+        let row =
+            |k: u32| format!("{} {} {} 3\n", 4 * k, if k.is_multiple_of(2) { 2.1 } else { 1.9 }, k / 20);
         let table: String = (0..50).map(row).collect();
         let printed = format!(
             "Step Temp c_counts[3] c_counts[4]\n0 9.0 0 0\nLoop time\n\nStep Temp c_counts[3] c_counts[4]\n{table}Loop time"
