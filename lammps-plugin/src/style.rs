@@ -45,12 +45,7 @@ pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T
 }
 
 impl Style {
-    pub(crate) fn new(
-        model: Model,
-        kt: f64,
-        names: &[String],
-        dimensions: usize,
-    ) -> Result<Style, StyleError> {
+    fn new(model: Model, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
         if model.dimensions() != dimensions {
             return Err(StyleError(format!(
                 "{}: the model has dimensions = {}, the simulation has {dimensions}",

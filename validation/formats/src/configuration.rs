@@ -1,5 +1,24 @@
 use super::Frame;
+use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
+
+/// A box with its first edge along x and its second in the plane of x and y, as LAMMPS has them: its corners, and the tilt
+/// factors xy, xz, yz.
+pub fn domain(
+    lo: [f64; 3],
+    hi: [f64; 3],
+    tilt: Option<[f64; 3]>,
+    periodic: [bool; 3],
+) -> Result<PeriodicBox, String> {
+    let [xy, xz, yz] = tilt.unwrap_or([0.0; 3]);
+    let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| hi[k] - lo[k]);
+    let edges = Matrix3::from_columns(&[
+        Vector3::new(lx, 0.0, 0.0),
+        Vector3::new(xy, ly, 0.0),
+        Vector3::new(xz, yz, lz),
+    ]);
+    PeriodicBox::new(lo, edges, periodic).map_err(|e| e.to_string())
+}
 
 /// The particles at one step, read from a file.
 #[derive(Debug, Clone, PartialEq)]

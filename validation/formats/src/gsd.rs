@@ -5,9 +5,8 @@
 //! the middle of a frame is continued. Numbers are those of the schema: single precision. The box is centred at the
 //! origin, so positions are shifted by the middle of the box.
 
-use super::configuration::Configuration;
+use super::configuration::{Configuration, domain};
 use super::files::{create_inside, draft_inside, open_inside_to_write};
-use super::open::domain;
 use super::{FormatError, Frame, PathError};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};

@@ -20,11 +20,10 @@ mod vtk;
 mod xyz;
 
 pub use about::{About, AboutDensity, AboutStage, Expected, THERMO};
-pub use configuration::Configuration;
+pub use configuration::{Configuration, domain};
 pub use data::DataFile;
 pub use error::{FormatError, PathError};
 pub use frame::Frame;
 pub use gsd::GsdFile;
-pub use open::domain;
 pub use vtk::{Grid, write_vti, write_vtp};
 pub use xyz::{read_xyz, write_xyz};

@@ -1,13 +1,11 @@
 //! Reading a configuration from a file of any format.
 
-use super::configuration::dimensions_of;
+use super::configuration::{dimensions_of, domain};
 use super::{Configuration, FormatError, PathError, read_xyz};
 use crate::data::DataFile;
 use crate::dump::{self, DumpReader};
 use crate::gsd::{is_gsd, read_gsd};
-use nalgebra::{Matrix3, Vector3};
 use psidpd_core::document::open_regular;
-use psidpd_core::engine::PeriodicBox;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -98,24 +96,6 @@ fn last_or_nth(
     Ok(found)
 }
 
-/// A box with its first edge along x and its second in the plane of x and y, as LAMMPS has them: its corners, and the tilt
-/// factors xy, xz, yz.
-pub fn domain(
-    lo: [f64; 3],
-    hi: [f64; 3],
-    tilt: Option<[f64; 3]>,
-    periodic: [bool; 3],
-) -> Result<PeriodicBox, String> {
-    let [xy, xz, yz] = tilt.unwrap_or([0.0; 3]);
-    let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| hi[k] - lo[k]);
-    let edges = Matrix3::from_columns(&[
-        Vector3::new(lx, 0.0, 0.0),
-        Vector3::new(xy, ly, 0.0),
-        Vector3::new(xz, yz, lz),
-    ]);
-    PeriodicBox::new(lo, edges, periodic).map_err(|e| e.to_string())
-}
-
 fn type_names(types: usize) -> Vec<String> {
     (1..=types).map(|k| k.to_string()).collect()
 }
@@ -177,6 +157,7 @@ fn from_dump(frame: &dump::Frame) -> Result<Configuration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use psidpd_core::engine::PeriodicBox;
     use crate::Frame;
     use crate::data::Atom;
     use crate::dump::write_dump;
