@@ -157,10 +157,10 @@ fn from_dump(frame: &dump::Frame) -> Result<Configuration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use psidpd_core::engine::PeriodicBox;
     use crate::Frame;
     use crate::data::Atom;
     use crate::dump::write_dump;
+    use psidpd_core::engine::PeriodicBox;
 
     #[test]
     fn the_same_particles_come_out_of_every_format() {
