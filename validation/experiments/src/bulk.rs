@@ -26,6 +26,20 @@ pub struct Sampling {
     pub threads: NonZeroUsize,
 }
 
+#[cfg(test)]
+impl Sampling {
+    /// A short run, for tests.
+    pub const SHORT: Sampling = Sampling {
+        particles: 500,
+        dt: 0.01,
+        equilibrate: 100,
+        steps: 100,
+        every: 20,
+        seed: 1,
+        threads: NonZeroUsize::MIN,
+    };
+}
+
 #[derive(Debug)]
 pub struct Bulk<'a> {
     /// The fluid. Its file is there: a scene names it.

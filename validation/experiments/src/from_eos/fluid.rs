@@ -98,15 +98,7 @@ mod tests {
             density: 6.0,
             range: 0.75,
             tolerance: 0.05,
-            sampling: Sampling {
-                particles: 500,
-                dt: 0.01,
-                equilibrate: 100,
-                steps: 100,
-                every: 20,
-                seed: 1,
-                threads: std::num::NonZeroUsize::MIN,
-            },
+            sampling: Sampling::SHORT,
         };
         (Substance::find("decane").unwrap(), liquid, options)
     }

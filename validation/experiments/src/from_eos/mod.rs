@@ -128,9 +128,9 @@ fn model_of(
     let mut attraction = -40.0;
     loop {
         let text = fluid::model(substance, liquid, &units, options, attraction, command)?;
-        write_bytes(&path, Existing::Replace, text.as_bytes())?;
+        write_bytes(&path, Existing::Keep, text.as_bytes())?;
         let (text, calibrated) = measures.calibrated(&path, command)?;
-        write_bytes(&path, Existing::Replace, text.as_bytes())?;
+        write_bytes(&path, Existing::Keep, text.as_bytes())?;
         let [dense, tension] = measures.slab(&path)?;
         told(&format!(
             "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",

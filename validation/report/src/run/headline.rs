@@ -364,16 +364,21 @@ mod tests {
         }
     }
 
+    /// An observable with scalars of a name, a unit and a value, whose error is a tenth of it.
+    fn observed(name: &str, columns: &[(&str, &str, Option<f64>)]) -> Observation {
+        let column = |(name, unit, value): &(&str, &str, Option<f64>)| {
+            let error = value.map(|value| 0.1 * value);
+            serde_json::json!({"name": name, "unit": unit, "values": [value], "errors": [error]})
+        };
+        let columns: Vec<_> = columns.iter().map(column).collect();
+        serde_json::from_value(serde_json::json!({"name": name, "kind": "scalar", "columns": columns}))
+            .unwrap()
+    }
+
     /// Each observable has a number among the results, in one spelling of units; a mixture has all compositions. Numbers that
     /// do not exist are left out.
     #[test]
     fn every_observable_has_a_result() {
-        let observed = |name: &str, columns: &[(&str, &str, Option<f64>)]| -> Observation {
-            let column = |(name, unit, value): &(&str, &str, Option<f64>)| serde_json::json!({"name": name, "unit": unit, "values": [value], "errors": [0.1]});
-            let columns: Vec<_> = columns.iter().map(column).collect();
-            serde_json::from_value(serde_json::json!({"name": name, "kind": "scalar", "columns": columns}))
-                .unwrap()
-        };
         let all = [
             observed(
                 "poiseuille",
@@ -407,7 +412,7 @@ mod tests {
                     ("clusters_count", 3.0, "1"),
                 ]
             );
-            assert!(found.values.iter().all(|v| v.error == Some(0.1)));
+            assert!(found.values.iter().all(|v| v.error == Some(0.1 * v.value)), "{found:?}");
         }
     }
 
@@ -550,11 +555,9 @@ mod tests {
     /// What observables measure, by the name that the headline has for it; each value is its own number.
     #[test]
     fn observables_have_their_names_in_the_headline() {
-        let of = |name: &str, columns: &[(&str, f64)]| -> Observation {
-            let column = |(name, value): &(&str, f64)| serde_json::json!({"name": name, "values": [value], "errors": [0.1 * value]});
-            let columns: Vec<_> = columns.iter().map(column).collect();
-            serde_json::from_value(serde_json::json!({"name": name, "kind": "scalar", "columns": columns}))
-                .unwrap()
+        let of = |name: &str, columns: &[(&str, f64)]| {
+            let columns: Vec<_> = columns.iter().map(|(name, value)| (*name, "", Some(*value))).collect();
+            observed(name, &columns)
         };
         let slab = [
             of("temperature", &[("configurational", 1.0), ("kinetic", 2.0)]),

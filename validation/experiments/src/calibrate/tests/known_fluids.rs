@@ -4,7 +4,6 @@ use super::fit::fit_pressure;
 use super::*;
 use psidpd_observe::{Kind, Observation, Series};
 use std::cell::Cell;
-use std::num::NonZeroUsize;
 
 const KT: f64 = 0.7;
 
@@ -33,15 +32,7 @@ fn options(densities: &[f64], tolerance: f64) -> Options {
         composition: vec![1.0],
         name: None,
         tolerance,
-        sampling: Sampling {
-            particles: 500,
-            dt: 0.01,
-            equilibrate: 100,
-            steps: 100,
-            every: 3,
-            seed: 1,
-            threads: NonZeroUsize::MIN,
-        },
+        sampling: Sampling { every: 3, ..Sampling::SHORT },
     }
 }
 

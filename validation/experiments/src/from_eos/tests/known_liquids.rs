@@ -19,15 +19,7 @@ fn options(molecules: f64, density: f64) -> Options {
         density,
         range: 0.75,
         tolerance: 0.03,
-        sampling: Sampling {
-            particles: 500,
-            dt: 0.01,
-            equilibrate: 100,
-            steps: 100,
-            every: 20,
-            seed: 1,
-            threads: std::num::NonZeroUsize::MIN,
-        },
+        sampling: Sampling::SHORT,
     }
 }
 
@@ -88,7 +80,7 @@ fn found(calibrated: bool) -> (Found, Known, Units) {
     let (substance, liquid, options) = (decane(), liquid(), options(3.0, 7.5));
     let units = Units::new(&substance, &liquid, &options);
     let mut known = Known { wanted: liquid.tension / units.tension, calibrated, strengths: Vec::new() };
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temporary_folder().unwrap();
     let found =
         model_of(&liquid, &substance, &options, "a command", &mut |_| {}, folder.path(), &mut known).unwrap();
     (found, known, units)
