@@ -75,8 +75,8 @@ impl Image {
         let mut encoder = png::Encoder::new(&mut bytes, first.width as u32, first.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        // The highest level takes three times as long, for files smaller by 0 to 5 %.
-        encoder.set_compression(png::Compression::Balanced);
+        // The usual level takes six times as long, for files smaller by a fifth.
+        encoder.set_compression(png::Compression::Fast);
         if images.len() > 1 {
             encoder.set_animated(images.len() as u32, 0)?;
             encoder.set_frame_delay(1, per_second.max(1))?;

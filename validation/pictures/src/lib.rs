@@ -4,6 +4,7 @@
 //! [`projection::Projection`] maps points of the box to pixels.
 
 mod animation;
+mod balls;
 pub mod colour;
 mod field;
 mod grid;

@@ -1,4 +1,5 @@
 use super::Image;
+use super::balls::Balls;
 use super::colour::{Rgb, mix, of_species};
 use super::projection::{Projection, View};
 use psidpd_formats::Frame;
@@ -45,63 +46,34 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
     // Along an axis the picture ends with the box. In the oblique view particles at corners extend beyond the box.
     let margin = if view == View::Oblique { radius } else { 0.0 };
     let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size, margin);
-    let size = projection.size.map(|s| s * FINER);
-    let mut canvas = Canvas {
-        image: Image::filled(size[0], size[1], WHITE),
-        depth: vec![f64::NEG_INFINITY; size[0] * size[1]],
-    };
+    let [width, height] = projection.size.map(|s| s * FINER);
     let fine = FINER as f64;
     // A particle smaller than a pixel would flicker as it moves.
     let pixels = (radius * projection.scale * fine).max(0.75 * fine);
-    let reach = pixels / fine / projection.scale;
+    let mut balls = Balls::new([width, height], pixels, pixels / fine / projection.scale);
     let fades = frame.dimensions == 3 && options.slice.is_none();
     for (x, colour) in frame.x.iter().zip(colours) {
-        let toward = projection.toward(*x);
-        let from_slice = (toward - projection.middle() - options.offset).abs();
+        let toward = projection.toward(*x) - projection.middle();
+        let from_slice = (toward - options.offset).abs();
         if options.slice.is_some_and(|thickness| from_slice > 0.5 * thickness) {
             continue;
         }
         let ([across, down], near) = projection.place(*x);
         let colour = if fades { mix(*colour, WHITE, 0.45 * (1.0 - near).clamp(0.0, 1.0)) } else { *colour };
-        canvas.ball([across * fine, down * fine], pixels, toward, reach, colour);
+        balls.add([across * fine, down * fine], toward, colour);
     }
+    let mut canvas = Canvas { image: balls.shaded(), depth: balls.depth };
     canvas.edges(frame, &projection);
     (canvas.image.reduced(FINER), projection)
 }
 
 struct Canvas {
     image: Image,
-    /// The position of the surface in each pixel along the line of sight; larger is nearer to the viewer.
-    depth: Vec<f64>,
+    /// The position of the surface in each pixel along the line of sight, from the middle of the box; larger is nearer to the viewer.
+    depth: Vec<f32>,
 }
 
 impl Canvas {
-    /// Draws a ball of `radius` pixels at `at`. Its middle is at depth `toward`; its front is `reach` (a length) nearer.
-    fn ball(&mut self, at: [f64; 2], radius: f64, toward: f64, reach: f64, colour: Rgb) {
-        let range = |middle: f64, most: usize| {
-            let low = (middle - radius).floor().max(0.0) as usize;
-            let high = (middle + radius).ceil().clamp(0.0, most as f64) as usize;
-            low..high
-        };
-        for y in range(at[1], self.image.height) {
-            for x in range(at[0], self.image.width) {
-                let nx = (x as f64 + 0.5 - at[0]) / radius;
-                let ny = (y as f64 + 0.5 - at[1]) / radius;
-                let rest = 1.0 - nx * nx - ny * ny;
-                if rest <= 0.0 {
-                    continue;
-                }
-                let nz = rest.sqrt();
-                let depth = toward + reach * nz;
-                let index = y * self.image.width + x;
-                if depth > self.depth[index] {
-                    self.depth[index] = depth;
-                    self.image.pixels[index] = shade(colour, nx, ny, nz);
-                }
-            }
-        }
-    }
-
     /// Draws the edges of the box, hidden behind particles.
     fn edges(&mut self, frame: &Frame, projection: &Projection) {
         let fine = FINER as f64;
@@ -115,7 +87,7 @@ impl Canvas {
                     let t = s as f64 / steps as f64;
                     let point: [f64; 3] = std::array::from_fn(|k| a[k] + t * (b[k] - a[k]));
                     let [x, y] = projection.place(point).0.map(|c| c * fine);
-                    let toward = projection.toward(point);
+                    let toward = (projection.toward(point) - projection.middle()) as f32;
                     // The line is two fine pixels wide, so it is one pixel wide in the reduced image.
                     for (dx, dy) in [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (-1.0, -1.0)] {
                         let x = (x + dx).clamp(0.0, (self.image.width - 1) as f64) as usize;
@@ -128,14 +100,6 @@ impl Canvas {
             }
         }
     }
-}
-
-/// Light from the upper left: a highlight there, shade on the other side, the unchanged colour in the middle.
-fn shade(colour: Rgb, nx: f64, ny: f64, nz: f64) -> Rgb {
-    let light = -0.5 * nx - 0.62 * ny;
-    let rim = 0.45 * (1.0 - nz).powi(2);
-    let lit = mix(colour, WHITE, (0.55 * light).clamp(0.0, 0.45) * nz.sqrt());
-    mix(lit, [0; 3], (rim + (-0.35 * light).max(0.0)).clamp(0.0, 0.6))
 }
 
 #[cfg(test)]
