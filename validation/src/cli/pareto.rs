@@ -10,8 +10,8 @@ use psidpd_experiments::pareto::{self, Choice, Effort, Options, Pace, Tolerance,
 pub struct Arguments {
     /// The scene file.
     scene: PathBuf,
-    /// Errors that you accept, such as u=0.2%,p=2%,rho_L=0.1%. If left out, each quantity has the smallest of 1, 2 and 5% that can be
-    /// resolved in the time. Errors of u and T are in units of kT, of p in ρkT, of densities in that of the liquid.
+    /// Errors that you accept, such as u=0.2%,p=2%,rho_L=0.1%. If left out, each quantity has the smallest of 1, 2, 5 and 10% that
+    /// can be resolved in the time, doubled until a setting keeps it. Errors of u and T are in units of kT, of p in ρkT, of densities in that of the liquid.
     #[arg(long, value_name = "NAME=BOUND,…", value_delimiter = ',')]
     tolerance: Vec<Tolerance>,
     /// Approximate duration in minutes; 20 with --full.

@@ -82,14 +82,16 @@ mod tests {
         outcome.values.iter().filter(|value| !value.passes()).map(|value| value.name.clone()).collect()
     }
 
-    /// A tolerance that passes these would be too wide.
+    /// Tolerances that pass these would be too wide. Of right forces one value of this case disagrees.
     #[test]
-    fn cases_tell_of_faults() {
-        let (id, fault) = ("pagonabarraga-fig3", Fault::ManyBodyForce);
-        let known = failing(id, None);
-        assert_eq!(known, ["alpha of the quadratic kernel, density 3"]);
-        assert!(failing(id, Some(fault)).len() > known.len() + 1, "{fault:?}");
-        // The rest of this case does not depend on the noise: nothing else is wrong.
+    fn a_case_tells_of_wrong_forces() {
+        let found = failing("pagonabarraga-fig3", Some(Fault::ManyBodyForce));
+        assert!(found.len() > 2, "{found:?}");
+    }
+
+    /// The rest of this case does not depend on the noise: nothing else is wrong.
+    #[test]
+    fn a_case_tells_of_wrong_noise() {
         assert_eq!(failing("pagonabarraga-fig7", Some(Fault::Noise)), ["kinetic temperature"]);
     }
 

@@ -7,7 +7,9 @@ use crate::code::Host;
 use psidpd_report::distinct;
 
 /// Bounds of quantities where none is given: the first that can be told from nothing.
-const USUAL: [f64; 3] = [0.01, 0.02, 0.05];
+const USUAL: [f64; 4] = [0.01, 0.02, 0.05, 0.1];
+/// The widest that they become where no setting keeps them.
+const WIDEST: f64 = 0.2;
 
 /// Notes at each point its worst error, and whether nothing is cheaper with a smaller one. Points of LAMMPS's own law are not
 /// on the front: they are another fluid, with another reference.
@@ -44,19 +46,29 @@ pub fn unmeasured<'a>(points: &[Point], tolerances: &'a [Tolerance]) -> Option<&
     tolerances.iter().find(|t| !measured(t))
 }
 
-/// For every quantity the smallest usual bound that is twice what most points will be bound by if they have no error at all, and
-/// the names of quantities that are too vague for any. Errors fall to `forecast` of what they are.
-pub fn usual(points: &[Point], forecast: f64) -> (Vec<Tolerance>, Vec<String>) {
+/// For every quantity the smallest usual bound of which most points will use half if they have no error at all, and the names of
+/// quantities that are too vague for any. Errors fall to `forecast` of what they are, and count `margin` times.
+pub fn usual(points: &[Point], forecast: f64, margin: f64) -> (Vec<Tolerance>, Vec<String>) {
     let native = || points.iter().filter(|p| p.code == Host::Native && p.stable);
     let (mut good, mut others) = (Vec::new(), Vec::new());
     for name in distinct(native().flat_map(|p| &p.errors).map(|d| &d.name)) {
         let of: Vec<&Deviation> = native().flat_map(|p| &p.errors).filter(|d| d.name == *name).collect();
-        let mostly =
-            |bound: &f64| 2 * of.iter().filter(|d| d.resolves(0.5 * bound / forecast)).count() > of.len();
+        let is_kept = |d: &&&Deviation, bound: f64| margin * d.error * forecast <= 0.5 * bound;
+        let mostly = |bound: &f64| 2 * of.iter().filter(|d| is_kept(d, *bound)).count() > of.len();
         match USUAL.into_iter().find(mostly) {
             Some(bound) => good.push(Tolerance { name: name.clone(), bound }),
             None => others.push(name.clone()),
         }
     }
     (good, others)
+}
+
+/// Usual tolerances, doubled until a native point is within them, up to [`WIDEST`]. This may be done after a race: the margin of
+/// its rule holds for all errors of all points at once, whatever they are compared with.
+pub fn widened(points: &[Point], tolerances: &[Tolerance]) -> Vec<Tolerance> {
+    let mut wide = tolerances.to_vec();
+    while cheapest(points, &wide, &[Host::Native]).is_none() && wide.iter().any(|t| t.bound < WIDEST) {
+        wide.iter_mut().for_each(|t| t.bound = (2.0 * t.bound).min(WIDEST));
+    }
+    wide
 }

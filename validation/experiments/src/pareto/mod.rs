@@ -41,7 +41,7 @@ use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::{Existing, write_bytes, write_json};
 use psidpd_report::Progress;
 use quantity::{Known, Quantities, deviations};
-use race::{Rule, contenders, race};
+use race::{Rule, Standing, contenders, race};
 use sample::{Made, Sampled, Sampler};
 use setting::{Physics, Setting};
 use std::num::NonZeroUsize;
@@ -135,8 +135,10 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
         points[k].cost = Cost::of(&cost);
     }
     let forecast = if options.fixed.is_some() { 1.0 } else { FORECAST };
-    let (tolerances, unresolved) = match &options.tolerances[..] {
-        [] => front::usual(&points, forecast),
+    let measured = looked.iter().flatten().map(Vec::len).max().unwrap_or(0);
+    let (mut tolerances, unresolved) = match &options.tolerances[..] {
+        // As if all quantities were judged: hardly more than what the rule of the race will ask for.
+        [] => front::usual(&points, forecast, Rule::new(&[], physics.len(), measured, LOOKS + 1).margin()),
         asked => (asked.to_vec(), Vec::new()),
     };
     if let Some(tolerance) = front::unmeasured(&points, &tolerances) {
@@ -147,7 +149,7 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
     let rule = Rule::new(&tolerances, physics.len(), quantities, LOOKS + 1);
     let (begin, whole) = (Instant::now(), Duration::from_secs_f64(LATER * budget));
     let rounds = if options.fixed.is_some() { 0 } else { LOOKS };
-    let standings = race(
+    let mut standings = race(
         &mut field,
         &rule,
         &costs,
@@ -163,6 +165,15 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
     )?;
     let (looked, sampled) = (field.look(known)?, field.sampled());
     renew(&mut points, &physics, &sampled, &looked);
+    let margin = rule.margin();
+    if options.tolerances.is_empty() {
+        tolerances = front::widened(&points, &tolerances);
+        let rule = Rule::new(&tolerances, physics.len(), quantities, LOOKS + 1);
+        let again = |errors: &Option<Vec<Deviation>>| {
+            errors.as_ref().map_or(Standing::Beyond, |errors| rule.standing(errors))
+        };
+        standings = looked.iter().map(again).collect();
+    }
     front::mark(&mut points, &tolerances);
     let references = &field.references;
     let open = contenders(&costs, &standings);
@@ -170,7 +181,6 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Comp
         .filter(|k| points[*k].code == Host::Native && points[*k].stable)
         .filter(|k| open.iter().any(|of| physics[*of] == points[*k].setting.physics))
         .collect();
-    let margin = rule.margin();
     let (reference, reference_of_dynamics) = references.tell(&origin, known);
     if let Err(why) = &references.configurations {
         left_out.push(format!("This scene cannot run Monte Carlo, so small steps are the reference: {why}."));

@@ -31,7 +31,7 @@ pub struct Comparison {
     pub left_out: Vec<String>,
     pub points: Vec<Point>,
     pub drifts: Vec<EnergyDrift>,
-    /// What was asked for; if nothing was, 1, 2 or 5 % of each quantity, as well as the time resolves it.
+    /// What was asked for; if nothing was, 1, 2, 5 or 10 % of each quantity, as well as the time resolves it, doubled until a setting is within.
     #[serde(rename = "tolerance", serialize_with = "tolerance::by_name")]
     pub tolerances: Vec<Tolerance>,
     /// Quantities that are not judged, as most points do not resolve the largest of these.

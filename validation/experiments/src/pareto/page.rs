@@ -161,7 +161,7 @@ pub fn recommendation(outcome: &Comparison) -> String {
     let within = within.join(", ");
     let mut text = match &outcome.unresolved[..] {
         [] => String::new(),
-        names => format!("Not judged, as most runs do not resolve 5 % of it: {}.\n\n", names.join(", ")),
+        names => format!("Not judged, as most runs do not resolve 10 % of it: {}.\n\n", names.join(", ")),
     };
     let Some(best) = &outcome.recommended else {
         text += &format!("No setting has {within}. {}", decision(outcome));

@@ -79,7 +79,7 @@ fn walls_turn_nothing_away_that_belongs_there() {
     run.set_frozen(&crate::particles::Tags::Ranges(vec![1..=1]));
     let (mut counts, mut heat) = ([0.0; 8], 0.0);
     for _ in 0..10_000 {
-        run.step(1.0, trials(60, Some(0.7)), Want::FORCES).unwrap();
+        run.step(1.0, trials(20, Some(0.7)), Want::FORCES).unwrap();
         assert_eq!((run.state().x[0], run.state().v[0]), (frozen, [0.0; 3]));
         counts[(run.state().x[1][2] / EDGE * 8.0) as usize] += 1.0;
         heat += run.temperature() / 10_000.0;
