@@ -24,7 +24,6 @@ pub struct Style {
     pub(crate) thermostat: Option<PairThermostat>,
     /// Iterations of the thermostat at earlier temperatures and settings.
     pub(crate) effort_before: Effort,
-    kt: f64,
     /// Meaning of the letters of pair_coeff, for the log.
     letters: Option<&'static str>,
     /// One unit of the model in units of LAMMPS.
@@ -72,14 +71,13 @@ impl Style {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let mut engine = Engine::new(&model.at(kt)?, settings)?;
         engine.map_kinds(&kinds)?;
-        let thermostat = PairThermostat::new(engine.plan(), kt, &settings);
+        let thermostat = PairThermostat::new(engine.plan(), &settings);
         Ok(Style {
             model,
             engine,
             pending: None,
             thermostat,
             effort_before: Effort::default(),
-            kt,
             letters: None,
             scale: Scale::ONE,
             converted: Converted::default(),
@@ -88,22 +86,19 @@ impl Style {
 
     /// Changes the temperature, on which the model's expressions and the noise depend.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
-        guard(|| {
-            self.kt = kt / self.scale.energy;
-            self.rebuild(self.engine.settings())
-        })
+        guard(|| self.rebuild(kt / self.scale.energy, self.engine.settings()))
     }
 
-    fn rebuild(&mut self, settings: Settings) -> Result<(), StyleError> {
+    fn rebuild(&mut self, kt: f64, settings: Settings) -> Result<(), StyleError> {
         self.effort_before = self.effort_so_far();
-        let fluid = self.model.at(self.kt)?;
+        let fluid = self.model.at(kt)?;
         let device = self.engine.use_device(None);
         self.engine.renew(&fluid, settings)?;
         if let Some(mut device) = device {
             device.set_fluid(&fluid)?;
             self.engine.use_device(Some(device));
         }
-        self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &settings);
+        self.thermostat = PairThermostat::new(self.engine.plan(), &settings);
         Ok(())
     }
 
@@ -116,7 +111,7 @@ impl Style {
             if (precision, threads) == (settings.precision, settings.threads) {
                 return Ok(());
             }
-            self.rebuild(Settings { precision, threads, ..settings })
+            self.rebuild(self.engine.plan().kt(), Settings { precision, threads, ..settings })
         })
     }
 

@@ -63,7 +63,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         let mut engine = Engine::new(&fluid, settings).map_err(|e| e.to_string())?;
         let mut cloud = Cloud::new(subject, &fluid, count);
         let mut thermostat =
-            PairThermostat::new(sweep.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
+            PairThermostat::new(sweep.plan(), &settings).ok_or("the fluid has no thermostat")?;
         let (pool, dt) = (Pool::new(settings.threads), 6.0 * cloud.dt());
         for number in 0..evaluations {
             cloud.drift();
@@ -110,7 +110,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
 fn on_rank(mut rank: Rank, fluid: &Fluid, settings: Settings, evaluations: u32) -> Result<(), String> {
     let mut engine = Engine::new(fluid, settings).map_err(|e| e.to_string())?;
     let mut thermostat =
-        PairThermostat::new(engine.plan(), 1.0, &settings).ok_or("the fluid has no thermostat")?;
+        PairThermostat::new(engine.plan(), &settings).ok_or("the fluid has no thermostat")?;
     rank.find_ghosts(engine.plan().cutoff());
     let (pool, dt, owned) = (engine.pool().clone(), 6.0 * rank.cloud.dt(), rank.cloud.x.len());
     let (mass, kinds): (_, Vec<i32>) = (vec![1.0; owned], (0..fluid.species.len() as i32).collect());

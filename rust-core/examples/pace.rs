@@ -152,7 +152,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         sweep.memory() / count
     );
     if let (Any::Cloud(mut cloud), Some(thermostat)) =
-        (particles, PairThermostat::new(sweep.plan(), 1.0, &settings))
+        (particles, PairThermostat::new(sweep.plan(), &settings))
     {
         time_thermostat(&mut cloud, thermostat, &Pool::new(threads))?;
     }

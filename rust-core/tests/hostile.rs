@@ -99,7 +99,7 @@ fn sums_over_pairs(fluid: &Fluid) -> Engine {
 
 /// Velocities after drag and noise, with the pairs of the forces if an engine is given.
 fn heated(settings: Settings, fluid: &Fluid, cloud: &Cloud, ask: Option<&mut Engine>) -> Vec<[f64; 3]> {
-    let mut thermostat = PairThermostat::new(&Plan::new(fluid).unwrap(), 1.0, &settings).unwrap();
+    let mut thermostat = PairThermostat::new(&Plan::new(fluid).unwrap(), &settings).unwrap();
     let (pool, mut v) = (Pool::new(settings.threads), cloud.v.clone());
     if let Some(engine) = ask {
         thermostat.ask(engine, DT, true);
@@ -141,7 +141,7 @@ fn a_thermostat_takes_the_pairs_of_another() {
     for settings in all_settings() {
         let mut engine = Engine::new(&fluid, settings).unwrap();
         let pool = Pool::new(settings.threads);
-        let [mut a, mut b] = [1.0; 2].map(|kt| PairThermostat::new(engine.plan(), kt, &settings).unwrap());
+        let [mut a, mut b] = [(); 2].map(|()| PairThermostat::new(engine.plan(), &settings).unwrap());
         a.ask(&mut engine, DT, false);
         b.ask(&mut engine, 4.0 * DT, false);
         cloud.energy(&mut engine).unwrap();
@@ -167,7 +167,7 @@ fn a_thermostat_has_no_pairs_after_a_search_that_failed() {
     ];
     for (number, settings) in all_settings().enumerate() {
         let pool = Pool::new(settings.threads);
-        let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), 1.0, &settings).unwrap();
+        let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), &settings).unwrap();
         let spoil: [fn(&mut Cloud); 6] = [
             |cloud| cloud.tag.truncate(cloud.tag.len() / 2),
             |cloud| cloud.kind.truncate(7),
@@ -208,7 +208,7 @@ fn rounds_of_the_thermostat_in_a_wrong_order() {
         let mut engine = Engine::new(&fluid, settings).unwrap();
         engine.map_kinds(&[0, -1]).unwrap();
         let pool = Pool::new(settings.threads);
-        let mut thermostat = PairThermostat::new(engine.plan(), 1.0, &settings).unwrap();
+        let mut thermostat = PairThermostat::new(engine.plan(), &settings).unwrap();
         let mut half = cloud.clone();
         half.kind = (0..300).map(|k| k % 2).collect();
         let around = Around { domain: &cloud.domain, images: &[] };
@@ -374,7 +374,7 @@ fn drag_in_boxes_with_open_edges() {
         }
         let mut cloud = of_edge(6.0);
         cloud.x[0][2] = 1e9;
-        let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), 1.0, &settings).unwrap();
+        let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), &settings).unwrap();
         thermostat.find_pairs(&Pool::new(settings.threads), &cloud.bodies(&[1.0]), DT, false).unwrap_err();
     }
 }
@@ -385,7 +385,7 @@ fn streams_of_noise() {
     let (cloud, fluid) = (Cloud::new(60, 1, [6.0; 3], [true; 3]), fluid(1));
     let settings = Settings::default();
     let pool = Pool::new(settings.threads);
-    let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), 1.0, &settings).unwrap();
+    let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), &settings).unwrap();
     thermostat.find_pairs(&pool, &cloud.bodies(&[1.0]), DT, false).unwrap();
     let mut seen: Vec<Vec<u64>> = (0..=255)
         .map(|stream| {

@@ -26,7 +26,7 @@ impl Style {
     fn use_gpu(&mut self, number: usize) -> Result<(), StyleError> {
         let failed = |error: psidpd_gpu::GpuError| StyleError(format!("device gpu: {error}"));
         let device = psidpd_gpu::Device::open(Some(number)).map_err(failed)?;
-        let fluid = self.model.at(self.kt)?;
+        let fluid = self.model.at(self.engine.plan().kt())?;
         let forces = psidpd_gpu::GpuForces::new(&device, &fluid).map_err(failed)?;
         self.engine.use_device(Some(Box::new(forces)));
         Ok(())

@@ -14,8 +14,6 @@ pub struct Engine {
     pub(super) engine: engine::Engine,
     /// Forces of psidpd_engine_first, which psidpd_engine_second adds to the host's.
     pub(super) first_forces: Vec<[f64; 3]>,
-    /// Temperature, for a thermostat apart from the forces.
-    pub(super) kt: f64,
     plan_text: CString,
     path_text: CString,
     pub(super) state: State,
@@ -137,7 +135,6 @@ pub unsafe extern "C" fn psidpd_engine_new(
         out.put(Box::into_raw(Box::new(Engine {
             engine,
             first_forces: Vec::new(),
-            kt,
             plan_text,
             path_text,
             state: State::Nothing,

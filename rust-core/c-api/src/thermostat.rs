@@ -56,7 +56,7 @@ pub unsafe extern "C" fn psidpd_thermostat_new(
         // SAFETY: the caller promises that `engine` is null or not freed and that `thermostat` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(thermostat, "thermostat")?) };
         let (plan, settings) = (engine.engine.plan(), engine.engine.settings());
-        let thermostat = PairThermostat::new(plan, engine.kt, &settings)
+        let thermostat = PairThermostat::new(plan, &settings)
             .ok_or_else(|| Failure::new(Status::Model, "the model has no thermostat with drag"))?;
         let (pool, species) = (Arc::clone(engine.engine.pool()), plan.species().len());
         out.put(Box::into_raw(Box::new(Thermostat { thermostat, pool, species })));

@@ -22,6 +22,8 @@ use std::fmt;
 pub struct Plan {
     /// The names of the species.
     pub(super) species: Vec<String>,
+    /// Temperature of the thermostat and of every formula with kT.
+    pub(super) kt: f64,
     /// Number of dimensions, 2 or 3.
     pub(super) dimensions: usize,
     /// Longest range of all forces; particles further apart do not interact.
@@ -130,6 +132,7 @@ impl Plan {
             pairs: fluid.pairs.clone(),
             thermostat: ThermostatPlan::new(fluid),
             title: fluid.title.clone(),
+            kt: fluid.kt,
             species_of_type: (0..fluid.species.len() as i32).collect(),
             conservative: fluid.is_conservative(),
         })
@@ -138,6 +141,11 @@ impl Plan {
     /// The names of the species.
     pub fn species(&self) -> &[String] {
         &self.species
+    }
+
+    /// The temperature kT, in the energy unit of the model.
+    pub fn kt(&self) -> f64 {
+        self.kt
     }
 
     /// Number of dimensions, 2 or 3.

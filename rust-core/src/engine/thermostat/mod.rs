@@ -117,14 +117,14 @@ struct Masses {
 }
 
 impl PairThermostat {
-    /// The thermostat of a fluid at temperature `kt`; `None` if all γ are 0. It uses the instructions
+    /// The thermostat of a fluid, at its temperature; `None` if all γ are 0. It uses the instructions
     /// and the precision of the settings.
-    pub fn new(plan: &Plan, kt: f64, settings: &Settings) -> Option<PairThermostat> {
+    pub fn new(plan: &Plan, settings: &Settings) -> Option<PairThermostat> {
         let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
         Some(PairThermostat {
             plan: plan.thermostat.clone()?,
             dimensions: plan.dimensions,
-            kt,
+            kt: plan.kt,
             dt: 0.0,
             set,
             lists: PairLists::new(set, plan.dimensions),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::model::Model;
+use crate::model::{Fluid, Model};
 use nalgebra::Matrix3;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::noise::threefry2x32;
@@ -145,8 +145,9 @@ fn rounding(cloud: &Cloud) -> f64 {
 
 fn thermostat(model: &str, kt: f64, precision: Precision) -> PairThermostat {
     let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
+    let fluid = Fluid { kt, ..fluid };
     let settings = Settings { precision, ..Settings::default() };
-    PairThermostat::new(&Plan::new(&fluid).unwrap(), kt, &settings).unwrap()
+    PairThermostat::new(&Plan::new(&fluid).unwrap(), &settings).unwrap()
 }
 
 fn pool(threads: usize) -> Pool {

@@ -11,7 +11,6 @@ use psidpd_core::model::Model;
 #[derive(Debug)]
 pub(super) struct Forces {
     model: Model,
-    pub kt: f64,
     pub engine: Engine,
     pub tally: Tally,
     /// The number of the positions of the last evaluation, [`Particles::moves`].
@@ -26,7 +25,6 @@ impl Forces {
         Ok(Forces {
             engine: Engine::new(&model.at(kt)?, settings)?,
             model: model.clone(),
-            kt,
             tally: Tally::default(),
             moves: 0,
             earlier_out_of_bounds: [0; 2],
@@ -88,7 +86,7 @@ impl Forces {
     pub fn renew(&mut self, kt: f64, settings: Settings) -> Result<(), RunError> {
         let out_of_bounds = self.out_of_bounds();
         self.engine.renew(&self.model.at(kt)?, settings)?;
-        (self.kt, self.earlier_out_of_bounds) = (kt, out_of_bounds);
+        self.earlier_out_of_bounds = out_of_bounds;
         Ok(())
     }
 
@@ -136,7 +134,7 @@ impl Simulation {
     }
 
     pub fn kt(&self) -> f64 {
-        self.forces.kt
+        self.engine().plan().kt()
     }
 
     pub fn dimensions(&self) -> usize {

@@ -117,7 +117,7 @@ impl Thermostat {
 }
 
 fn pairs_of(forces: &Forces) -> Option<PairThermostat> {
-    PairThermostat::new(forces.engine.plan(), forces.kt, &forces.engine.settings())
+    PairThermostat::new(forces.engine.plan(), &forces.engine.settings())
 }
 
 impl Simulation {
