@@ -280,7 +280,7 @@ fn the_schema_refuses_unknown_and_missing_keys() {
 
 #[test]
 fn every_example_of_the_reference_loads() {
-    let page = std::fs::read_to_string(root().join("../docs/model-file.md")).unwrap().replace("\r\n", "\n");
+    let page = reference();
     let name = root().join("tests/models/good/example.toml");
     let mut count = 0;
     for block in page.split("```toml\n").skip(1) {

@@ -257,7 +257,7 @@ fn every_scene_is_valid_by_the_schema() {
 /// The reader and the schema accept the examples.
 #[test]
 fn every_example_of_the_reference_loads() {
-    let page = std::fs::read_to_string(root().join("../docs/scene-file.md")).unwrap().replace("\r\n", "\n");
+    let page = reference();
     let folder = folder();
     let blocks = page.split("```toml\n").skip(1);
     let texts: Vec<String> = blocks.map(|block| completed(block.split("\n```").next().unwrap())).collect();

@@ -9,6 +9,7 @@ pub struct Bell;
 impl Shape for Bell {
     const NAME: &'static str = "bell";
     const FACTORS: [f64; 2] = [10.0 / (3.0 * PI), 15.0 / (4.0 * PI)];
+    const POSITIVE_DEFINITE: bool = false;
 
     #[inline(always)]
     fn value<R: Real>(s: R) -> R {

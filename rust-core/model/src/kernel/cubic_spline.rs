@@ -9,6 +9,7 @@ pub struct CubicSpline;
 impl Shape for CubicSpline {
     const NAME: &'static str = "cubic-spline";
     const FACTORS: [f64; 2] = [40.0 / (7.0 * PI), 8.0 / PI];
+    const POSITIVE_DEFINITE: bool = false;
 
     // The sum 2(1 − s)³ − 8(½ − s)³₊ has both pieces without a branch.
     #[inline(always)]

@@ -8,6 +8,7 @@ pub struct Linear;
 impl Shape for Linear {
     const NAME: &'static str = "linear";
     const FACTORS: [f64; 2] = [3.0 / PI, 3.0 / PI];
+    const POSITIVE_DEFINITE: bool = false;
 
     #[inline(always)]
     fn value<R: Real>(s: R) -> R {

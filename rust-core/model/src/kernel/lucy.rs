@@ -8,6 +8,7 @@ pub struct Lucy;
 impl Shape for Lucy {
     const NAME: &'static str = "lucy";
     const FACTORS: [f64; 2] = [5.0 / PI, 105.0 / (16.0 * PI)];
+    const POSITIVE_DEFINITE: bool = false;
 
     #[inline(always)]
     fn value<R: Real>(s: R) -> R {

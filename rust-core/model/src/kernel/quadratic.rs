@@ -9,6 +9,7 @@ pub struct Quadratic;
 impl Shape for Quadratic {
     const NAME: &'static str = "quadratic";
     const FACTORS: [f64; 2] = [6.0 / PI, 15.0 / (2.0 * PI)];
+    const POSITIVE_DEFINITE: bool = true;
 
     #[inline(always)]
     fn value<R: Real>(s: R) -> R {

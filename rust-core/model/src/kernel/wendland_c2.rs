@@ -8,6 +8,7 @@ pub struct WendlandC2;
 impl Shape for WendlandC2 {
     const NAME: &'static str = "wendland-c2";
     const FACTORS: [f64; 2] = [7.0 / PI, 21.0 / (2.0 * PI)];
+    const POSITIVE_DEFINITE: bool = true;
 
     #[inline(always)]
     fn value<R: Real>(s: R) -> R {

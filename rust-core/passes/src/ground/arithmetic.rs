@@ -255,11 +255,11 @@ impl<I: Isa> Arithmetic<I> for Mixed {
         // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
         // lists of pairs to whole vectors.
         unsafe {
-            let load_transposed = I::load_transposed::<ALL>(records.cast(), j_offsets);
+            let bits = I::load_transposed::<ALL>(records.cast(), j_offsets);
             let mut numbers = [I::F32::constant(0.0); 8];
             let mut c = 0;
             while c < if ALL { 8 } else { 4 } {
-                numbers[c] = I::of_bits(load_transposed[c]);
+                numbers[c] = I::of_bits(bits[c]);
                 c += 1;
             }
             numbers

@@ -237,7 +237,7 @@ pub unsafe fn add_soft<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
 
 /// The potential `φ = (c_αβ + c_βα) w(r)`, for one kernel of the force.
 struct LinearTerm<R: Reals, S> {
-    species_pair: KernelKind,
+    kernel: KernelKind,
     inverse_range: R,
     force_inverse_range: R,
     force: TableLookup<R>,
@@ -260,7 +260,7 @@ impl<R: Reals, S: Shape> Term<R> for LinearTerm<R, S> {
             let one = R::constant(1.0);
             if TALLY {
                 let s = r * self.inverse_range;
-                let w = self.energy.lookup::<MULTISPECIES>(species_pair) * self.species_pair.visit(Value(s));
+                let w = self.energy.lookup::<MULTISPECIES>(species_pair) * self.kernel.visit(Value(s));
                 *energy = w.where_below(s, one).mul_add(pair_weight, *energy);
             }
             let s = r * self.force_inverse_range;
@@ -301,7 +301,7 @@ impl<R: Reals, const MULTISPECIES: bool, const TALLY: bool> ShapeVisitor
         // SAFETY: `add_linear` alone creates this visitor, and its caller fulfils the contract of `each`.
         unsafe {
             let term = LinearTerm::<R, S> {
-                species_pair: self.term.kernel,
+                kernel: self.term.kernel,
                 inverse_range: R::splat(self.term.inverse_range),
                 force_inverse_range: R::splat(self.term.force_inverse_range),
                 force: TableLookup::new(&self.term.force),

@@ -231,10 +231,10 @@ impl Reals for F64x4 {
     #[inline(always)]
     unsafe fn store_transposed([a, b, c, d]: [Self; 4], p: *mut f64) {
         unsafe {
-            let store_transposed = transposed([a.0, b.0, c.0, d.0]);
+            let rows = transposed([a.0, b.0, c.0, d.0]);
             let mut k = 0;
             while k < 4 {
-                _mm256_storeu_pd(p.add(4 * k), store_transposed[k]);
+                _mm256_storeu_pd(p.add(4 * k), rows[k]);
                 k += 1;
             }
         }
@@ -369,11 +369,10 @@ impl Isa for Avx2 {
             let mut mask = 0;
             let mut k = 0;
             while k < 4 {
-                let distance_masks = _mm256_cmpgt_epi16(limit, sums[k]);
+                let this = _mm256_cmpgt_epi16(limit, sums[k]);
                 let next = _mm256_cmpgt_epi16(limit, sums[k + 1]);
                 // The halves of both masks are joined first, then those of each mask.
-                let bytes =
-                    _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(distance_masks, next));
+                let bytes = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(this, next));
                 mask |= (_mm256_movemask_epi8(bytes) as u32 as u64) << (16 * k);
                 k += 2;
             }
@@ -452,15 +451,15 @@ impl Isa for Avx2 {
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x8; 8] {
         unsafe {
-            let mut store_transposed = [[_mm_setzero_si128(); 8]; 2];
+            let mut records = [[_mm_setzero_si128(); 8]; 2];
             let mut k = 0;
             while k < 8 {
                 let at: *const __m128i = record_at(base, offsets, k).cast();
-                store_transposed[0][k] = _mm_loadu_si128(at);
-                store_transposed[1][k] = _mm_loadu_si128(at.add(1));
+                records[0][k] = _mm_loadu_si128(at);
+                records[1][k] = _mm_loadu_si128(at.add(1));
                 k += 1;
             }
-            let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] = store_transposed;
+            let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] = records;
             let [a, b, c, d] = transpose_words([a0, a1, a2, a3], [a4, a5, a6, a7]);
             let zero = U32x8(_mm256_setzero_si256());
             let [e, f, g, h] =
@@ -471,16 +470,16 @@ impl Isa for Avx2 {
     #[inline(always)]
     unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x4; 8] {
         unsafe {
-            let mut store_transposed = [[_mm256_setzero_pd(); 4]; 2];
+            let mut records = [[_mm256_setzero_pd(); 4]; 2];
             let mut k = 0;
             while k < 4 {
                 let at: *const f64 = wide_record_at(base, offsets, k).cast();
-                store_transposed[0][k] = _mm256_loadu_pd(at);
-                store_transposed[1][k] = _mm256_loadu_pd(at.add(4));
+                records[0][k] = _mm256_loadu_pd(at);
+                records[1][k] = _mm256_loadu_pd(at.add(4));
                 k += 1;
             }
-            let [a, b, c, d] = transposed(store_transposed[0]);
-            let [e, f, g, h] = if ALL { transposed(store_transposed[1]) } else { store_transposed[1] };
+            let [a, b, c, d] = transposed(records[0]);
+            let [e, f, g, h] = if ALL { transposed(records[1]) } else { records[1] };
             [F64x4(a), F64x4(b), F64x4(c), F64x4(d), F64x4(e), F64x4(f), F64x4(g), F64x4(h)]
         }
     }

@@ -204,9 +204,10 @@ fn bounds_of(fluid: &Fluid, species: usize) -> Vec<&str> {
     (0..fluid.densities.len()).filter(bounded).map(|d| fluid.densities[d].name.as_str()).collect()
 }
 
-/// Whether a kernel's transform may be negative, so that a strong repulsion makes particles cluster.
-fn may_cluster(kind: KernelKind) -> bool {
-    !matches!(kind, KernelKind::Quadratic | KernelKind::WendlandC2)
+/// The names of kernels with which a strong repulsion does not make particles cluster.
+fn positive_definite() -> String {
+    let all = KernelKind::ALL.iter().filter(|kind| kind.is_positive_definite());
+    all.map(|kind| kind.name()).collect::<Vec<_>>().join(", ")
 }
 
 fn unstable(fluid: &Fluid, stability: &Stability) -> Option<Warning> {
@@ -216,9 +217,11 @@ fn unstable(fluid: &Fluid, stability: &Stability) -> Option<Warning> {
         return Some(Warning { id: "spinodal", severity: Severity::Warning, message: message.into() });
     }
     let k = stability.k_star.filter(|_| !stability.stable)?;
-    let kernel = match fluid.densities.iter().any(|density| may_cluster(density.kernel.kind())) {
-        true => "a positive definite kernel (quadratic, wendland-c2), ",
-        false => "",
+    let may_cluster = fluid.densities.iter().any(|density| !density.kernel.kind().is_positive_definite());
+    let kernel = if may_cluster {
+        format!("a positive definite kernel ({}), ", positive_definite())
+    } else {
+        String::new()
     };
     let message = format!(
         "in mean field S(k) diverges before this state is reached, at k* = {k:.3}: the fluid clusters or freezes with \
