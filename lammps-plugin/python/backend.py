@@ -71,8 +71,8 @@ def announce(text):
             terminal.write("\npsidpd: " + text + "\n")
 
 
-def build_plugin(package, features=()):
-    """Runs cargo, as `psidpd lammps plugin` does, and returns the libraries by their names. The features are those of the program."""
+def build_plugin(package):
+    """Runs cargo, as `psidpd lammps plugin` does, and returns the libraries by their names."""
     if not (ROOT / "lammps-plugin" / "Cargo.toml").is_file():
         fail(f"the plugin is built from the psidpd sources, which are not in {ROOT}: install from a checkout")
     if any(Path(package.parent, "lammps.libs").glob("libmpi*")):
@@ -97,7 +97,7 @@ def build_plugin(package, features=()):
     )
     # With the program, for the same features of what both need: then neither is compiled twice.
     command = [os.environ.get("CARGO") or "cargo", "build", "--release", "--lib"]
-    command += ["-p", "psidpd", "-p", "psidpd-lammps", "-p", "psidpd-lammps-entry", *(f"--features={feature}" for feature in features)]
+    command += ["-p", "psidpd", "-p", "psidpd-lammps", "-p", "psidpd-lammps-entry"]
     command += ["--message-format=json-render-diagnostics", "--target-dir", str(builds)]
     # One build at a time, until the file is read.
     with open(builds / "psidpd.lock", "w") as lock:

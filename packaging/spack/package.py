@@ -17,8 +17,6 @@ class Psidpd(CargoPackage):
     version("main", branch="main")
     version("0.2.0", tag="v0.2.0")
 
-    variant("eos", default=False, description="Equations of state of real liquids")
-
     depends_on("c", type="build")
     depends_on("rust@1.95:", type="build")
 
@@ -26,4 +24,4 @@ class Psidpd(CargoPackage):
 
     @property
     def build_args(self):
-        return ["--locked"] + (["--features", "eos"] if self.spec.satisfies("+eos") else [])
+        return ["--locked"]

@@ -16,12 +16,16 @@
     simulation.run(100)
     simulation.positions
 
+    water = psidpd.Liquid.from_coolprop("Water", T=350)      # numbers of a data sheet
+    water.model("water.toml", molecules=2)                   # a model that has them
+
 All numbers are in the reduced units of the model: lengths in r_c, masses in m, energies in the unit of kT. `psidpd.ase`
 has a calculator for ASE, `psidpd.lammps` finds the pair styles for LAMMPS.
 """
 
 from ._psidpd import Engine, Evaluation, Model, estimate, version
 from .errors import InputError, PsidpdError, RunStoppedError
+from .liquid import Liquid
 from .result import Result, run, sweep
 from .simulation import Simulation
 
@@ -31,6 +35,7 @@ __all__ = [
     "Engine",
     "Evaluation",
     "InputError",
+    "Liquid",
     "Model",
     "PsidpdError",
     "Result",

@@ -180,11 +180,3 @@ def test_estimates_count_correlation():
     _, larger = psidpd.estimate(correlated)
     assert larger > 3 * correlated.std() / 64
     assert numpy.isnan(psidpd.estimate([1.0, 2.0])[1])
-
-
-def test_equations_of_state_of_real_liquids_are_inside(tmp_path):
-    # Water has no saturated liquid above 647 K, which only an equation of state tells.
-    command = [sys.executable, "-m", "psidpd", "model", "from-eos", "water", "--T", "5000", "--out", "water.toml"]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert run.returncode != 0 and "the equation of state: " in run.stderr and "--features" not in run.stderr, run.stderr
-    assert not (tmp_path / "water.toml").exists()

@@ -411,6 +411,46 @@ fn a_table_of_pressures_makes_a_model() {
     assert!((json["pressure"].as_f64().unwrap() / pressure(5.0) - 1.0).abs() < 1e-6, "{json}");
 }
 
+/// Water with a thousand molecules in a particle is too stiff: exit 1, the pair and the nearest size, a table, and no file.
+#[test]
+fn impossible_liquids_are_refused_with_the_nearest_possible_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(
+        here,
+        "water.toml",
+        "density = 997.0\nsound_speed = 1489.0\ntemperature = 298.15\nmolar_mass = 0.018015\n",
+    );
+    let line = [
+        "model",
+        "liquid",
+        "water",
+        "--data",
+        "water.toml",
+        "--molecules",
+        "1000",
+        "--anyway",
+        "--json",
+        "f.json",
+    ];
+    let output = psidpd(here, &[&line[..], &["--out", "m.toml"]].concat());
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let text = said(&output);
+    assert!(
+        text.contains("compressibility") && text.contains("conflict") && text.contains("Nearest"),
+        "{text}"
+    );
+    assert!(!here.join("m.toml").exists());
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("f.json")).unwrap()).unwrap();
+    let refusal = &json["refusals"][0];
+    assert!(json["good"] == false && refusal["kind"] == "too-stiff", "{json}");
+    // 16.1 for a molecule.
+    let stiffness = refusal["stiffness"].as_f64().unwrap();
+    assert!((stiffness / 16_100.0 - 1.0).abs() < 0.01, "{json}");
+    assert!((refusal["nearest_molecules"].as_f64().unwrap() * 16.1 / 110.0 - 1.0).abs() < 0.01, "{json}");
+}
+
 /// A reader like `| head` may close the pipe before the output ends.
 #[test]
 fn a_reader_that_leaves_ends_the_program_quietly() {

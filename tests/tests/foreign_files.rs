@@ -140,7 +140,7 @@ fn every_verb_spares_what_it_did_not_make() {
     // With leave these take minutes, or need LAMMPS or a feature.
     let slow = [
         ("calibrate w.toml --out F", "c.toml"),
-        ("model from-eos water --out F", "water.toml"),
+        ("model liquid water --density 997 --rc 1e-9 --temperature 298 --out F", "water.toml"),
         ("pareto s.toml --out F/..", "pareto.json"),
         ("pareto s.toml --out F/..", "pareto.html"),
         ("bench --out F/..", "bench.json"),

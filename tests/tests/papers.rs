@@ -115,14 +115,3 @@ fn cases_are_listed_and_theory_is_reproduced() {
     assert_eq!(unknown.status.code(), Some(2), "{}", said(&unknown));
     assert!(said(&unknown).contains("--list"), "{}", said(&unknown));
 }
-
-#[test]
-fn substances_without_parameters_are_refused_by_name() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = psidpd(folder.path(), &["model", "from-eos", "phlogiston", "--out", "x.toml"]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("water") && said(&output).contains("decane"), "{}", said(&output));
-    let output = psidpd(folder.path(), &["model", "from-eos", "decane", "--range", "1.5", "--out", "x.toml"]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("range"), "{}", said(&output));
-}

@@ -338,6 +338,7 @@ fn errors_of_every_verb_name_the_file() {
         "pareto F",
         "lammps plugin --lammps F",
         "bench --lammps F --out out",
+        "model liquid w --data F --rc 1e-9 --temperature 300 --out x.toml",
     ];
     for (name, text) in
         [("broken", Some("x = [[[\n\"")), ("empty", Some("")), ("missing", None), ("folder", None)]
@@ -386,6 +387,8 @@ fn errors_of_every_verb_name_the_file() {
         ("export eam w.toml --spacing 1e-9", &["w.toml", "2.000e9 numbers"]),
         ("export eam w.toml --densities 1000000000000", &["w.toml", "1.000e12 numbers"]),
         ("calibrate w.toml --density 5:6 --out c.toml --threads 100000", &["from 1 to 1024"]),
+        ("model liquid w --density 0.997 --rc 1e-9 --out x.toml", &["density = 0.997", "SI units"]),
+        ("model liquid w --density 997 --molecules 3 --out x.toml", &["molar_mass"]),
         ("reproduce --threads 100000", &["from 1 to 1024"]),
         ("bench --threads 100000", &["from 1 to 1024"]),
         ("pareto s.toml --threads 0", &["from 1 to 1024"]),

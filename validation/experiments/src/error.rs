@@ -83,13 +83,8 @@ pub enum ExperimentError {
          values with the old ones among them, or replace the table with --overwrite", path.display()
     )]
     OtherGrid { path: PathBuf, row: String },
-    #[cfg(not(feature = "eos"))]
-    #[error("this psidpd was built without equations of state: cargo build --release --features eos")]
-    NotBuilt,
-    #[error("no parameters for {0}: there are {1}")]
-    Substance(String, String),
-    #[error("the equation of state: {0}")]
-    Equation(String),
+    #[error(transparent)]
+    Liquid(#[from] crate::liquid::LiquidError),
     #[error("{given} densities for {species} species")]
     Densities { given: usize, species: usize },
 }

@@ -16,7 +16,14 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         ],
     ),
     ("calibrate", &["psidpd calibrate model.toml --kT 1 --density 3:10 --out calibrated.toml"]),
-    ("model from-eos", &["psidpd model from-eos water --out water.toml"]),
+    (
+        "model liquid",
+        &[
+            "psidpd model liquid water --density 997 --tension 0.0720 --compressibility 4.52e-10 --viscosity 8.9e-4 --temperature 298.15 \
+             --molar-mass 0.018015 --molecules 3 --out water.toml",
+            "psidpd model liquid oil --data oil.toml --rc 1e-9 --out oil-model.toml",
+        ],
+    ),
     ("reproduce", &["psidpd reproduce --list"]),
     ("new", &["psidpd new hanging --template pendant-drop"]),
     (

@@ -1,98 +1,214 @@
-use super::calibrate::Runs;
-use super::run::at_least;
 use super::*;
-use psidpd_experiments::from_eos::{Options, Substance, from_eos};
+use psidpd_experiments::liquid::{ENTRIES, Entries, Found, Liquid, LiquidError, Row, model};
+use psidpd_report::quantity::with_error;
 
 /// Make a model file.
 #[derive(Debug, clap::Subcommand)]
 pub enum Verb {
-    /// Make a model of a real liquid from its equation of state (PC-SAFT), with its units in SI.
+    /// Make a model of a liquid from its data sheet.
     ///
-    /// Density, compressibility and surface tension are those of the equation of state within the tolerance; exits
-    /// with 1 if not. Needs a psidpd that was built with `--features eos`.
-    FromEos(FromEos),
+    /// Numbers are in SI units. Density and the size of a particle are needed; what else is left out is free, and is reported.
+    /// Compressibility, tension and viscosity are met by short runs, and measured again by longer ones. Exits with 1, and
+    /// writes nothing, if a number is not met; says then which two numbers conflict, and what is nearest.
+    Liquid(Box<OfLiquid>),
 }
 
 #[derive(Debug, clap::Args)]
-pub struct FromEos {
-    /// Which substance: water, decane.
-    substance: String,
-    /// Temperature in K.
-    #[arg(long = "T", value_name = "KELVIN", default_value_t = 298.15)]
-    temperature: f64,
-    /// Molecules in a particle (N_m).
-    #[arg(long, value_name = "N", default_value_t = 1.0)]
-    molecules: f64,
-    /// Particles of the liquid in the cube of the unit of length.
-    #[arg(long, value_name = "RHO", default_value_t = 6.0)]
-    density: f64,
-    /// Range of the many-body repulsion, over that of the attraction.
-    #[arg(long, default_value_t = 0.75)]
-    range: f64,
-    /// Largest relative difference of the tension, and of pressures as in `calibrate`.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
-    tolerance: f64,
-    /// Steps of each run of the homogeneous liquid; the slab has eight times as many.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least(100))]
-    steps: u64,
+pub struct OfLiquid {
+    /// What it is called.
+    name: String,
     #[command(flatten)]
-    runs: Runs,
+    numbers: Numbers,
+    /// A TOML file with these numbers, as sound_speed = 1497.0; options replace them.
+    #[arg(long, value_name = "FILE")]
+    data: Option<PathBuf>,
+    /// Write the model even if a number is not met.
+    #[arg(long)]
+    anyway: bool,
+    /// Seed of the runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Where the model file goes.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
 
+#[derive(Debug, clap::Args)]
+struct Numbers {
+    /// Mass density.
+    #[arg(long, value_name = "KG/M3")]
+    density: Option<f64>,
+    /// Surface tension.
+    #[arg(long, value_name = "N/M")]
+    tension: Option<f64>,
+    /// Isothermal compressibility.
+    #[arg(long, value_name = "1/PA")]
+    compressibility: Option<f64>,
+    /// Speed of sound, instead of the compressibility. Sound is isothermal in a fluid with a thermostat.
+    #[arg(long, value_name = "M/S")]
+    sound_speed: Option<f64>,
+    /// Shear viscosity.
+    #[arg(long, value_name = "PA.S")]
+    viscosity: Option<f64>,
+    /// Temperature. If left out the unit of energy is free, and particles fluctuate more than those of the liquid.
+    #[arg(long, value_name = "K")]
+    temperature: Option<f64>,
+    /// Molar mass.
+    #[arg(long, value_name = "KG/MOL")]
+    molar_mass: Option<f64>,
+    /// Size of a particle: molecules in it; needs the molar mass.
+    #[arg(long, value_name = "N")]
+    molecules: Option<f64>,
+    /// Size of a particle: the unit of length, which is the range of the forces.
+    #[arg(long, value_name = "M")]
+    rc: Option<f64>,
+    /// Size of a particle: the diameter of a drop of so many particles.
+    #[arg(long, value_name = "M")]
+    drop: Option<f64>,
+    /// Particles of the drop.
+    #[arg(long, value_name = "N")]
+    particles: Option<f64>,
+    /// Particles in the cube of the unit of length; 6 if left out.
+    #[arg(long, value_name = "RHO")]
+    number_density: Option<f64>,
+    /// A length of the scene, for dimensionless numbers.
+    #[arg(long, value_name = "M")]
+    length: Option<f64>,
+    /// A velocity of the scene.
+    #[arg(long, value_name = "M/S")]
+    velocity: Option<f64>,
+    /// An acceleration of the scene.
+    #[arg(long, value_name = "M/S2")]
+    gravity: Option<f64>,
+}
+
+impl Numbers {
+    /// In the order of [`ENTRIES`].
+    fn all(&self) -> [Option<f64>; ENTRIES.len()] {
+        let n = self;
+        [
+            n.density,
+            n.tension,
+            n.compressibility,
+            n.sound_speed,
+            n.viscosity,
+            n.temperature,
+            n.molar_mass,
+            n.molecules,
+            n.rc,
+            n.drop,
+            n.particles,
+            n.number_density,
+            n.length,
+            n.velocity,
+            n.gravity,
+        ]
+    }
+}
+
 impl Verb {
     pub fn files(&self) -> Files {
-        let Verb::FromEos(a) = self;
-        Files::default().writes([a.out.clone()])
+        let Verb::Liquid(a) = self;
+        Files::reads(&a.data).writes([a.out.clone()])
     }
 }
 
 pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
-    let Verb::FromEos(a) = verb;
-    let numbers = [a.temperature, a.molecules, a.density, a.tolerance, a.runs.dt, a.range, 1.0 - a.range];
-    if !numbers.into_iter().all(|x| x > 0.0 && x.is_finite()) {
-        let message = "numbers must be positive, and the range below 1";
-        return Err(ExperimentError::Conditions(message.into()).into());
+    let Verb::Liquid(a) = verb;
+    let liquid = Liquid::new(&a.name, &entries(a)?).map_err(ExperimentError::from)?;
+    say_wanted(&liquid);
+    let found = model(&liquid, a.seed, &command(a), &mut |line| say!("{line}"))?;
+    print(&found);
+    match &found.text {
+        Some(text) if found.good || a.anyway => {
+            write_bytes(&a.out, told.existing, text.as_bytes())?;
+            say!("written to {}", a.out.display());
+        }
+        Some(_) => say!("nothing is written, as not all numbers are met: --anyway writes this model"),
+        None => say!("nothing is written: there is no model"),
     }
-    let options = Options {
-        temperature: a.temperature,
-        molecules: a.molecules,
-        density: a.density,
-        range: a.range,
-        tolerance: a.tolerance,
-        sampling: a.runs.sampling(1000, 500, a.steps),
-    };
-    let command = format!(
-        "psidpd model from-eos {} --T {} --molecules {} --density {} --range {} --tolerance {} --steps {} --dt {} --seed {} --out {}",
-        a.substance,
-        a.temperature,
-        a.molecules,
-        a.density,
-        a.range,
-        a.tolerance,
-        a.steps,
-        a.runs.dt,
-        a.runs.seed,
-        a.out.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned()),
+    conclude(told, &found, found.good)
+}
+
+/// The numbers of the file, and those of options in their place.
+fn entries(a: &OfLiquid) -> Result<Entries, Failure> {
+    let mut all = a.data.as_deref().map_or(Ok(Entries::default()), Entries::read)?;
+    for (entry, value) in ENTRIES.iter().zip(a.numbers.all()) {
+        if let Some(value) = value {
+            all.set(entry.key, value).map_err(|e: LiquidError| ExperimentError::from(e))?;
+        }
+    }
+    Ok(all)
+}
+
+fn say_wanted(liquid: &Liquid) {
+    let units = &liquid.units;
+    let molecules = liquid.molecules().map_or(String::new(), |n| format!(" ({n:.2} molecules)"));
+    say!(
+        "r_c = {:.3e} m, a particle has {:.3e} kg{molecules}, kT = {:.3e} J{}",
+        units.length,
+        units.mass,
+        units.energy,
+        if liquid.entries.get("temperature").is_some() { "" } else { " (free)" }
     );
-    let substance = Substance::find(&a.substance)?;
-    let found = from_eos(&substance, &options, &command, &mut |line| say!("{line}"))?;
-    write_bytes(&a.out, told.existing, found.text.as_bytes())?;
-    let mut table = Table::new(["", "equation of state", "model"]);
-    for c in &found.compared {
+    let goals = &liquid.goals;
+    let shown = |goal: Option<f64>| goal.map_or("free".to_owned(), |x| format!("{x:.2}"));
+    say!(
+        "in these units: density {}, stiffness dp/drho {}, tension {}, viscosity {}",
+        goals.density,
+        shown(goals.stiffness),
+        shown(goals.tension),
+        shown(goals.viscosity)
+    );
+}
+
+fn print(found: &Found) {
+    let mut table = Table::new(["", "wanted", "got", "off by", "allowed"]);
+    let percent = |x: f64| format!("{:.2} %", 100.0 * x);
+    for row in &found.rows {
+        let Row { name, unit, wanted, got, tolerance } = row;
         table.push([
-            c.name.to_owned(),
-            format!("{:.4}", c.wanted),
-            format!("{:.4} ± {:.4}", c.measured.value, c.measured.error),
+            format!("{name}, {unit}"),
+            wanted.map_or("free".to_owned(), |x| format!("{x:.4e}")),
+            if got.value.is_finite() { with_error(got.value, Some(got.error)) } else { "-".to_owned() },
+            wanted.filter(|_| got.value.is_finite()).map_or("".to_owned(), |x| percent(got.value / x - 1.0)),
+            wanted
+                .and(*tolerance)
+                .map_or("".to_owned(), |x| percent(x) + if row.is_met() { "" } else { ", missed" }),
         ]);
     }
     say!("");
     say::table(&table);
-    if !found.converged {
-        say!("the tolerance of {:.1} % is not met", 100.0 * a.tolerance);
+    if let Some(step) = found.step {
+        let seconds = step * found.units[3];
+        say!(
+            "step: integrator = \"force-gradient\", lambda = 0.17, thermostat_every = 2, dt = {step} ({seconds:.2e} s)"
+        );
     }
-    say!("written to {}", a.out.display());
-    conclude(told, &found, found.converged)
+    for number in &found.numbers {
+        let shown = |x: Option<f64>| x.map_or("unknown".to_owned(), |x| format!("{x:.3e}"));
+        let off = if number.is_off(0.1) { ": not met" } else { "" };
+        say!(
+            "{}: {} of the liquid, {} of the model{off}",
+            number.name,
+            shown(number.of_liquid),
+            shown(number.of_model)
+        );
+    }
+    found.refusals.iter().for_each(|refusal| say!("MISSED: {refusal}"));
+}
+
+/// The command line that repeats the search.
+fn command(a: &OfLiquid) -> String {
+    let name = |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+    let mut text = format!("psidpd model liquid {:?}", a.name);
+    for (entry, value) in ENTRIES.iter().zip(a.numbers.all()) {
+        if let Some(value) = value {
+            text += &format!(" --{} {value}", entry.key.replace('_', "-"));
+        }
+    }
+    if let Some(data) = &a.data {
+        text += &format!(" --data {}", name(data));
+    }
+    text + &format!(" --seed {} --out {}", a.seed, name(&a.out))
 }

@@ -1,0 +1,93 @@
+"""Models of liquids from their data sheets."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError, RunStoppedError
+from .scenes import AnyPath
+
+
+@dataclass(frozen=True)
+class Liquid:
+    """What a data sheet says of a liquid, in SI units; numbers that are None are free.
+
+        water = psidpd.Liquid.from_coolprop("Water", T=350)
+        found = water.model("water.toml", molecules=2)
+
+    density in kg/m3, tension in N/m, compressibility (isothermal) in 1/Pa, viscosity in Pa s, temperature in K, molar_mass in kg/mol.
+    """
+
+    name: str
+    density: float
+    tension: float | None = None
+    compressibility: float | None = None
+    viscosity: float | None = None
+    temperature: float | None = None
+    molar_mass: float | None = None
+
+    @classmethod
+    def from_coolprop(cls, fluid: str, T: float) -> Liquid:
+        """The saturated liquid of a fluid of CoolProp at T kelvin: `pip install psidpd[coolprop]`.
+
+        What CoolProp does not know of the fluid is free. Raises InputError for a fluid or a temperature without a saturated liquid.
+        """
+        try:
+            from CoolProp.CoolProp import PropsSI
+        except ImportError as missing:
+            raise InputError("CoolProp is not installed: pip install psidpd[coolprop]") from missing
+
+        def known(key: str) -> float | None:
+            try:
+                return float(PropsSI(key, "T", T, "Q", 0, fluid))
+            except ValueError:
+                return None
+
+        density = known("D")
+        if density is None:
+            raise InputError(f"CoolProp has no saturated liquid of {fluid} at {T} K")
+        compressibility = known("ISOTHERMAL_COMPRESSIBILITY")
+        return cls(fluid, density, known("I"), compressibility, known("V"), float(T), known("M"))
+
+    def model(
+        self,
+        out: AnyPath,
+        *,
+        molecules: float | None = None,
+        rc: float | None = None,
+        drop: float | None = None,
+        particles: float | None = None,
+        number_density: float | None = None,
+        seed: int = 1,
+        anyway: bool = False,
+        overwrite: bool = False,
+    ) -> dict[str, Any]:
+        """Finds a model as `psidpd model liquid` does, writes it to `out`, and gives the table: minutes.
+
+        One size of a particle is needed: molecules in it, rc in m, or the diameter of a drop in m with its number of particles. The
+        result has "good", which says whether all numbers are met, "rows" with what was wanted and what was measured, and "refusals". If
+        a number is not met `out` is written with `anyway` alone.
+
+        Raises InputError for numbers that cannot be used.
+        """
+        numbers = {key: getattr(self, key) for key in self.__dataclass_fields__ if key != "name"}
+        sizes = {"molecules": molecules, "rc": rc, "drop": drop, "particles": particles, "number_density": number_density}
+        given = [(key, value) for key, value in (numbers | sizes).items() if value is not None]
+        options = [f"--{key.replace('_', '-')}={float(value)!r}" for key, value in given]
+        with tempfile.TemporaryDirectory() as folder:
+            table = Path(folder, "found.json")
+            command = [sys.executable, "-m", "psidpd", "model", "liquid", *options, f"--seed={seed}"]
+            command += ["--out", os.fspath(out), "--json", str(table)]
+            command += ["--anyway"] * anyway + ["--overwrite"] * overwrite + ["--", self.name]
+            run = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            if table.is_file():
+                found: dict[str, Any] = json.loads(table.read_text(encoding="utf-8"))
+                return found
+        raise (InputError if run.returncode == 2 else RunStoppedError)(run.stderr.strip())

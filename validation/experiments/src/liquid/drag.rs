@@ -1,0 +1,100 @@
+//! The drag with which a liquid has its viscosity.
+
+use super::fluid::{Drag, Strengths, USUAL};
+use super::instrument::{Care, Flow, Instrument, Trouble};
+use super::sheet::Goals;
+use crate::ExperimentError;
+use serde::Serialize;
+
+/// Weights by rising viscosity at the same strength.
+const SHAPES: [[f64; 2]; 3] = [[1.0, 1.0], [1.0, 0.25], [1.5, 0.25]];
+
+/// The least and the strongest drag that are tried.
+pub const WEAKEST: f64 = 0.5;
+pub const STRONGEST: f64 = 400.0;
+
+/// A wider weight is taken where this one would need more drag.
+const COMFORTABLE: f64 = 200.0;
+
+const TRIALS: usize = 6;
+
+/// A drag that was measured.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Tried {
+    pub drag: Drag,
+    pub flow: Flow,
+}
+
+/// The part of the viscosity that drag makes, over its strength, of particles without correlations: 2πρ²/15 ∫ r⁴ w² dr in units of r_c.
+fn per_gamma(drag: &Drag, density: f64) -> f64 {
+    // ∫₀¹ s⁴ (1 − s)^p ds = 4! / ((p + 1) … (p + 5)), with p = 2 · exponent.
+    let p = 2.0 * drag.exponent;
+    let integral = 24.0 / ((p + 1.0) * (p + 2.0) * (p + 3.0) * (p + 4.0) * (p + 5.0));
+    2.0 * std::f64::consts::PI / 15.0 * density * density * drag.range.powi(5) * integral
+}
+
+/// Seeks the drag: content within `tolerance`. The last of the trials is the best that was found. Without a goal the usual drag is measured.
+pub fn search(
+    goals: &Goals,
+    fluid: &Strengths,
+    tolerance: f64,
+    instrument: &mut dyn Instrument,
+    told: &mut dyn FnMut(&str),
+) -> Result<Result<Vec<Tried>, String>, ExperimentError> {
+    let mut trials: Vec<Tried> = Vec::new();
+    let mut drag = USUAL;
+    let mut guess = 2.0 + per_gamma(&drag, goals.density) * drag.gamma;
+    for _ in 0..TRIALS {
+        let flow = match instrument.flow(fluid, &drag, guess, Care::Search) {
+            Ok(flow) => flow,
+            Err(Trouble::Failed(error)) => return Err(error),
+            Err(trouble) => return Ok(Err(trouble.to_string())),
+        };
+        told(&format!(
+            "gamma = {:.3} (range {}, exponent {}): viscosity {:.2}({:.2})",
+            drag.gamma, drag.range, drag.exponent, flow.viscosity.value, flow.viscosity.error
+        ));
+        trials.push(Tried { drag, flow });
+        let Some(goal) = goals.viscosity else { break };
+        if (flow.viscosity.value / goal - 1.0).abs() <= tolerance {
+            break;
+        }
+        let Some(better) = next(&trials, goal, goals.density).filter(|better| *better != drag) else { break };
+        (drag, guess) = (better, goal);
+    }
+    if let Some(goal) = goals.viscosity {
+        let off = |tried: &Tried| (tried.flow.viscosity.value / goal).ln().abs();
+        trials.sort_by(|a, b| off(b).total_cmp(&off(a)));
+    }
+    Ok(Ok(trials))
+}
+
+/// The next drag: of the weight that reaches the goal in comfort, between two trials of this weight by the straight line in logarithms.
+fn next(trials: &[Tried], goal: f64, density: f64) -> Option<Drag> {
+    let last = trials.last()?;
+    let same: Vec<&Tried> = trials
+        .iter()
+        .filter(|t| [t.drag.range, t.drag.exponent] == [last.drag.range, last.drag.exponent])
+        .collect();
+    let gamma = match same[..] {
+        [.., a, b] if (a.drag.gamma / b.drag.gamma).ln().abs() > 0.01 => {
+            let (x, y) = (a.drag.gamma.ln(), a.flow.viscosity.value.ln());
+            let slope = (b.flow.viscosity.value.ln() - y) / (b.drag.gamma.ln() - x);
+            // Viscosity rises with the drag, and not faster; noise may say otherwise.
+            let change = ((goal / b.flow.viscosity.value).ln() / slope.clamp(0.15, 1.2)).clamp(-2.5, 2.5);
+            b.drag.gamma * change.exp()
+        }
+        // Without drag some viscosity is left, so this is too far where there was little.
+        _ => last.drag.gamma * (goal / last.flow.viscosity.value).clamp(0.1, 100.0),
+    };
+    let shape = SHAPES.iter().position(|s| *s == [last.drag.range, last.drag.exponent])?;
+    if gamma > COMFORTABLE
+        && let Some([range, exponent]) = SHAPES.get(shape + 1).copied()
+    {
+        let wider = Drag { gamma: 1.0, range, exponent };
+        // Of two weights the part of the drag is known to the same factor.
+        let factor = per_gamma(&last.drag, density) / per_gamma(&wider, density);
+        return Some(Drag { gamma: (gamma * factor).clamp(WEAKEST, STRONGEST), ..wider });
+    }
+    Some(Drag { gamma: gamma.clamp(WEAKEST, STRONGEST), ..last.drag })
+}

@@ -1,0 +1,238 @@
+//! Measures by runs: the homogeneous liquid at three densities, a slab of it in its vapour, and two flows side by side.
+
+use super::fluid::{Drag, Strengths, USUAL, text};
+use super::instrument::{Care, Equilibrium, Flow, Instrument, Trouble};
+use super::sheet::Liquid;
+use crate::bulk::Observed;
+use crate::{ExperimentError, jobs};
+use psidpd_core::model::Model;
+use psidpd_dynamics::integrator::{Coupling, Integrator};
+use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::scene::Scene;
+use psidpd_dynamics::trial::{Composition, Piece, two_digits};
+use psidpd_formats::files::{Existing, write_bytes};
+use psidpd_observe::Measured;
+use std::fmt::Write;
+use std::path::Path;
+
+/// The step of all runs after the start, as runs advise it: forces three times, drag at every second step.
+const STEP: &str = "integrator = \"force-gradient\"\nlambda = 0.17\nthermostat_every = 2\n";
+const ADVISED: Integrator = Integrator::ForceGradient {
+    lambda: 0.17,
+    gradient: 1.0 / 24.0,
+    coupling: Coupling { every: 2, ..Coupling::DEFAULT },
+};
+
+/// ωΔt of the runs: half the cost of certainty, and errors below a percent in nearly all fluids.
+const STRIDE: f64 = 0.9;
+
+/// Times that runs last, in r_c √(m/kT): the homogeneous liquid, the slab, the flow.
+const TIMES: [f64; 3] = [25.0, 100.0, 60.0];
+/// How many times longer those of the result are.
+const LONGER: f64 = 3.0;
+
+/// Densities of the homogeneous liquid, over that of the goals.
+const DENSITIES: [f64; 3] = [0.97, 1.0, 1.03];
+
+const PARTICLES: f64 = 600.0;
+
+/// The slab, in r_c.
+const AREA: f64 = 6.0;
+const THICKNESS: f64 = 7.0;
+const HEIGHT: f64 = 14.0;
+
+/// A diffusion coefficient below this, in r_c √(kT/m), is that of a solid: Warren's set 6 has 0.034, and the solid of three times its
+/// attraction, ordered or not, less than 0.002.
+const SOLID: f64 = 0.006;
+
+/// Two flows side by side: edges of the box, and the highest velocity.
+const CHANNEL: [f64; 3] = [5.0, 5.0, 12.0];
+const VELOCITY: f64 = 0.4;
+
+pub struct Runs<'a> {
+    pub liquid: &'a Liquid,
+    pub folder: &'a Path,
+    pub seed: u64,
+}
+
+/// A scene of the liquid without its drag, which the model file has.
+struct Setting<'a> {
+    title: &'a str,
+    edges: [f64; 3],
+    initial: String,
+    /// Of the force along x, reversed in the upper half of z.
+    acceleration: f64,
+    settle: f64,
+    time: f64,
+    dt: f64,
+    observe: &'a str,
+}
+
+impl Setting<'_> {
+    fn text(&self, seed: u64) -> String {
+        let steps = |time: f64| (time / self.dt).ceil().max(100.0);
+        let mut text = format!(
+            "title = \"{}\"\nmodel = \"liquid.toml\"\nkT = 1.0\nseed = {seed}\nbox = {:?}\n{}",
+            self.title, self.edges, self.initial
+        );
+        if self.acceleration > 0.0 {
+            let _ = writeln!(
+                text,
+                "[[body_force]]\nacceleration = [{:?}, 0.0, 0.0]\nreversed_along = \"z\"",
+                self.acceleration
+            );
+        }
+        let mut stage = |name: &str, steps: f64, dt: f64| {
+            let _ = write!(text, "[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
+        };
+        // A start that is no liquid yet needs short steps.
+        stage("begin", 400.0, 0.15 * self.dt);
+        stage("settle", steps(self.settle), self.dt);
+        stage("measure", steps(self.time), self.dt);
+        text + "[output]\nthermo = 0\ncheckpoint = 0\n[observe]\n" + self.observe
+    }
+}
+
+impl Runs<'_> {
+    /// Writes the model, and gives it.
+    fn model(&self, fluid: &Strengths, drag: &Drag) -> Result<Model, ExperimentError> {
+        let (path, text) = (self.folder.join("liquid.toml"), text(self.liquid, fluid, drag, ""));
+        write_bytes(&path, Existing::Keep, text.as_bytes())?;
+        Ok(Model::parse_in(&path, &text)?)
+    }
+
+    fn piece(&self, model: &Model) -> Result<Piece, Trouble> {
+        let densities = [self.liquid.goals.density];
+        let of = Composition { model, masses: &[1.0], kt: 1.0, densities: &densities, seed: self.seed };
+        match Piece::settled(&of).map_err(stopped)? {
+            Ok(piece) => Ok(piece),
+            Err(why) => Err(Trouble::Stopped(why.to_string())),
+        }
+    }
+
+    fn dt(&self, model: &Model) -> Result<f64, Trouble> {
+        Ok(two_digits(STRIDE / self.piece(model)?.frequency))
+    }
+
+    /// The longest step with errors of about a percent.
+    pub fn longest_step(&self, fluid: &Strengths, drag: &Drag) -> Result<Option<f64>, Trouble> {
+        let piece = self.piece(&self.model(fluid, drag)?)?;
+        Ok(piece.longest(ADVISED).map_err(stopped)?.map(|(dt, _)| dt))
+    }
+
+    fn seed(&self, care: Care) -> u64 {
+        match care {
+            Care::Search => self.seed,
+            Care::Result(seed) => self.seed.wrapping_add(1000).wrapping_add(seed),
+        }
+    }
+
+    /// Runs scenes side by side; the last is the longest.
+    fn run(&self, settings: &[Setting], care: Care) -> Result<Vec<Observed>, Trouble> {
+        let run = |(number, setting): (usize, &Setting)| -> Result<Observed, RunError> {
+            let scene = Scene::parse(setting.title, &setting.text(self.seed(care)), self.folder)?;
+            let folder = self.folder.join(format!("run-{number}"));
+            run_scene(&scene, &folder, &mut |_| ())?;
+            Observed::read(&folder)
+        };
+        let all = jobs::each(settings.iter().enumerate().collect(), run);
+        let all: Vec<Observed> = all.into_iter().collect::<Result<_, _>>().map_err(stopped)?;
+        match all.iter().flat_map(|o| &o.0).find(|o| o.note.contains("are a crystal")) {
+            Some(crystal) => Err(Trouble::Frozen(crystal.note.clone())),
+            None => Ok(all),
+        }
+    }
+
+    fn homogeneous<'a>(&self, share: f64, time: f64, dt: f64, observe: &'a str) -> Setting<'a> {
+        let density = share * self.liquid.goals.density;
+        Setting {
+            title: "homogeneous liquid",
+            edges: [(PARTICLES / density).cbrt(); 3],
+            initial: format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n"),
+            acceleration: 0.0,
+            settle: 8.0,
+            time,
+            dt,
+            observe,
+        }
+    }
+}
+
+fn longer(care: Care, time: f64) -> f64 {
+    if care == Care::Search { time } else { LONGER * time }
+}
+
+/// A run that stops says something of the fluid; another error does not.
+fn stopped(error: RunError) -> Trouble {
+    if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
+}
+
+const OF_BULK: &str = "every = 5\npressure = true\nmsd = { every = 25, length = 10 }\n";
+const OF_SLAB: &str = "every = 5\nsurface_tension = true\ninterface_width = { every = 25 }\n";
+const OF_FLOW: &str = "every = 3\npoiseuille = true\n";
+const OF_MOTION: &str = "msd = { every = 15, length = 10 }\n";
+
+impl Instrument for Runs<'_> {
+    fn equilibrium(&mut self, fluid: &Strengths, care: Care) -> Result<Equilibrium, Trouble> {
+        let dt = self.dt(&self.model(fluid, &USUAL)?)?;
+        let density = self.liquid.goals.density;
+        let mut settings: Vec<Setting> = DENSITIES
+            .iter()
+            .map(|share| self.homogeneous(*share, longer(care, TIMES[0]), dt, OF_BULK))
+            .collect();
+        settings.push(Setting {
+            title: "slab",
+            edges: [AREA, AREA, HEIGHT],
+            initial: format!(
+                "[initial]\nkind = \"slab\"\naxis = \"z\"\nthickness = {THICKNESS:?}\ndensity = {density:?}\n"
+            ),
+            acceleration: 0.0,
+            settle: 12.0,
+            time: longer(care, TIMES[1]),
+            dt,
+            observe: OF_SLAB,
+        });
+        let found = self.run(&settings, care)?;
+        let [thin, wanted, dense] = [0, 1, 2].map(|k: usize| found[k].configurational_pressure());
+        let slab = &found[3];
+        let diffusion = found[1].scalar("diffusion", "diffusion").value;
+        if diffusion < SOLID {
+            let message = format!("particles stay in place, with a diffusion coefficient of {diffusion:.4}");
+            return Err(Trouble::Frozen(message));
+        }
+        Ok(Equilibrium {
+            pressure: wanted,
+            stiffness: dense.minus(thin).times(1.0 / ((DENSITIES[2] - DENSITIES[0]) * density)),
+            // Of the routes to the tension that with the least scatter.
+            tension: slab.scalar("surface_tension", "free_energy"),
+            liquid: slab.scalar("interface_width", "liquid"),
+        })
+    }
+
+    fn flow(&mut self, fluid: &Strengths, drag: &Drag, guess: f64, care: Care) -> Result<Flow, Trouble> {
+        let dt = self.dt(&self.model(fluid, drag)?)?;
+        let density = self.liquid.goals.density;
+        // v = ρ a z (D − z)/2η in each half of width D.
+        let half = 0.5 * CHANNEL[2];
+        let mut settings = vec![Setting {
+            title: "two flows",
+            edges: CHANNEL,
+            initial: format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n"),
+            acceleration: 8.0 * guess * VELOCITY / (density * half * half),
+            settle: 8.0 + density * half * half / guess,
+            time: longer(care, TIMES[2]),
+            dt,
+            observe: OF_FLOW,
+        }];
+        if care != Care::Search {
+            settings.insert(0, self.homogeneous(1.0, longer(care, TIMES[2]), dt, OF_MOTION));
+        }
+        let found = self.run(&settings, care)?;
+        let last = &found[found.len() - 1];
+        let diffusion = match care {
+            Care::Search => Measured::NONE,
+            Care::Result(_) => found[0].scalar("diffusion", "diffusion"),
+        };
+        Ok(Flow { viscosity: last.scalar("poiseuille", "viscosity"), diffusion, dt })
+    }
+}
