@@ -277,6 +277,43 @@ fn an_engine_survives_bad_particles() {
     }
 }
 
+/// Types that were species of a model with more of them are not those of another model.
+#[test]
+fn an_engine_renewed_with_fewer_species() {
+    let (many, few) = (fluid(64), fluid(2));
+    let mut cloud = Cloud::new(300, 2, [6.0; 3], [true; 3]);
+    cloud.kind = vec![1; 300];
+    for settings in all_settings() {
+        let expected = cloud.energy(&mut Engine::new(&few, settings).unwrap()).unwrap();
+        for pair_sums in [false, true] {
+            let mut engine = Engine::new(&many, settings).unwrap();
+            engine.map_kinds(&[0, 63]).unwrap();
+            engine.use_pair_sums_only(pair_sums);
+            cloud.energy(&mut engine).unwrap();
+            engine.renew(&few, settings).unwrap();
+            let error = cloud.energy(&mut engine).unwrap() / expected - 1.0;
+            assert!(error.abs() < 1e-5, "{settings:?} {pair_sums}: {error}");
+        }
+    }
+}
+
+/// After an evaluation that has failed there are no densities, and asking for them does not end the host.
+#[test]
+fn densities_after_an_evaluation_that_failed() {
+    let mut engine = sums_over_pairs(&fluid(1));
+    let [large, small] = [300, 100].map(|count| Cloud::new(count, 1, [6.0; 3], [true; 3]));
+    let want = Want { densities: false, ..Want::TOTALS };
+    let mut force = vec![[0.0; 3]; 300];
+    engine.forces(&large.domain, &Request { want, ..large.request(None) }, &mut force, false).unwrap();
+    let request = Request { want, ..small.request(None) };
+    let narrow = PeriodicBox::orthogonal([0.0; 3], [1e-9, 6.0, 6.0], [true; 3]).unwrap();
+    engine.forces(&narrow, &request, &mut force, false).unwrap_err();
+    let around = Surroundings::Box(&small.domain);
+    assert!(engine.sum_densities(around, &small.particles()).unwrap().is_empty());
+    let pending = engine.first(around, &request, &mut force).unwrap();
+    assert!(pending.finish(&mut engine, &request, &mut force).is_ok());
+}
+
 /// A panic in the middle of an evaluation leaves nothing that a later call could take for a result.
 #[test]
 fn lists_of_a_fluid_that_do_not_fit_are_refused() {
@@ -287,6 +324,16 @@ fn lists_of_a_fluid_that_do_not_fit_are_refused() {
         spoil(&mut fluid);
         catch_unwind(|| Plan::new(&fluid).is_ok()).unwrap_err();
     }
+    // More species than a model file can have.
+    let ideal = Model::parse("m.toml", "title = \"t\"\nspecies = [\"F\"]\n").unwrap().at(1.0).unwrap();
+    let of = |count: usize| Fluid {
+        species: vec!["F".to_owned(); count],
+        excess: vec![ideal.excess[0].clone(); count],
+        thermostats: vec![None; count * count],
+        ..ideal.clone()
+    };
+    assert!(Plan::new(&of(256)).is_ok());
+    catch_unwind(|| Plan::new(&of(257)).is_ok()).unwrap_err();
 }
 
 /// Boxes at the ends of numbers: the result is that of the sums over pairs, or an error.
@@ -320,6 +367,35 @@ fn extreme_boxes() {
             let Ok(domain) = PeriodicBox::new([0.0; 3], edges, [true; 3]) else { continue };
             cloud.domain = domain;
             let _ = cloud.energy(&mut engine);
+        }
+    }
+}
+
+/// Boxes so skew that coordinates are much larger than the edges: no pair is lost, or the sums over pairs do it.
+#[test]
+fn skew_boxes() {
+    let fluid = fluid(1);
+    let mut expected = sums_over_pairs(&fluid);
+    for (length, tilt) in [
+        ([6.58, 60.1, 714_886.0], [65.19, 12_178_937.0, 10_890_778.0]),
+        ([10.68, 489.2, 790_988.0], [298.9, 18_636_792.0, 30_763_446.0]),
+        ([7.5, 75.65, 964_893.0], [46.95, 9_792_021.0, 17_052_177.0]),
+        ([9.05, 2_178.0, 575_081.0], [1_937.2, 9_486_543.0, 10_793_990.0]),
+        ([6.0, 2_000.0, 2_000.0], [0.0, 0.0, 150_000.0]),
+        ([20.0, 20.0, 20.0], [-60.0, 55.0, 40.0]),
+    ] {
+        let ([lx, ly, lz], [xy, xz, yz]) = (length, tilt);
+        let edges = nalgebra::Matrix3::new(lx, xy, xz, 0.0, ly, yz, 0.0, 0.0, lz);
+        let mut cloud = Cloud::new(300, 1, [4.0; 3], [true; 3]);
+        cloud.domain = PeriodicBox::new([0.0; 3], edges, [true; 3]).unwrap();
+        let corner = cloud.domain.point([0.9, 0.97, 0.99]);
+        cloud.x.iter_mut().for_each(|x| (0..3).for_each(|c| x[c] += corner[c]));
+        let sums = cloud.energy(&mut expected).unwrap();
+        for settings in all_settings() {
+            let found = cloud.energy(&mut Engine::new(&fluid, settings).unwrap()).unwrap();
+            assert!((found / sums - 1.0).abs() < 1e-4, "{length:?} {tilt:?} {settings:?}: {found} {sums}");
+            let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), 1.0, &settings).unwrap();
+            let _ = thermostat.find_pairs(&Pool::new(settings.threads), &cloud.bodies(&[1.0]), DT, true);
         }
     }
 }

@@ -111,13 +111,17 @@ impl Engine {
     }
 
     /// Takes the same model at another temperature, or other settings. The map of types and the restriction to sums over
-    /// pairs stay. Counts begin anew; there are no special pairs, no exclusions and no device.
+    /// pairs stay; with another number of species types are species indices again. Counts begin anew; there are no special
+    /// pairs, no exclusions and no device.
     ///
     /// # Errors
     /// Fails as [`Plan::new`].
     pub fn renew(&mut self, fluid: &Fluid, settings: Settings) -> Result<(), TooLarge> {
         let mut plan = Plan::new(fluid)?;
-        plan.species_of_type.clone_from(&self.plan().species_of_type);
+        // The passes read tables by species without checks.
+        if plan.species.len() == self.plan().species.len() {
+            plan.species_of_type.clone_from(&self.plan().species_of_type);
+        }
         self.replace(plan, settings);
         Ok(())
     }

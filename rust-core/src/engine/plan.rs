@@ -116,6 +116,7 @@ impl Plan {
     fn of_passes(fluid: &Fluid, passes: Vec<usize>, linear: Vec<LinearTerm>) -> Result<Plan, TooLarge> {
         let count = fluid.species.len();
         assert!(matches!(fluid.dimensions, 2 | 3), "a fluid has two or three dimensions");
+        assert!(count <= 1 << u8::BITS, "the passes store a species in a byte");
         assert!(fluid.thermostats.len() == count * count && fluid.excess.len() == count, "a list by species");
         assert!(fluid.pairs.iter().flat_map(|p| p.between).all(|s| s < count), "a pair of species");
         let psi = |alpha| plan_excess(fluid, alpha, &passes);

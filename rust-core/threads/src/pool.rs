@@ -340,8 +340,12 @@ fn worker(shared: &Arc<Shared>, number: usize) {
         let Some(Work(work)) = work else { continue };
         // SAFETY: this worker is busy, and `Pool::run` holds the reference until no worker is.
         let work = unsafe { &*work };
-        if std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(number))).is_err() {
+        if let Err(what) = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(number))) {
             shared.failed.store(true, Ordering::Relaxed);
+            // Dropping what a panic has thrown may panic again, and the caller would wait for this worker for ever.
+            if let Err(again) = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| drop(what))) {
+                std::mem::forget(again);
+            }
         }
         if shared.busy.fetch_sub(1, Ordering::Release) == 1 {
             // A caller that saw this worker busy is asleep once the lock is free.

@@ -65,6 +65,15 @@ impl BoxGeometry {
         self.tilt != [0.0; 3]
     }
 
+    /// The largest number that can occur where a point is computed from its fractions, or its fractions from it: errors of
+    /// rounding are fractions of this. Without tilt it is the longest edge.
+    pub fn extent(&self) -> f64 {
+        let [xy, xz, yz] = self.tilt.map(f64::abs);
+        let [x, y, z] = self.length;
+        let along = [x + xy + xz + xy * (yz / y), y + yz, z];
+        along[..self.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b))
+    }
+
     /// Distance between opposite faces.
     pub fn height(&self, k: usize) -> f64 {
         let [xy, xz, yz] = self.tilt;

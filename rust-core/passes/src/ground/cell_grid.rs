@@ -39,19 +39,20 @@ pub struct CellGrid {
     pub i_cluster_extent: f64,
 }
 
-/// Coordinates are in single precision, relative to the box: the search distance grows by this fraction of cutoff and box.
+/// Coordinates are in single precision, relative to the box: the search distance grows by this fraction of the cutoff and of
+/// the box's extent.
 const ROUNDING: f64 = 1e-6;
 
 /// Cutoffs whose squares, and those of boxes of [`MOST_CUTOFFS`], are far from the ends of single precision.
 const CUTOFFS: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
-/// Longest edge of a box, in cutoffs.
+/// Largest extent of a box, in cutoffs.
 const MOST_CUTOFFS: f64 = 1e12;
 
 impl CellGrid {
-    /// The largest cutoff that fits into a box of this height, whose longest edge is `longest`.
-    pub fn cutoff_within(height: f64, longest: f64) -> f64 {
-        (0.5 * height * (1.0 - 1e-12) - ROUNDING * longest) / (1.0 + ROUNDING)
+    /// The largest cutoff that fits into a box of this height and [`BoxGeometry::extent`].
+    pub fn cutoff_within(height: f64, extent: f64) -> f64 {
+        (0.5 * height * (1.0 - 1e-12) - ROUNDING * extent) / (1.0 + ROUNDING)
     }
 
     /// The grid for `count` particles; `None` if the box is so narrow along a period that a
@@ -63,11 +64,11 @@ impl CellGrid {
     /// As [`CellGrid::new`], with up to `most` cells.
     pub fn with_cells(geometry: &BoxGeometry, cutoff: f64, count: usize, most: usize) -> Option<CellGrid> {
         let (column_axis, plane_axis) = if geometry.dimensions == 3 { (1, 2) } else { (2, 1) };
-        let longest = geometry.length[..geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b));
-        let search_cutoff = cutoff + ROUNDING * (cutoff + longest);
+        let extent = geometry.extent();
+        let search_cutoff = cutoff + ROUNDING * (cutoff + extent);
         // Comparisons with NaN are false.
         let is_wide = |k: usize| !geometry.periodic[k] || geometry.height(k) >= 2.0 * search_cutoff;
-        let fits = CUTOFFS.contains(&cutoff) && longest <= MOST_CUTOFFS * cutoff;
+        let fits = CUTOFFS.contains(&cutoff) && extent <= MOST_CUTOFFS * cutoff;
         if !(fits && (0..geometry.dimensions).all(is_wide)) {
             return None;
         }

@@ -343,12 +343,13 @@ impl PlaneSearch {
                 if together {
                     (low, end) = (I::cluster_least::<CLUSTER>(low), I::cluster_greatest::<CLUSTER>(end));
                 }
+                // All ends are limited to the cells of a column: no rounding error leads out of the arrays.
                 if before != 0 {
-                    let low = (low + most).smaller(most);
+                    let low = (low + most).larger(zero).smaller(most);
                     low.store_whole(out.before.get_unchecked_mut(w).as_mut_ptr().add(at));
                 }
                 if after != 0 {
-                    let over = (end - most).larger(zero);
+                    let over = (end - most).larger(zero).smaller(most);
                     over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr().add(at));
                 }
                 let low = low.larger(zero).smaller(most);

@@ -107,8 +107,18 @@ impl PairSums {
             + particle_virial.capacity() * size_of::<[f64; 6]>()
     }
 
-    /// Finds the pairs of another configuration.
+    /// Finds the pairs of another configuration; after an error there are none.
     fn find_pairs(&mut self, surroundings: Surroundings, particles: &Particles) -> Result<(), EngineError> {
+        let done = self.search_pairs(surroundings, particles);
+        if done.is_err() {
+            self.pairs.clear(0, Newton::On);
+            self.species.clear();
+            self.owned = 0;
+        }
+        done
+    }
+
+    fn search_pairs(&mut self, surroundings: Surroundings, particles: &Particles) -> Result<(), EngineError> {
         self.take_species(particles)?;
         self.owned = particles.owned;
         let (dimensions, cutoff) = (self.plan.dimensions, self.plan.cutoff);

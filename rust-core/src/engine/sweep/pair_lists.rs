@@ -84,11 +84,12 @@ impl PairLists {
         let set = self.set;
         let region = region(set, pool, (self.dimensions, range * (1.0 + margin)), domain, &input)?;
         let is_long = region.is_long(range);
-        let margin = if is_long { margin.max(region.longest() / range * UNITS_OF_MARGIN) } else { margin };
+        let extent = region.geometry.extent();
+        let margin = if is_long { margin.max(extent / range * UNITS_OF_MARGIN) } else { margin };
         if margin > MOST_MARGIN {
             return Err(FAR_APART);
         }
-        let range = self.range_within(domain, region.longest(), range, margin)?;
+        let range = self.range_within(domain, extent, range, margin)?;
         let (geometry, mut grid) = region.cells(range, particles.x.len())?;
         let terms = &terms(margin);
         // Updates of single pairs need an even number of planes, so that planes updated at
@@ -140,25 +141,22 @@ impl PairLists {
         cells.find_places(&mut self.place);
     }
 
-    /// The range of the search in a region whose longest edge is `longest`; slightly less than `range` in a box that is
+    /// The range of the search in a region of this extent; slightly less than `range` in a box that is
     /// exactly twice as wide: drag and noise at the range are almost zero there.
     fn range_within(
         &self,
         domain: &PeriodicBox,
-        longest: f64,
+        extent: f64,
         range: f64,
         margin: f64,
     ) -> Result<f64, EngineError> {
         let periodic = domain.periodic();
-        // The length of an edge along an open direction does not matter.
-        let edges = (0..self.dimensions).filter(|k| periodic[*k]).flat_map(|k| domain.edge(k));
-        let longest = edges.map(f64::abs).fold(longest.max(4.0 * range), f64::max);
         let heights = (0..self.dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
         if height < 2.0 * range * (1.0 - 1e-12) {
             return Err(EngineError::Host("the box is narrower than twice the range of the thermostat"));
         }
-        let within = CellGrid::cutoff_within(height, longest);
+        let within = CellGrid::cutoff_within(height, extent.max(4.0 * range));
         // The comparison is false for NaN.
         let is_wide = within >= range * (1.0 - MOST_LOSS);
         if is_wide { Ok(within.min(range * (1.0 + margin))) } else { Err(FAR_APART) }

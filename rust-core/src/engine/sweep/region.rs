@@ -60,19 +60,14 @@ pub struct Region {
     owned: [[f64; 3]; 2],
 }
 
-/// Positions of pairs are fractions of the region in units of 2⁻³²: in a region of this many cutoffs they are as exact as
+/// Positions of pairs are fractions of the region in units of 2⁻³²: in a region that extends over this many cutoffs they are as exact as
 /// single precision is within a cutoff.
 const LONG: f64 = 8192.0;
 
 impl Region {
-    /// The longest edge.
-    pub fn longest(&self) -> f64 {
-        self.geometry.length[..self.geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b))
-    }
-
     /// Whether the region is so long that pairs within `cutoff` have to be computed in double precision.
     pub fn is_long(&self, cutoff: f64) -> bool {
-        self.longest() > LONG * cutoff
+        self.geometry.extent() > LONG * cutoff
     }
 
     /// The cells for pairs within `cutoff`; directions that are open are stretched as they need.

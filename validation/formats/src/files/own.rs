@@ -1,10 +1,12 @@
 //! How psidpd knows what it has made.
 
 use super::inside::is_empty_or_missing;
-use super::{PathError, create_inside, unless_missing};
+use super::{Draft, PathError, open_inside, unless_missing};
 use psidpd_core::document::open_regular;
 use serde::Serialize;
+use std::fs::{canonicalize, metadata};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -48,12 +50,27 @@ pub(super) fn is_made_here(path: &Path) -> io::Result<bool> {
     })
 }
 
-/// Whether the path lies in a folder that [`work_folder`] has made.
+/// The content of the mark of a folder. It names this folder alone, so that a copy of the mark, or one in a folder from
+/// elsewhere, marks nothing.
+fn mark_of(folder: &Path) -> io::Result<String> {
+    Ok(format!("psidpd made folder {} and replaces what is in it.\n", metadata(folder)?.ino()))
+}
+
+/// Whether the folder has its own mark, made by this user.
+fn is_marked(folder: &Path) -> io::Result<bool> {
+    let expected = mark_of(folder)?;
+    let mark = open_inside(&folder.join(MARK))?;
+    let is_own = mark.metadata()?.uid() == rustix::process::geteuid().as_raw();
+    let mut found = Vec::new();
+    mark.take(expected.len() as u64 + 1).read_to_end(&mut found)?;
+    Ok(is_own && found == expected.as_bytes())
+}
+
+/// Whether the path lies in a folder that [`work_folder`] has made; links and steps back on the way to it are followed.
 pub(super) fn is_in_work(path: &Path) -> bool {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    path.ancestors()
-        .skip(1)
-        .any(|folder| folder.join(MARK).symlink_metadata().is_ok_and(|mark| mark.is_file()))
+    let place = path.ancestors().skip(1).find_map(|folder| canonicalize(folder).ok());
+    place.is_some_and(|place| place.ancestors().any(|folder| is_marked(folder).unwrap_or(false)))
 }
 
 /// Creates a folder in which psidpd may replace everything, or takes one that it created before.
@@ -71,9 +88,12 @@ pub fn work_folder(path: &Path) -> Result<(), PathError> {
             return Err(io::Error::new(ErrorKind::AlreadyExists, why));
         }
         std::fs::create_dir_all(path)?;
-        match create_inside(&mark) {
+        let mut draft = Draft::new(&mark, false)?;
+        draft.write_all(mark_of(path)?.as_bytes())?;
+        match draft.finish(false) {
+            // Another process was faster.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
-            created => created?.write_all(b"psidpd made this folder and replaces what is in it.\n"),
+            done => done,
         }
     };
     make().map_err(PathError::at("use", path))

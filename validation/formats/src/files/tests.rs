@@ -166,6 +166,38 @@ fn a_draft_has_no_name() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
+/// A mark is that of one folder and one user: an empty one, a copy, and another user's are none.
+#[test]
+fn a_mark_from_elsewhere_gives_no_leave() {
+    let folder = tempfile::tempdir().unwrap();
+    let [work, mine] = ["work", "mine"].map(|name| folder.path().join(name));
+    work_folder(&work).unwrap();
+    std::fs::create_dir_all(mine.join("inner")).unwrap();
+    let refuses = |what: &str| {
+        for file in ["f", "inner/f"] {
+            std::fs::write(mine.join(file), "mine").unwrap();
+            assert!(write_bytes(&mine.join(file), Existing::Keep, b"x").is_err(), "{what}");
+        }
+        assert!(work_folder(&mine).is_err() && remove_work(&mine).is_err(), "{what}");
+    };
+    for text in [String::new(), std::fs::read_to_string(work.join(".psidpd")).unwrap()] {
+        std::fs::write(mine.join(".psidpd"), &text).unwrap();
+        refuses(&text);
+    }
+    // Ways through a marked folder that lead out of it.
+    std::fs::remove_file(mine.join(".psidpd")).unwrap();
+    symlink("../mine", work.join("link")).unwrap();
+    for way in ["../mine/f", "link/f", "link/inner/../f"] {
+        assert!(write_bytes(&work.join(way), Existing::Keep, b"x").is_err(), "{way}");
+        assert_eq!(std::fs::read(mine.join("f")).unwrap(), b"mine", "{way}");
+    }
+    // Only the administrator can give a file to another user.
+    if std::os::unix::fs::chown(work.join(".psidpd"), Some(12_345), None).is_ok() {
+        std::fs::write(work.join("f"), "mine").unwrap();
+        assert!(write_bytes(&work.join("f"), Existing::Keep, b"x").is_err());
+    }
+}
+
 #[test]
 fn a_folder_of_work_is_new_or_was_made_here() {
     let folder = tempfile::tempdir().unwrap();

@@ -84,6 +84,13 @@ impl Fluid {
         pairs
     }
 
+    /// The words for types of the first coefficients whose types are not known, as those of a loop.
+    fn unknown_types(&self) -> Option<&[String; 2]> {
+        let count = self.count();
+        let mut types = self.coefficients.iter().map(|(types, _)| types);
+        types.find(|types| types.iter().any(|word| range(word, count).is_none()))
+    }
+
     /// The types that have coefficients, with their masses: 1 if the script sets none that is known.
     pub fn members(&self) -> Vec<(usize, f64)> {
         let pairs = self.pairs();
@@ -116,8 +123,16 @@ impl Fluid {
         }
         let mut found = Vec::new();
         let pairs = self.pairs();
+        let unknown = self.unknown_types();
+        if let Some([i, j]) = unknown {
+            found.push(Finding::Look(format!(
+                "the types {i} {j} are known only when LAMMPS runs: densities and forces of a pair must have one range"
+            )));
+        }
         for ((i, j), pair) in &pairs {
             match pair {
+                // What seems to be missing may be that of a type that is not known.
+                Pair { density: None, .. } | Pair { forces: None, .. } if unknown.is_some() => {}
                 Pair { density: Some(_), forces: None } => found.push(Finding::ByHand(format!(
                     "types {i} {j} have a density without a force: the new style has both or none for a pair"
                 ))),

@@ -24,11 +24,23 @@ pub fn program(old: &str, law: Law, plugin: Option<&str>, read: Read) -> Convert
             command.line += first - 1;
             // A piece of a command, to which the program adds its end, keeps its last blank.
             let piece = text.is_piece(old) && inside.ends_with(' ');
+            let filled = text.is_filled(old);
             let result = match (work.convert(&command), piece) {
+                // The program inserts as many numbers as before.
+                (Some(result), _) if result.is_empty() && filled => {
+                    Some(format!("# not needed: {}", command.text))
+                }
                 (Some(result), true) if result.is_empty() => Some("# not needed: ".to_owned()),
                 (Some(result), true) => Some(result + " "),
                 (result, _) => result,
             };
+            let percents = |text: &str| text.matches('%').count();
+            if filled && result.as_deref().is_some_and(|new| percents(new) != percents(command.text)) {
+                work.by_hand(
+                    &command,
+                    "the program inserts another number of values by % than the new text has",
+                );
+            }
             // A piece such as "mvv/dpd", which the program adds to another.
             if result.is_none() && names_built_in(&command.words[..command.words.len().min(1)]) {
                 work.by_hand(&command, "names the built-in style: rewrite it for mdpd/psi");
@@ -79,6 +91,11 @@ impl Literal<'_> {
     fn is_piece(&self, program: &str) -> bool {
         let after = program[self.end..].trim_start();
         after.starts_with('+') || after.starts_with(['"', '\'']) && !after.starts_with("\"\"\"")
+    }
+
+    /// Whether the program inserts values by `%`.
+    fn is_filled(&self, program: &str) -> bool {
+        program[self.end..].trim_start().starts_with('%')
     }
 
     fn is_long(&self) -> bool {

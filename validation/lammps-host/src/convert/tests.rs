@@ -225,6 +225,12 @@ fn fluids_are_compared_when_lammps_runs() {
             None => assert_eq!(found, [] as [&str; 0], "{rest}"),
         }
     }
+    // Types of a loop.
+    let looped = "pair_coeff * * mdpd/rhosum 0.75\nvariable i loop 2\nlabel a\npair_coeff $i * mdpd -40 25 18 1 0.75\n\
+                  next i\njump SELF a\nrun 5\n";
+    let found = remarks(looped, Law::Lucy);
+    assert!(found.contains("the types $i * are known only when LAMMPS runs"), "{found}");
+    assert!(!found.contains("without a force"), "{found}");
     // The built-in's own law has its weights, and any B.
     assert_eq!(remarks(&format!("{both}mass 2 2.0\npair_coeff 1 2 mdpd -40 20 1 1 0.75\n"), Law::Lucy), "");
 }
@@ -319,6 +325,17 @@ fn fixes_that_had_no_effect() {
     assert!(texts(&new.left).contains(undone), "{:?}", new.left);
     let new = converted(&format!("{style}fix 1 all nve\n"), Law::Lucy, "p.so");
     assert!(!texts(&new.left).contains(undone), "{:?}", new.left);
+}
+
+/// Where a program inserts values by `%` a command that goes stays as a comment, which takes the values.
+#[test]
+fn programs_that_insert_values_by_percent() {
+    let old = "l.command('comm_modify vel yes')\nl.command('pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5')\n\
+               l.command('pair_coeff * * mdpd/rhosum %.2f' % rd)\nl.command('pair_coeff * * mdpd %g 25 0 1 %.2f' % (a, rd))\n";
+    let new = python::program(old, Law::Lucy, None, &|_| None);
+    let expected = "l.command('# not needed: pair_coeff * * mdpd/rhosum %.2f' % rd)\n\
+                    l.command('pair_coeff * * %g 25 0 1 %.2f' % (a, rd))\n";
+    assert!(new.script.ends_with(expected) && new.by_hand.is_empty(), "{} {:?}", new.script, new.by_hand);
 }
 
 /// One text that becomes several commands: elements of lists, arguments of calls, values that a generator yields, names of scripts;

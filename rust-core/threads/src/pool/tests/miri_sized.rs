@@ -91,6 +91,30 @@ fn a_panic_of_a_worker_reaches_the_caller_and_the_next_piece_is_done() {
     }
 }
 
+/// What a panic has thrown may panic when it is dropped.
+#[test]
+fn a_worker_whose_panic_panics_again_does_the_next_piece() {
+    struct Bomb;
+    impl Drop for Bomb {
+        fn drop(&mut self) {
+            panic!("again, on purpose");
+        }
+    }
+    let pool = pool(3);
+    let throws = |t: usize| {
+        if t == 1 {
+            std::panic::panic_any(Bomb)
+        }
+    };
+    assert!(catch_unwind(AssertUnwindSafe(|| pool.run(&throws))).is_err());
+    assert!(catch_unwind(AssertUnwindSafe(|| pool.in_stages(&mut [0, 1, 2], &[&|t| throws(*t)]))).is_err());
+    let seen = AtomicUsize::new(0);
+    pool.run(&|t| {
+        seen.fetch_or(1 << t, Ordering::Relaxed);
+    });
+    assert_eq!(seen.into_inner(), 7);
+}
+
 /// Each caller's work is on its own stack, and invalid after its call returns.
 #[test]
 fn pieces_of_two_callers_do_not_overlap() {
