@@ -1,7 +1,9 @@
 use super::Image;
 use super::colour::{Rgb, mix, of_species};
 use super::projection::{Projection, View};
+use psidpd_core::engine::vectors::{Loop, run_best};
 use psidpd_formats::Frame;
+use std::ops::Range;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ParticleOptions {
@@ -49,6 +51,8 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
     let mut canvas = Canvas {
         image: Image::filled(size[0], size[1], WHITE),
         depth: vec![f64::NEG_INFINITY; size[0] * size[1]],
+        foremost: vec![NONE; size[0] * size[1]],
+        balls: Vec::with_capacity(frame.len()),
     };
     let fine = FINER as f64;
     // A particle smaller than a pixel would flicker as it moves.
@@ -63,8 +67,9 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
         }
         let ([across, down], near) = projection.place(*x);
         let colour = if fades { mix(*colour, WHITE, 0.45 * (1.0 - near).clamp(0.0, 1.0)) } else { *colour };
-        canvas.ball([across * fine, down * fine], pixels, toward, reach, colour);
+        canvas.place(Ball { at: [across * fine, down * fine], radius: pixels, colour }, toward, reach);
     }
+    canvas.shade();
     canvas.edges(frame, &projection);
     (canvas.image.reduced(FINER), projection)
 }
@@ -73,31 +78,63 @@ struct Canvas {
     image: Image,
     /// The position of the surface in each pixel along the line of sight; larger is nearer to the viewer.
     depth: Vec<f64>,
+    /// The ball that is seen in each pixel, and [`NONE`] where there is none.
+    foremost: Vec<u32>,
+    balls: Vec<Ball>,
+}
+
+const NONE: u32 = u32::MAX;
+
+/// A ball in pixels.
+struct Ball {
+    at: [f64; 2],
+    radius: f64,
+    colour: Rgb,
+}
+
+impl Ball {
+    /// The pixels along a direction that the ball may cover, of `most`.
+    fn range(&self, direction: usize, most: usize) -> Range<usize> {
+        let low = (self.at[direction] - self.radius).floor().max(0.0) as usize;
+        let high = (self.at[direction] + self.radius).ceil().clamp(0.0, most as f64) as usize;
+        low..high
+    }
+
+    /// The place of the middle of a pixel, in radii.
+    fn place(&self, direction: usize, pixel: usize) -> f64 {
+        (pixel as f64 + 0.5 - self.at[direction]) / self.radius
+    }
 }
 
 impl Canvas {
-    /// Draws a ball of `radius` pixels at `at`. Its middle is at depth `toward`; its front is `reach` (a length) nearer.
-    fn ball(&mut self, at: [f64; 2], radius: f64, toward: f64, reach: f64, colour: Rgb) {
-        let range = |middle: f64, most: usize| {
-            let low = (middle - radius).floor().max(0.0) as usize;
-            let high = (middle + radius).ceil().clamp(0.0, most as f64) as usize;
-            low..high
-        };
-        for y in range(at[1], self.image.height) {
-            for x in range(at[0], self.image.width) {
-                let nx = (x as f64 + 0.5 - at[0]) / radius;
-                let ny = (y as f64 + 0.5 - at[1]) / radius;
-                let rest = 1.0 - nx * nx - ny * ny;
-                if rest <= 0.0 {
-                    continue;
-                }
-                let nz = rest.sqrt();
-                let depth = toward + reach * nz;
-                let index = y * self.image.width + x;
-                if depth > self.depth[index] {
-                    self.depth[index] = depth;
-                    self.image.pixels[index] = shade(colour, nx, ny, nz);
-                }
+    /// Hides what is behind a ball. Its middle is at depth `toward`; its front is `reach` (a length) nearer.
+    fn place(&mut self, ball: Ball, toward: f64, reach: f64) {
+        let number = self.balls.len() as u32;
+        let columns = ball.range(0, self.image.width);
+        for y in ball.range(1, self.image.height) {
+            let ny = ball.place(1, y);
+            let row = y * self.image.width..(y + 1) * self.image.width;
+            run_best(Hide {
+                depth: &mut self.depth[row.clone()][columns.clone()],
+                foremost: &mut self.foremost[row][columns.clone()],
+                number,
+                first: ball.place(0, columns.start),
+                step: 1.0 / ball.radius,
+                ny,
+                toward,
+                reach,
+            });
+        }
+        self.balls.push(ball);
+    }
+
+    /// Colours the pixels of all balls: each once, of the foremost.
+    fn shade(&mut self) {
+        let width = self.image.width;
+        for (k, (pixel, foremost)) in self.image.pixels.iter_mut().zip(&self.foremost).enumerate() {
+            if let Some(ball) = self.balls.get(*foremost as usize) {
+                let (nx, ny) = (ball.place(0, k % width), ball.place(1, k / width));
+                *pixel = shade(ball.colour, nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt());
             }
         }
     }
@@ -126,6 +163,36 @@ impl Canvas {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Hides what is behind a ball in a row of pixels.
+struct Hide<'a> {
+    depth: &'a mut [f64],
+    foremost: &'a mut [u32],
+    number: u32,
+    /// The place of the first pixel in radii, the distance of pixels, and the place of the row.
+    first: f64,
+    step: f64,
+    ny: f64,
+    toward: f64,
+    reach: f64,
+}
+
+impl Loop for Hide<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Hide { depth, foremost, number, first, step, ny, toward, reach } = self;
+        for (k, (depth, foremost)) in depth.iter_mut().zip(foremost).enumerate() {
+            let nx = first + k as f64 * step;
+            let rest = 1.0 - nx * nx - ny * ny;
+            let here = toward + reach * rest.max(0.0).sqrt();
+            let is_seen = rest > 0.0 && here > *depth;
+            *depth = if is_seen { here } else { *depth };
+            *foremost = if is_seen { number } else { *foremost };
         }
     }
 }
