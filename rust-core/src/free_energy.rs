@@ -1,9 +1,10 @@
-//! ψ of one particle and its derivatives, for the theory and for measurements. The engine evaluates blocks of particles
-//! instead; both continue ψ beyond the bounds of a density by [`crate::model::continuation`].
+//! ψ of one particle and its derivatives, for the theory, and for many particles, for measurements. The engine evaluates blocks of
+//! particles without second derivatives instead; both continue ψ beyond the bounds of a density by [`crate::model::continuation`].
 
 use crate::model::curve::Curve;
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
 use crate::model::{Bounds, ExcessFreeEnergy, Fluid, StatedSlopes, Stray, continuation};
+use psidpd_passes::vectors::{Loop, run_best};
 
 /// The `ψ_α` of a fluid with exact first and second derivatives.
 #[derive(Debug, Clone)]
@@ -109,6 +110,49 @@ impl FreeEnergy {
         }
     }
 
+    /// [`FreeEnergy::at`] at as many points as there are `lanes`: `x[v * lanes + l]` is density v in lane l. The result has ψ, its
+    /// gradient and its second derivatives, row-major, each in all lanes.
+    pub fn evaluate_block(&self, alpha: usize, lanes: usize, x: &[f64]) -> Vec<f64> {
+        let n = self.variables;
+        let mut all = vec![0.0; (1 + n + n * n) * lanes];
+        let in_block = match &self.excess[alpha] {
+            Excess::Formula { program, .. } => {
+                let mut found = vec![0.0; program.outputs() * lanes];
+                run_best(EvaluateBlock { program, lanes, x, found: &mut found });
+                let (first, second) = found.split_at((1 + n) * lanes);
+                all[..(1 + n) * lanes].copy_from_slice(first);
+                let places = (0..n).flat_map(|u| (u..n).map(move |v| [u, v]));
+                for ([u, v], entry) in places.zip(second.chunks_exact(lanes.max(1))) {
+                    for row in [u * n + v, v * n + u] {
+                        all[(1 + n + row) * lanes..][..lanes].copy_from_slice(entry);
+                    }
+                }
+                true
+            }
+            _ => false,
+        };
+        let (mut psi, mut work, mut at) = (Psi::default(), Work::default(), vec![0.0; n]);
+        for lane in 0..lanes {
+            (0..n).for_each(|v| at[v] = x[v * lanes + lane]);
+            if in_block && !self.is_beyond(&at) {
+                continue;
+            }
+            self.evaluate(alpha, &at, &mut psi, &mut work);
+            all[lane] = psi.value;
+            for (k, entry) in psi.gradient.iter().chain(&psi.hessian).enumerate() {
+                all[(1 + k) * lanes + lane] = *entry;
+            }
+        }
+        all
+    }
+
+    /// Whether a density is out of its bounds.
+    fn is_beyond(&self, x: &[f64]) -> bool {
+        let beyond =
+            |(v, x): (usize, &f64)| self.bounds[v / self.species].is_some_and(|b| b.beyond(*x) != 0.0);
+        x.iter().enumerate().any(beyond)
+    }
+
     fn of_curve(&self, curve: &Curve, x: &[f64], psi: &mut Psi) {
         let n = self.variables;
         let own = curve.density * self.species..(curve.density + 1) * self.species;
@@ -160,6 +204,24 @@ impl FreeEnergy {
         (0..n).for_each(|u| values[1 + u] = derivative(&[u]));
         let pairs = (0..n).flat_map(|u| (u..n).map(move |v| [u, v]));
         values[1 + n..].iter_mut().zip(pairs).for_each(|(to, pair)| *to = derivative(&pair));
+    }
+}
+
+/// Runs a program for a block of points.
+struct EvaluateBlock<'a> {
+    program: &'a Program,
+    lanes: usize,
+    x: &'a [f64],
+    found: &'a mut [f64],
+}
+
+impl Loop for EvaluateBlock<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let EvaluateBlock { program, lanes, x, found } = self;
+        program.eval_block_into(lanes, x, found.chunks_exact_mut(lanes.max(1)), &mut Vec::new());
     }
 }
 

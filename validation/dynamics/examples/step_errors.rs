@@ -11,7 +11,7 @@ use psidpd_dynamics::run::{RunError, Simulation};
 use psidpd_dynamics::trial::{Composition, Piece, StepErrors};
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;
-use psidpd_observe::{Measured, configurational};
+use psidpd_observe::{Measured, Recorded, configurational};
 
 /// The step that is advised.
 const STEP: Integrator = Integrator::ForceGradient {
@@ -162,11 +162,11 @@ fn long_run(
         return Ok(None);
     }
     for sample in 0..SAMPLES {
-        run.record_flux(false);
+        run.record_flux(Recorded::Nothing);
         if run.advance(BETWEEN - 1, dt, STEP).is_err() {
             return Ok(None);
         }
-        run.record_flux(true);
+        run.record_flux(Recorded::Lines);
         if run.step(dt, STEP, Want::TOTALS).is_err() {
             return Ok(None);
         }

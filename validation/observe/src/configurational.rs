@@ -54,7 +54,7 @@ fn weight(frame: &Frame, range: f64, x: [f64; 3]) -> (f64, [f64; 3]) {
 /// Visits `w F·F` and `w ∇²U − ∇w·F` of each mobile particle, with its index.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
-    let laplacians = evaluation.laplacians(&frame.evaluator.fluid, frame.view.species);
+    let laplacians = evaluation.laplacians(frame.view.pool, &frame.evaluator.fluid);
     let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
     for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
@@ -89,7 +89,7 @@ pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
 
 /// The mean square frequency of a particle in the field of the others, `⟨Σ ∇²U/m⟩/(dN)`.
 pub fn mean_square_frequency(frame: &Frame) -> f64 {
-    let laplacians = frame.evaluation().laplacians(&frame.evaluator.fluid, frame.view.species);
+    let laplacians = frame.evaluation().laplacians(frame.view.pool, &frame.evaluator.fluid);
     let sum: f64 = laplacians.into_iter().enumerate().map(|(k, l)| l / frame.mass(k)).sum();
     sum / (frame.view.dimensions * frame.view.x.len()) as f64
 }

@@ -10,6 +10,7 @@
 
 use psidpd_core::engine::pair_sums::COMPONENTS;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// A straight line of momentum transport. It adds `d ⊗ f` times its fraction in a volume, divided by that volume, to the
 /// mean pressure in the volume.
@@ -23,20 +24,80 @@ pub struct Line {
     pub f: [f64; 3],
 }
 
+/// The number of lines in a block.
+pub const BLOCK: usize = 256;
+
+/// Lines of one carrier as parallel arrays, of which the first `count` entries are lines.
+#[derive(Debug, Clone)]
+pub struct Lines {
+    pub carrier: Carrier,
+    pub count: usize,
+    /// The three arrays have the components of [`Line::from`]; so have `d` and `f`.
+    pub from: [[f64; BLOCK]; 3],
+    pub d: [[f64; BLOCK]; 3],
+    pub f: [[f64; BLOCK]; 3],
+}
+
+impl Lines {
+    /// No lines.
+    pub fn of(carrier: Carrier) -> Lines {
+        Lines { carrier, count: 0, from: [[0.0; BLOCK]; 3], d: [[0.0; BLOCK]; 3], f: [[0.0; BLOCK]; 3] }
+    }
+
+    /// Passes lines on in blocks.
+    pub fn in_blocks(carrier: Carrier, all: impl Iterator<Item = Line>, mut visit: impl FnMut(&Lines)) {
+        let mut lines = Lines::of(carrier);
+        for Line { from, d, f } in all {
+            let at = lines.count;
+            for c in 0..3 {
+                (lines.from[c][at], lines.d[c][at], lines.f[c][at]) = (from[c], d[c], f[c]);
+            }
+            lines.count += 1;
+            if lines.count == BLOCK {
+                visit(&lines);
+                lines.count = 0;
+            }
+        }
+        if lines.count > 0 {
+            visit(&lines);
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Carrier {
     Particle,
     Pair,
 }
 
+/// What a step records of the transport of momentum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Recorded {
+    #[default]
+    Nothing,
+    /// The sum over all lines.
+    Sum,
+    /// The lines.
+    Lines,
+}
+
 #[derive(Debug, Clone, Default)]
 pub struct Flux {
     /// The paths of the particles.
     pub ways: Vec<Line>,
-    /// The drag of the pairs, averaged over the step.
-    pub drag: Vec<Line>,
+    /// The drag of the pairs, averaged over the step, of each action of a thermostat.
+    pub drag: Vec<Arc<Drag>>,
     /// The positions at which conservative forces acted.
     pub forces: Vec<Acted>,
+}
+
+/// The drag of the pairs in one action of a thermostat, averaged over the step.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Drag {
+    /// `Σ d ⊗ f` in the order xx, yy, zz, xy, xz, yz.
+    pub sum: [f64; 6],
+    /// The lines, in parts that do not depend on the number of threads; none if only the sum is recorded.
+    pub lines: Vec<Vec<Line>>,
 }
 
 /// Conservative forces at positions of a step.
@@ -45,7 +106,7 @@ pub struct Acted {
     /// The fraction of the step for which these forces acted.
     pub share: f64,
     pub virial: [f64; 6],
-    /// The positions of the particles, if they differ from those at the end of the step.
+    /// The positions of the particles, if they differ from those at the end of the step and lines are recorded.
     pub at: Option<Place>,
 }
 
@@ -65,7 +126,10 @@ impl Flux {
         for acted in &self.forces {
             (0..6).for_each(|c| sum[c] += acted.share * acted.virial[c]);
         }
-        for line in self.ways.iter().chain(&self.drag) {
+        for drag in &self.drag {
+            (0..6).for_each(|c| sum[c] += drag.sum[c]);
+        }
+        for line in &self.ways {
             for (sum, (a, b)) in sum.iter_mut().zip(COMPONENTS) {
                 *sum += 0.5 * (line.d[a] * line.f[b] + line.d[b] * line.f[a]);
             }

@@ -1,7 +1,7 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
-use super::flux::{Carrier, Flux, Line, Place};
-use psidpd_core::engine::pair_sums::{Evaluation, Evaluator};
+use super::flux::{Acted, Carrier, Flux, Line, Lines, Place};
+use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair};
 use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_core::model::Model;
 use std::cell::OnceCell;
@@ -33,6 +33,8 @@ pub struct View<'a> {
     pub temperature: f64,
     /// The kinetic energy `½ Σ m v²`.
     pub kinetic_energy: f64,
+    /// The sums Σψ and Σφ of the potential energy, if the step requested energies.
+    pub potential: [f64; 2],
     /// The tensor `(Σ m v v + W)/V` in the order xx, yy, zz, xy, xz, yz, if the step requested a virial.
     pub pressure: [f64; 6],
     /// The tensor of pressure with conservative forces only.
@@ -48,8 +50,18 @@ pub struct Frame<'a> {
     pub evaluator: &'a Evaluator,
     evaluation: OnceCell<Evaluation>,
     /// The evaluations of forces that acted at positions other than the present ones.
-    earlier: OnceCell<Vec<Option<Evaluation>>>,
+    earlier: OnceCell<Vec<Option<Earlier>>>,
 }
+
+/// Forces that acted at other positions than the present ones.
+struct Earlier {
+    evaluation: Evaluation,
+    /// The displacement of each particle for which the forces were computed; empty without one.
+    displacements: Vec<[f64; 3]>,
+}
+
+/// Number of particles whose lines a thread takes at a time.
+const LINES: usize = 1024;
 
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
@@ -58,37 +70,65 @@ impl<'a> Frame<'a> {
 
     /// Energies and conservative forces.
     pub fn evaluation(&self) -> &Evaluation {
-        let View { x, species, domain, .. } = self.view;
-        self.evaluation.get_or_init(|| self.evaluator.evaluate(x, species, domain))
+        let View { pool, x, species, domain, .. } = self.view;
+        self.evaluation.get_or_init(|| self.evaluator.evaluate(pool, x, species, domain))
     }
 
-    /// Visits every line of momentum transport in the step; returns false if the step did not record them.
-    pub fn lines(&self, mut visit: impl FnMut(Carrier, &Line)) -> bool {
-        let Some(flux) = self.view.flux else { return false };
-        flux.ways.iter().for_each(|line| visit(Carrier::Particle, line));
-        flux.drag.iter().for_each(|line| visit(Carrier::Pair, line));
-        let View { x, domain, .. } = self.view;
+    /// Adds up `width` numbers over all lines of momentum transport in the step; `None` if the step did not record them.
+    ///
+    /// Threads share the lines. The parts of their sums, and the order in which these are added, do not depend on the number of threads.
+    pub fn sum_lines(&self, width: usize, add: impl Fn(&Lines, &mut [f64]) + Sync) -> Option<Vec<f64>> {
+        let flux = self.view.flux?;
         let earlier = self.earlier.get_or_init(|| {
-            let at = flux.forces.iter().map(|acted| acted.at.as_ref());
-            let evaluate = |place: &Place| {
-                let x = place.displaced.as_ref().unwrap_or(&place.x);
-                self.evaluator.evaluate(x, &place.species, domain)
-            };
-            at.map(|at| at.map(evaluate)).collect()
+            flux.forces.iter().map(|acted| acted.at.as_ref().map(|at| self.earlier(at))).collect()
         });
-        for (acted, earlier) in flux.forces.iter().zip(earlier) {
-            let x = acted.at.as_ref().map_or(x, |at| &at.x);
-            let displaced = acted.at.as_ref().and_then(|at| at.displaced.as_ref());
-            for (pair, force) in earlier.as_ref().unwrap_or_else(|| self.evaluation()).pair_forces() {
-                let f = pair.d.map(|d| acted.share * force / pair.r * d);
-                // A displaced particle may have crossed a face of the box.
-                let back = |k: usize| displaced.map_or([0.0; 3], |to| domain.minimum_image(to[k], x[k]));
-                let (back_i, back_j) = (back(pair.i), back(pair.j));
-                let d = std::array::from_fn(|c| pair.d[c] - (back_i[c] - back_j[c]));
-                visit(Carrier::Pair, &Line { from: x[pair.i], d, f });
-            }
+        let ways = flux.ways.chunks(LINES).map(|lines| Part::Recorded(Carrier::Particle, lines));
+        let drag = flux.drag.iter().flat_map(|drag| &drag.lines);
+        let recorded = ways.chain(drag.map(|lines| Part::Recorded(Carrier::Pair, lines)));
+        let forces = flux.forces.iter().zip(earlier).flat_map(|(acted, earlier)| {
+            let evaluation =
+                earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation);
+            let x = acted.at.as_ref().map_or(self.view.x, |at| &at.x);
+            let displacements = earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements);
+            (0..evaluation.parts()).map(move |part| Part::Forces {
+                acted,
+                evaluation,
+                part,
+                x,
+                displacements,
+            })
+        });
+        let mut work: Vec<(Part, Vec<f64>)> = recorded.chain(forces).map(|part| (part, Vec::new())).collect();
+        self.view.pool.each(&mut work, |(part, sums)| {
+            sums.resize(width, 0.0);
+            part.in_blocks(|lines| add(lines, sums));
+        });
+        let mut all = vec![0.0; width];
+        for (_, sums) in &work {
+            all.iter_mut().zip(sums).for_each(|(all, sum)| *all += sum);
         }
-        true
+        Some(all)
+    }
+
+    fn earlier(&self, at: &Place) -> Earlier {
+        let View { pool, domain, .. } = self.view;
+        let to = at.displaced.as_deref().unwrap_or(&[]);
+        Earlier {
+            evaluation: self.evaluator.evaluate(
+                pool,
+                at.displaced.as_ref().unwrap_or(&at.x),
+                &at.species,
+                domain,
+            ),
+            // A displaced particle may have crossed a face of the box.
+            displacements: to.iter().zip(&at.x).map(|(to, x)| domain.minimum_image(*to, *x)).collect(),
+        }
+    }
+
+    /// Calls `visit` with every pair of particles closer than `range`, each once.
+    pub fn for_each_pair(&self, range: f64, visit: impl FnMut(Pair)) {
+        let View { pool, x, domain, .. } = self.view;
+        self.evaluator.for_each_pair(pool, x, domain, range, visit);
     }
 
     /// The pressure tensor of the momentum transport in the whole box; `None` if the step did not record it.
@@ -113,6 +153,42 @@ impl<'a> Frame<'a> {
 impl Drop for Frame<'_> {
     fn drop(&mut self) {
         let earlier = self.earlier.take().unwrap_or_default().into_iter().flatten();
+        let earlier = earlier.map(|earlier| earlier.evaluation);
         self.evaluation.take().into_iter().chain(earlier).for_each(|done| self.evaluator.recycle(done));
+    }
+}
+
+/// Lines that one thread adds up.
+enum Part<'a> {
+    Recorded(Carrier, &'a [Line]),
+    /// A part of the pairs of an evaluation, whose forces acted on particles at `x`.
+    Forces {
+        acted: &'a Acted,
+        evaluation: &'a Evaluation,
+        part: usize,
+        x: &'a [[f64; 3]],
+        displacements: &'a [[f64; 3]],
+    },
+}
+
+impl Part<'_> {
+    fn in_blocks(&self, visit: impl FnMut(&Lines)) {
+        match *self {
+            Part::Recorded(carrier, lines) => Lines::in_blocks(carrier, lines.iter().copied(), visit),
+            Part::Forces { acted, evaluation, part, x, displacements } => {
+                let back = |k: usize| displacements.get(k).copied().unwrap_or([0.0; 3]);
+                // Pairs at zero distance have no direction.
+                let apart = evaluation.pairs_of(part).filter(|(pair, _)| pair.r > 0.0);
+                let lines = apart.map(|(pair, force)| {
+                    let (from_i, from_j) = (back(pair.i), back(pair.j));
+                    Line {
+                        from: x[pair.i],
+                        d: std::array::from_fn(|c| pair.d[c] - (from_i[c] - from_j[c])),
+                        f: pair.d.map(|d| acted.share * force / pair.r * d),
+                    }
+                });
+                Lines::in_blocks(Carrier::Pair, lines, visit);
+            }
+        }
     }
 }

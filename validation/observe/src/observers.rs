@@ -1,6 +1,7 @@
 //! The observables of a run while it is going.
 
 use super::error::ObserveError;
+use super::flux::Recorded;
 use super::frame::{Frame, View};
 use super::meter::AnyMeter;
 use super::observation::Observation;
@@ -74,9 +75,9 @@ impl Observers {
         want
     }
 
-    /// Returns true if step `step` of stage `stage` must record the momentum transport.
-    pub fn wants_flux(&self, step: u64, stage: &str) -> bool {
-        self.due(step, stage).any(|sampled| sampled.meter.needs_flux())
+    /// What step `step` of stage `stage` must record of the momentum transport.
+    pub fn wants_flux(&self, step: u64, stage: &str) -> Recorded {
+        self.due(step, stage).map(|sampled| sampled.meter.flux()).max().unwrap_or_default()
     }
 
     fn due(&self, step: u64, stage: &str) -> impl Iterator<Item = &Sampled> {

@@ -22,7 +22,7 @@ pub fn of_species(species: usize) -> Rgb {
 /// Mixes `a` (share 0) and `b` (share 1).
 pub fn mix(a: Rgb, b: Rgb, share: f64) -> Rgb {
     let share = share.clamp(0.0, 1.0);
-    std::array::from_fn(|k| (f64::from(a[k]) * (1.0 - share) + f64::from(b[k]) * share).round() as u8)
+    std::array::from_fn(|k| (f64::from(a[k]) * (1.0 - share) + f64::from(b[k]) * share + 0.5) as u8)
 }
 
 /// The scale goes from dark blue over green to yellow. Lightness grows with the value, so it is legible in grey too.

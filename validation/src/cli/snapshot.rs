@@ -1,7 +1,7 @@
 use super::*;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use psidpd_core::engine::check_reach;
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
+use psidpd_core::engine::{Pool, check_reach};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_formats::files::SVG;
 use psidpd_formats::{Configuration, FormatError, Frame};
@@ -194,7 +194,8 @@ fn values(
                     model.species().len()
                 )));
             }
-            Some(evaluator.evaluate(frame.x, frame.species, frame.domain).psi.value)
+            let alone = Pool::new(std::num::NonZeroUsize::MIN);
+            Some(evaluator.evaluate(&alone, frame.x, frame.species, frame.domain).psi.value)
         }
     })
 }

@@ -2,6 +2,7 @@
 
 use super::pairs::{PairList, Pairs};
 use crate::engine::plan::Plan;
+use crate::engine::vectors::{Loop, run_best};
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 
 /// Sums the densities `which` of every owned particle to `n`, which has
@@ -59,24 +60,48 @@ pub fn add_density(
         type Output = ();
 
         fn visit<S: Shape>(self) {
-            let inverse_range = 1.0 / self.kernel.range();
-            let factor = self.kernel.value_factor();
             let list = self.pairs;
-            for k in 0..list.len() {
-                // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
-                let s = list.r[k] * inverse_range;
-                let mut w = if s < 1.0 { factor * S::value(s) } else { 0.0 };
-                if !list.factor.is_empty() {
-                    w *= list.factor[k];
-                }
-                let (i, j) = (list.i[k] as usize, list.j[k] as usize);
-                self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
-                if j < self.owned {
-                    self.n[j * self.width + self.offset + list.species_i[k] as usize] += w;
+            let mut weights = [0.0; BLOCK];
+            for from in (0..list.len()).step_by(BLOCK) {
+                let r = &list.r[from..(from + BLOCK).min(list.len())];
+                run_best(Weights { kernel: self.kernel, r, weights: &mut weights, _shape: S::default() });
+                for (at, k) in (from..from + r.len()).enumerate() {
+                    let factor = list.factor.get(k).copied().unwrap_or(1.0);
+                    let w = weights[at] * factor;
+                    let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+                    self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
+                    if j < self.owned {
+                        self.n[j * self.width + self.offset + list.species_i[k] as usize] += w;
+                    }
                 }
             }
         }
     }
 
     kernel.kind().visit(Pass { pairs, kernel, owned, n, width, offset });
+}
+
+/// Number of pairs in a block.
+const BLOCK: usize = 256;
+
+/// The weights of a block of pairs in a density; 0 beyond its range.
+struct Weights<'a, S> {
+    kernel: &'a Kernel,
+    r: &'a [f64],
+    weights: &'a mut [f64; BLOCK],
+    _shape: S,
+}
+
+impl<S: Shape> Loop for Weights<'_, S> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Weights { kernel, r, weights, .. } = self;
+        let (inverse_range, factor) = (1.0 / kernel.range(), kernel.value_factor());
+        for (r, w) in r.iter().zip(weights) {
+            let s = r * inverse_range;
+            *w = if s < 1.0 { factor * S::value(s) } else { 0.0 };
+        }
+    }
 }

@@ -1,22 +1,21 @@
 //! Evaluates one configuration in a box for measurements and tests: every density, every ψ with its
 //! derivatives, every pair with its force.
 
-use super::densities::sum_densities;
-use super::forces::{ForceInput, ForceOutput, add_forces};
 use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
-use super::pairs::Pairs;
+use super::plane_list::{PlaneList, merge};
 use super::sweep_pairs::SweepPairs;
 use crate::engine::plan::Plan;
-use crate::engine::surroundings::Newton;
+use crate::engine::sweep::Pool;
 use crate::free_energy::FreeEnergy;
+use crate::model::Fluid;
 use crate::model::expression::TooLarge;
-use crate::model::pair::PairForm;
-use crate::model::{Fluid, PairTerm};
 use psidpd_passes::domain::PeriodicBox;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Evaluates configurations of one fluid at one temperature.
+///
+/// The threads of a pool share the planes of cells of a box. Results do not depend on their number.
 #[derive(Debug)]
 pub struct Evaluator {
     /// The fluid that is evaluated.
@@ -31,7 +30,7 @@ pub struct Evaluator {
 #[derive(Debug)]
 struct Work {
     search: SweepPairs,
-    spare: Vec<(Pairs, Vec<f64>)>,
+    spare: Vec<Vec<PlaneList>>,
 }
 
 /// Energy, densities, forces and virial of one configuration.
@@ -49,8 +48,9 @@ pub struct Evaluation {
     pub psi: Psi,
     /// Sum `Σ ψ` over the particles of each species.
     pub excess: Vec<f64>,
-    pairs: Pairs,
-    pair_forces: Vec<f64>,
+    pub(super) planes: Vec<PlaneList>,
+    /// Range of the conservative interactions.
+    range: f64,
 }
 
 impl Evaluator {
@@ -60,84 +60,112 @@ impl Evaluator {
     /// Fails if a derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: Fluid) -> Result<Evaluator, TooLarge> {
         let free_energy = FreeEnergy::new(&fluid, usize::MAX).map_err(|_| TooLarge)?;
-        let work = Mutex::new(Work { search: SweepPairs::new(&fluid), spare: Vec::new() });
+        let work = Mutex::new(Work { search: SweepPairs::new(fluid.dimensions), spare: Vec::new() });
         Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energy, work, fluid })
     }
 
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
     /// are not finite do not interact.
-    pub fn evaluate(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
-        let (pairs, pair_forces) = self.pairs(x, species, domain);
-        self.of_pairs(pairs, pair_forces, species)
+    pub fn evaluate(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
+        let mut planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
+        let (densities, psi) = self.excess(pool, &mut planes, species);
+        pool.each(&mut planes, |plane| plane.add_forces(&self.plan, &psi.slopes));
+        let forces = merge(planes.iter().map(PlaneList::sums), x.len(), 3).as_chunks().0.to_vec();
+        let mut excess = vec![0.0; self.fluid.species.len()];
+        psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
+        let (mut energy, mut virial) = (excess.iter().sum::<f64>(), [0.0; 6]);
+        for tally in planes.iter().map(PlaneList::tally) {
+            energy += tally.pair;
+            (0..6).for_each(|c| virial[c] += tally.virial[c]);
+        }
+        let range = self.fluid.conservative_range();
+        Evaluation { energy, densities, forces, virial, psi, excess, planes, range }
     }
 
     /// Computes the energy `U` only.
-    pub fn energy(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
-        let (pairs, pair_forces) = self.pairs(x, species, domain);
-        let (_, psi) = self.excess(&pairs, species);
-        let energy = psi.value.iter().sum::<f64>() + pair_energies(&pairs, &self.fluid).iter().sum::<f64>();
-        self.work().spare.push((pairs, pair_forces));
+    pub fn energy(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
+        let mut planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
+        let (_, psi) = self.excess(pool, &mut planes, species);
+        let energy =
+            psi.value.iter().sum::<f64>() + pair_energies(pool, &planes, &self.fluid).iter().sum::<f64>();
+        self.work().spare.push(planes);
         energy
+    }
+
+    /// Calls `visit` with every pair of particles with finite positions closer than `range`, each once, in an order that depends on
+    /// the positions alone.
+    pub fn for_each_pair(
+        &self,
+        pool: &Pool,
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        range: f64,
+        mut visit: impl FnMut(Pair),
+    ) {
+        let planes = self.planes(pool, x, &vec![0; x.len()], domain, range);
+        planes.iter().flat_map(|plane| plane.pairs(range)).for_each(|(pair, _)| visit(pair));
+        self.work().spare.push(planes);
     }
 
     /// Keeps the arrays of an evaluation for reuse: allocating new ones costs more than filling them.
     pub fn recycle(&self, evaluation: Evaluation) {
-        self.work().spare.push((evaluation.pairs, evaluation.pair_forces));
+        self.work().spare.push(evaluation.planes);
     }
 
     fn work(&self) -> MutexGuard<'_, Work> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Finds the pairs; allocates their forces.
-    fn pairs(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> (Pairs, Vec<f64>) {
+    /// Finds the pairs, plane by plane; without a plane of cells all of them together.
+    fn planes(
+        &self,
+        pool: &Pool,
+        x: &[[f64; 3]],
+        species: &[i32],
+        domain: &PeriodicBox,
+        range: f64,
+    ) -> Vec<PlaneList> {
         let mut work = self.work();
-        let (mut pairs, mut pair_forces) = work.spare.pop().unwrap_or_default();
-        pairs.clear(x.len(), Newton::On);
-        if !work.search.find(x, species, domain, &mut pairs) {
-            let (dimensions, range) = (self.fluid.dimensions, self.fluid.conservative_range());
+        let mut planes = work.spare.pop().unwrap_or_default();
+        if !work.search.find(pool, x, species, domain, range, &mut planes) {
             let finite = |k: usize| x[k].iter().all(|c| c.is_finite());
-            BoxSearch::default().find(x, x.len(), finite, domain, dimensions, range, |i, j, d| {
-                pairs.force.push(i, j, d, species);
-            });
+            planes.resize_with(1, PlaneList::default);
+            let all = &mut planes[0];
+            all.clear(species);
+            let push = |i, j, d| all.push(i, j, d);
+            BoxSearch::default().find(x, x.len(), finite, domain, self.fluid.dimensions, range, push);
         }
-        pair_forces.resize(pairs.force.len(), 0.0);
-        (pairs, pair_forces)
+        planes
     }
 
     /// Computes densities and ψ of all particles.
-    fn excess(&self, pairs: &Pairs, species: &[i32]) -> (Vec<f64>, Psi) {
+    fn excess(&self, pool: &Pool, planes: &mut [PlaneList], species: &[i32]) -> (Vec<f64>, Psi) {
         let Evaluator { fluid, plan, free_energy, .. } = self;
-        let mut densities = vec![0.0; species.len() * fluid.variables()];
-        sum_densities(pairs, plan, 0..fluid.densities.len(), species, &mut densities);
-        let psi = psi(free_energy, fluid, species, &densities);
+        let variables = fluid.variables();
+        pool.each(planes, |plane| plane.add_densities(plan));
+        let mut densities = merge(planes.iter().map(PlaneList::sums), species.len(), variables);
+        for (d, density) in fluid.densities.iter().enumerate().filter(|(_, density)| density.includes_self) {
+            let own = density.kernel.value(0.0);
+            for (k, s) in species.iter().enumerate() {
+                densities[k * variables + d * fluid.species.len() + *s as usize] += own;
+            }
+        }
+        let psi = psi(pool, free_energy, fluid, species, &densities);
         (densities, psi)
-    }
-
-    fn of_pairs(&self, pairs: Pairs, mut pair_forces: Vec<f64>, species: &[i32]) -> Evaluation {
-        let (owned, (densities, psi)) = (species.len(), self.excess(&pairs, species));
-        let mut forces = vec![[0.0; 3]; owned];
-        let mut output =
-            ForceOutput { force: &mut forces, pair_force: &mut pair_forces, ..ForceOutput::default() };
-        let input = ForceInput::conservative(&self.plan, &pairs.force, owned, &psi.slopes);
-        add_forces(&input, &mut output);
-        let tally = output.tally;
-        let mut excess = vec![0.0; self.fluid.species.len()];
-        psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
-        let energy = excess.iter().sum::<f64>() + tally.pair;
-        Evaluation { energy, densities, forces, virial: tally.virial, psi, excess, pairs, pair_forces }
     }
 }
 
 /// The sum `Σ φ` over each pair term of a fluid.
-fn pair_energies(pairs: &Pairs, fluid: &Fluid) -> Vec<f64> {
-    let list = &pairs.force;
-    let energy_of = |term: &PairTerm| {
-        let acting = (0..list.len())
-            .filter(|k| term.acts(list.species_i[*k] as usize, list.species_j[*k] as usize, list.r[*k]));
-        acting.map(|k| term.potential.at(list.r[k]).0).sum()
-    };
-    fluid.pairs.iter().map(energy_of).collect()
+fn pair_energies(pool: &Pool, planes: &[PlaneList], fluid: &Fluid) -> Vec<f64> {
+    let mut work: Vec<(&PlaneList, Vec<f64>)> = planes.iter().map(|plane| (plane, Vec::new())).collect();
+    pool.each(&mut work, |(plane, energies)| {
+        *energies = fluid.pairs.iter().map(|term| plane.energy_of(term)).collect();
+    });
+    let mut sums = vec![0.0; fluid.pairs.len()];
+    for (_, energies) in &work {
+        sums.iter_mut().zip(energies).for_each(|(sum, energy)| *sum += energy);
+    }
+    sums
 }
 
 impl Evaluation {
@@ -148,83 +176,19 @@ impl Evaluation {
     }
 
     /// The sum `Σ φ` over each pair term of the fluid.
-    pub fn pair_energies(&self, fluid: &Fluid) -> Vec<f64> {
-        pair_energies(&self.pairs, fluid)
+    pub fn pair_energies(&self, pool: &Pool, fluid: &Fluid) -> Vec<f64> {
+        pair_energies(pool, &self.planes, fluid)
     }
 
-    /// Pairs in the range of the conservative interactions.
-    pub fn pairs(&self) -> impl Iterator<Item = Pair> {
-        let list = &self.pairs.force;
-        (0..list.len()).map(|k| Pair {
-            i: list.i[k] as usize,
-            j: list.j[k] as usize,
-            d: list.d.each_ref().map(|d| d[k]),
-            r: list.r[k],
-        })
+    /// The number of parts that the pairs are in, for threads that share them. It does not depend on their number.
+    pub fn parts(&self) -> usize {
+        self.planes.len()
     }
 
-    /// The pairs with their force along `ê_ij = (r_i − r_j)/r_ij`, positive if repulsive; pairs at zero
-    /// distance have no direction and are left out.
-    pub fn pair_forces(&self) -> impl Iterator<Item = (Pair, f64)> {
-        self.pairs().zip(self.pair_forces.iter().copied()).filter(|(p, _)| p.r > 0.0)
-    }
-
-    /// `∇_k² U` of each particle `k`, minus the divergence of its force:
-    ///
-    /// ```text
-    /// Σ_i [ψ_i,vu ∇_k n_iv·∇_k n_iu + ψ_i,v ∇_k² n_iv] + Σ_j ∇² φ(r_kj)
-    /// ```
-    ///
-    /// The result is exact where each two particles form one pair, in boxes at least twice the range wide.
-    pub fn laplacians(&self, fluid: &Fluid, species: &[i32]) -> Vec<f64> {
-        let (count, variables) = (fluid.species.len(), fluid.variables());
-        let Psi { slopes, second, .. } = &self.psi;
-        let rest = (fluid.dimensions - 1) as f64;
-        let mut sum = vec![0.0; species.len()];
-        // Gradients ∇_i n_iv of the densities.
-        let mut gradients = vec![[0.0; 3]; species.len() * variables];
-        let mut slope = vec![0.0; fluid.densities.len()];
-        for p in self.pairs().filter(|p| p.r > 0.0 && p.i != p.j) {
-            let (a, b) = (species[p.i] as usize, species[p.j] as usize);
-            let mut both = 0.0;
-            for (d, density) in fluid.densities.iter().enumerate() {
-                slope[d] = density.kernel.slope(p.r);
-                if p.r >= density.kernel.range() {
-                    continue;
-                }
-                let (of_i, of_j) = (p.i * variables + d * count + b, p.j * variables + d * count + a);
-                let per_length = slope[d] / p.r;
-                for c in 0..3 {
-                    gradients[of_i][c] += per_length * p.d[c];
-                    gradients[of_j][c] -= per_length * p.d[c];
-                }
-                let laplacian = density.kernel.curvature(p.r) + rest * per_length;
-                both += (slopes[of_i] + slopes[of_j]) * laplacian;
-            }
-            for term in fluid.pairs.iter().filter(|term| term.acts(a, b, p.r)) {
-                both += term.potential.curvature(p.r) + rest * term.potential.at(p.r).1 / p.r;
-            }
-            sum[p.i] += both;
-            sum[p.j] += both;
-            // Second derivatives of ψ of each particle when the other moves.
-            let [of_i, of_j] = [p.i, p.j].map(|k| &second[k * variables * variables..]);
-            for (d, s) in slope.iter().enumerate() {
-                for (e, t) in slope.iter().enumerate() {
-                    sum[p.j] += of_i[(d * count + b) * variables + e * count + b] * s * t;
-                    sum[p.i] += of_j[(d * count + a) * variables + e * count + a] * s * t;
-                }
-            }
-        }
-        for (i, sum) in sum.iter_mut().enumerate() {
-            let gradients = &gradients[i * variables..(i + 1) * variables];
-            let second = second[i * variables * variables..].chunks_exact(variables.max(1));
-            for (g, row) in gradients.iter().zip(second) {
-                for (h, second) in gradients.iter().zip(row) {
-                    *sum += second * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2]);
-                }
-            }
-        }
-        sum
+    /// The pairs of a part in the range of the conservative interactions, with their force along `ê_ij = (r_i − r_j)/r_ij`,
+    /// positive if repulsive.
+    pub fn pairs_of(&self, part: usize) -> impl Iterator<Item = (Pair, f64)> {
+        self.planes[part].pairs(self.range)
     }
 }
 
@@ -268,6 +232,10 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
         include_str!("../../../../validation/models/spline-attractive.toml"),
     ];
 
+    fn alone() -> Pool {
+        Pool::new(std::num::NonZeroUsize::MIN)
+    }
+
     fn random(model: &str, seed: u32) -> (Evaluator, Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
         let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
         let flat = fluid.dimensions == 2;
@@ -295,11 +263,12 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
     fn an_evaluation_is_the_truth() {
         for model in MODELS.into_iter().chain([STATED]) {
             let (evaluator, x, species, domain) = random(model, 11);
-            let found = evaluator.evaluate(&x, &species, &domain);
+            let found = evaluator.evaluate(&alone(), &x, &species, &domain);
             let indices: Vec<usize> = species.iter().map(|s| *s as usize).collect();
             let truth = crate::truth::conservative(&evaluator.fluid, &x, &indices, &domain).unwrap();
-            let energies = found.excess.iter().chain(&found.pair_energies(&evaluator.fluid)).sum::<f64>();
-            let alone = evaluator.energy(&x, &species, &domain);
+            let energies =
+                found.excess.iter().chain(&found.pair_energies(&alone(), &evaluator.fluid)).sum::<f64>();
+            let alone = evaluator.energy(&alone(), &x, &species, &domain);
             assert!((alone - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             assert!((energies - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
@@ -309,6 +278,54 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             }
             for (w, v) in found.virial.iter().zip(truth.virial) {
                 assert!((w - v).abs() < 1e-10 * scale, "{w} {v}");
+            }
+        }
+    }
+
+    /// In boxes wide and narrow, tilted, open and half open, with particles at one point and outside the box, and with the same bits
+    /// on three threads.
+    #[test]
+    fn an_evaluation_in_any_box_is_the_truth() {
+        let skew = nalgebra::Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 3.0);
+        let straight =
+            |lengths, periodic| PeriodicBox::orthogonal([-1.0, 0.5, 2.0], lengths, periodic).unwrap();
+        let boxes = [
+            PeriodicBox::new([1.0, 2.0, 3.0], skew, [true; 3]).unwrap(),
+            straight([4.0, 3.0, 5.0], [true, false, true]),
+            straight([4.0, 3.0, 5.0], [false; 3]),
+            straight([2.2, 9.0, 2.2], [true; 3]),
+            straight([1.5, 4.0, 4.0], [true; 3]),
+        ];
+        let three = Pool::new(std::num::NonZeroUsize::new(3).unwrap());
+        for (model, domain) in
+            MODELS.into_iter().flat_map(|model| boxes.iter().map(move |domain| (model, domain)))
+        {
+            let (evaluator, x, species, unit) = random(model, 14);
+            if evaluator.fluid.dimensions == 2 {
+                continue;
+            }
+            let mut x: Vec<[f64; 3]> = x.iter().map(|x| domain.point(unit.fraction(*x))).collect();
+            x[11] = x[10];
+            if domain.periodic()[0] {
+                (0..3).for_each(|c| x[3][c] += domain.edge(0)[c]);
+            }
+            let found = evaluator.evaluate(&alone(), &x, &species, domain);
+            let shared = evaluator.evaluate(&three, &x, &species, domain);
+            assert_eq!(
+                (&found.forces, found.energy, found.virial),
+                (&shared.forces, shared.energy, shared.virial)
+            );
+            let laplacians = [&alone(), &three].map(|pool| found.laplacians(pool, &evaluator.fluid));
+            assert_eq!(laplacians[0], laplacians[1]);
+            let indices: Vec<usize> = species.iter().map(|s| *s as usize).collect();
+            let truth = crate::truth::conservative(&evaluator.fluid, &x, &indices, domain).unwrap();
+            let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
+            assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0), "{domain:?}");
+            for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
+                assert!((f - g).abs() < 1e-11 * scale, "{domain:?}: {f} {g}");
+            }
+            for (w, v) in found.virial.iter().zip(truth.virial) {
+                assert!((w - v).abs() < 1e-10 * scale, "{domain:?}: {w} {v}");
             }
         }
     }
@@ -332,7 +349,7 @@ range = 1.0
 "#;
         let (evaluator, ..) = random(model, 13);
         let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
-        let found = evaluator.evaluate(&[[1.0; 3], [1.7, 1.0, 1.0]], &[0, 0], &domain);
+        let found = evaluator.evaluate(&alone(), &[[1.0; 3], [1.7, 1.0, 1.0]], &[0, 0], &domain);
         assert!((found.forces[0][0] + 7.5).abs() < 1e-12 && found.forces[1][0] == -found.forces[0][0]);
     }
 
@@ -341,7 +358,8 @@ range = 1.0
     fn laplacians_are_divergences_of_forces() {
         for model in MODELS {
             let (evaluator, x, species, domain) = random(model, 12);
-            let found = evaluator.evaluate(&x, &species, &domain).laplacians(&evaluator.fluid, &species);
+            let found =
+                evaluator.evaluate(&alone(), &x, &species, &domain).laplacians(&alone(), &evaluator.fluid);
             let dimensions = evaluator.fluid.dimensions;
             for k in [0, 17, 44] {
                 let h = 1e-6;
@@ -350,7 +368,7 @@ range = 1.0
                     let force = |h: f64| {
                         let mut x = x.clone();
                         x[k][c] += h;
-                        evaluator.evaluate(&x, &species, &domain).forces[k][c]
+                        evaluator.evaluate(&alone(), &x, &species, &domain).forces[k][c]
                     };
                     divergence += (force(h) - force(-h)) / (2.0 * h);
                 }

@@ -6,6 +6,7 @@ use crate::engine::particles::Particles;
 use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
 use crate::engine::request::Request;
 use crate::engine::surroundings::Newton;
+use crate::engine::vectors::{Loop, run_best};
 use crate::model::PairTerm;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
@@ -165,16 +166,38 @@ impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
         let slopes = self.input.slopes;
         let species = self.input.plan.species.len();
         let (width, offset) = (self.input.plan.slope_width(), self.offset * species);
-        let inverse_range = 1.0 / self.kernel.range();
-        let factor = self.kernel.slope_factor();
-        for k in self.pairs.clone() {
-            // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
-            let s = list.r[k] * inverse_range;
+        let mut both = [0.0; N];
+        for (both, k) in both.iter_mut().zip(self.pairs.clone()) {
             let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
             let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
-            let force = (slopes[here] + slopes[there]) * (factor * S::slope(s));
+            *both = slopes[here] + slopes[there];
+        }
+        let r = &list.r[self.pairs.clone()];
+        run_best(TimesSlope { kernel: self.kernel, r, both: &both, out: self.out, _shape: S::default() });
+    }
+}
+
+/// Subtracts the slopes of a kernel, times `both`, from the forces of a block of pairs.
+struct TimesSlope<'a, S> {
+    kernel: &'a Kernel,
+    r: &'a [f64],
+    both: &'a [f64],
+    out: &'a mut [f64],
+    _shape: S,
+}
+
+impl<S: Shape> Loop for TimesSlope<'_, S> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let TimesSlope { kernel, r, both, out, .. } = self;
+        let (inverse_range, factor) = (1.0 / kernel.range(), kernel.slope_factor());
+        for ((r, both), out) in r.iter().zip(both).zip(out) {
+            let s = r * inverse_range;
+            let force = both * (factor * S::slope(s));
             // A slope of ψ may be infinite if no particle is in range.
-            self.out[k - self.pairs.start] -= if s < 1.0 { force } else { 0.0 };
+            *out -= if s < 1.0 { force } else { 0.0 };
         }
     }
 }

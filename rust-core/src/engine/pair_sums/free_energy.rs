@@ -1,8 +1,10 @@
 //! ψ of particles with first and second derivatives by their uncorrected densities. Tests compare
 //! [`ExcessPlan`](crate::engine::excess::ExcessPlan), which evaluates blocks of particles, with it.
 
-use crate::free_energy::{self, FreeEnergy};
+use crate::engine::sweep::Pool;
+use crate::free_energy::FreeEnergy;
 use crate::model::Fluid;
+use psidpd_threads::take;
 
 /// ψ of particles with derivatives by their uncorrected densities, particle by particle.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,32 +17,77 @@ pub struct Psi {
     pub second: Vec<f64>,
 }
 
-/// ψ of particles with one species each, at their uncorrected densities, density-major.
-pub fn psi(free_energy: &FreeEnergy, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
-    let (count, variables) = (fluid.species.len(), fluid.variables());
-    let room = |per_particle: usize| Vec::with_capacity(species.len() * per_particle);
-    let mut psi = Psi { value: room(1), slopes: room(variables), second: room(variables * variables) };
-    let (mut one, mut work) = (free_energy::Psi::default(), free_energy::Work::default());
-    let (mut corrected, mut at) = (Vec::new(), Vec::new());
-    for (k, alpha) in species.iter().map(|alpha| *alpha as usize).enumerate() {
-        let n = &densities[k * variables..][..variables];
+/// Number of particles that a thread takes at a time.
+const CHUNK: usize = 256;
+
+/// ψ of particles with one species each, at their uncorrected densities, density-major. Threads share the particles.
+pub fn psi(pool: &Pool, free_energy: &FreeEnergy, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
+    let (particles, variables) = (species.len(), fluid.variables());
+    let square = variables * variables;
+    let room = |per_particle: usize| vec![0.0; particles * per_particle];
+    let mut psi = Psi { value: room(1), slopes: room(variables), second: room(square) };
+    let (mut slopes, mut second) = (&mut psi.slopes[..], &mut psi.second[..]);
+    let chunks = psi.value.chunks_mut(CHUNK).zip(species.chunks(CHUNK)).enumerate();
+    let mut work: Vec<_> = chunks
+        .map(|(k, (value, species))| {
+            let count = species.len();
+            let densities = &densities[k * CHUNK * variables..][..count * variables];
+            let slopes = take(&mut slopes, count * variables);
+            (species, densities, Rows { value, slopes, second: take(&mut second, count * square) })
+        })
+        .collect();
+    pool.each(&mut work, |(species, densities, rows)| {
+        for alpha in 0..fluid.species.len() {
+            let of_species = |k: &usize| species[*k] as usize == alpha;
+            let of_species: Vec<usize> = (0..species.len()).filter(of_species).collect();
+            rows.evaluate(free_energy, fluid, alpha, &of_species, densities);
+        }
+    });
+    psi
+}
+
+/// Results of some particles, as in [`Psi`].
+struct Rows<'a> {
+    value: &'a mut [f64],
+    slopes: &'a mut [f64],
+    second: &'a mut [f64],
+}
+
+impl Rows<'_> {
+    /// Evaluates the particles `rows`, which are of species `alpha`.
+    fn evaluate(
+        &mut self,
+        free_energy: &FreeEnergy,
+        fluid: &Fluid,
+        alpha: usize,
+        rows: &[usize],
+        densities: &[f64],
+    ) {
+        let (count, variables, lanes) = (fluid.species.len(), fluid.variables(), rows.len());
         let correction = |v: usize| &fluid.densities[v / count].correction[alpha * count + v % count];
-        corrected.clear();
-        corrected.extend((0..variables).map(|v| polynomial(&correction(v).0, n[v])));
-        at.clear();
-        at.extend(corrected.iter().map(|[value, ..]| *value));
-        free_energy.evaluate(alpha, &at, &mut one, &mut work);
-        psi.value.push(one.value);
-        psi.slopes.extend(one.gradient.iter().zip(&corrected).map(|(slope, [_, first, _])| slope * first));
-        for v in 0..variables {
-            for u in 0..variables {
-                let curved = if u == v { one.gradient[v] * corrected[v][2] } else { 0.0 };
-                psi.second
-                    .push(one.hessian[v * variables + u] * (corrected[v][1] * corrected[u][1]) + curved);
+        // Variable by variable: the corrected density with its derivatives.
+        let corrected: Vec<[f64; 3]> = (0..variables)
+            .flat_map(|v| {
+                rows.iter().map(move |k| polynomial(&correction(v).0, densities[k * variables + v]))
+            })
+            .collect();
+        let at: Vec<f64> = corrected.iter().map(|[value, ..]| *value).collect();
+        let found = free_energy.evaluate_block(alpha, lanes, &at);
+        for (lane, k) in rows.iter().enumerate() {
+            self.value[*k] = found[lane];
+            for v in 0..variables {
+                let [_, first, bend] = corrected[v * lanes + lane];
+                let gradient = found[(1 + v) * lanes + lane];
+                self.slopes[k * variables + v] = gradient * first;
+                for u in 0..variables {
+                    let curved = if u == v { gradient * bend } else { 0.0 };
+                    let entry = found[(1 + variables + v * variables + u) * lanes + lane];
+                    let other = corrected[u * lanes + lane][1];
+                    self.second[(k * variables + v) * variables + u] = entry * (first * other) + curved;
+                }
             }
         }
     }
-    psi
 }
 
 /// The value and the first two derivatives of a polynomial.
@@ -78,13 +125,14 @@ B = "n^3 + sqrt(n_A)*n_B^2"
         let energies = FreeEnergy::new(&fluid, usize::MAX).unwrap();
         for alpha in 0..2 {
             for n in [[1.0, 1.2], [0.1, 1.0], [5.0, 0.2], [4.0, 6.0], [0.2, 0.1]] {
-                let here = psi(&energies, &fluid, &[alpha], &n);
+                let pool = Pool::new(std::num::NonZeroUsize::MIN);
+                let here = psi(&pool, &energies, &fluid, &[alpha], &n);
                 let h = 1e-5;
                 for v in 0..2 {
                     let moved = |h: f64| {
                         let mut n = n;
                         n[v] += h;
-                        psi(&energies, &fluid, &[alpha], &n)
+                        psi(&pool, &energies, &fluid, &[alpha], &n)
                     };
                     let (up, down) = (moved(h), moved(-h));
                     let slope = (up.value[0] - down.value[0]) / (2.0 * h);

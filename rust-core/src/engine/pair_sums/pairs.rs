@@ -60,6 +60,16 @@ impl PairList {
         self.thermostat_factor.clear();
     }
 
+    /// Makes room for so many pairs, whose values are unspecified; there are no factors.
+    pub fn resize(&mut self, count: usize) {
+        self.i.resize(count, 0);
+        self.j.resize(count, 0);
+        self.species_i.resize(count, 0);
+        self.species_j.resize(count, 0);
+        self.d.iter_mut().for_each(|d| d.resize(count, 0.0));
+        self.r.resize(count, 0.0);
+    }
+
     #[inline(always)]
     pub fn push(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
         self.push_of(i, j, d, [species[i], species[j]]);

@@ -42,7 +42,7 @@ mod tests;
 
 pub use bodies::Bodies;
 pub use effort::Effort;
-pub use pulls::Pull;
+pub use pulls::{Pull, Pulls};
 pub use rank::{Need, Rank};
 
 use super::error::EngineError;

@@ -31,10 +31,11 @@ pub use written::Written;
 
 use crate::particles::State;
 use psidpd_core::document::open_regular;
-use psidpd_observe::flux::Line;
+use psidpd_observe::flux::Drag;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 const NEWEST: &str = "checkpoint";
 
@@ -102,7 +103,22 @@ pub struct Held {
     /// Virial of its mean force.
     pub virial: [f64; 6],
     /// Mean drag of the pairs; empty if nobody records it.
-    pub drag: Vec<Line>,
+    #[serde(with = "shared")]
+    pub drag: Vec<Arc<Drag>>,
+}
+
+/// What is shared is written like other things.
+mod shared {
+    use super::{Arc, Deserialize, Drag};
+    use serde::{Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(drag: &[Arc<Drag>], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(drag.iter().map(|drag| &**drag))
+    }
+
+    pub fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<Vec<Arc<Drag>>, D::Error> {
+        Ok(Vec::<Drag>::deserialize(from)?.into_iter().map(Arc::new).collect())
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 use super::*;
 use crate::scene::Scene;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_observe::flux::Line;
+use psidpd_observe::flux::{Drag, Line};
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
 /// Numbers that a conversion may get wrong.
@@ -13,6 +13,7 @@ fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
 }
 
 fn checkpoint(step: u64) -> Checkpoint {
+    let drag = Drag { sum: [0.3; 6], lines: vec![vec![Line { from: HARD, d: HARD, f: HARD }], Vec::new()] };
     Checkpoint {
         instructions: "portable".into(),
         program: "1.2.3".into(),
@@ -31,7 +32,7 @@ fn checkpoint(step: u64) -> Checkpoint {
             image: vec![[0, -1, i32::MIN]; 2],
         },
         forces: vec![HARD; 2],
-        held: Held { virial: [0.1; 6], drag: vec![Line { from: HARD, d: HARD, f: HARD }] },
+        held: Held { virial: [0.1; 6], drag: vec![Arc::new(drag)] },
         max_move: Some(0.1),
         out_of_bounds: [u64::MAX, 0],
         last: None,

@@ -88,8 +88,8 @@ impl Runner<'_> {
         let last = if number.is_multiple_of(period) { number + period - 1 } else { number };
         let virial = |step| self.is_row(step) || self.observers.wants(step, &stage.name).virial;
         self.simulation.hold_impulses((number + 1..=last).any(virial));
-        let flux = (number..=last).any(|step| self.observers.wants_flux(step, &stage.name));
-        self.simulation.record_flux(flux);
+        let flux = (number..=last).map(|step| self.observers.wants_flux(step, &stage.name)).max();
+        self.simulation.record_flux(flux.unwrap_or_default());
         self.simulation.set_settling(self.scene.settles(self.position.stage, self.position.done));
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;

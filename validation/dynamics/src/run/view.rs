@@ -25,6 +25,7 @@ impl Simulation {
             frozen: self.frozen(),
             temperature: self.temperature(),
             kinetic_energy: self.kinetic_energy(),
+            potential: [self.tally().excess, self.tally().pair],
             pressure: self.pressure_tensor(),
             conservative_pressure: self.conservative_pressure_tensor(),
             flux: self.flux(),

@@ -9,7 +9,7 @@ use crate::tests::support::SET6;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::frame::Frame;
-use psidpd_observe::{Measured, Observation, Observers};
+use psidpd_observe::{Measured, Observation, Observers, Recorded};
 
 const DT: f64 = 0.02;
 
@@ -30,9 +30,9 @@ fn stretches(scene: &Scene, simulation: &mut Simulation, samples: usize) -> Vec<
     let stretch = |_| {
         let mut observers = Observers::new(&scene.observe, ["run"]);
         for _ in 0..samples {
-            simulation.record_flux(false);
+            simulation.record_flux(Recorded::Nothing);
             simulation.advance(4, DT, integrator).unwrap();
-            simulation.record_flux(true);
+            simulation.record_flux(Recorded::Lines);
             simulation.step(DT, integrator, Want::TOTALS).unwrap();
             observers.sample(simulation.view(0.0), "run");
         }
@@ -52,7 +52,7 @@ fn what_is_carried_across_a_film_is_nothing() {
         let mut simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), 11).unwrap();
         simulation.prepare_for(integrator, DT, Want::FORCES).unwrap();
         simulation.advance(200, DT, integrator).unwrap();
-        simulation.record_flux(true);
+        simulation.record_flux(Recorded::Lines);
         let (mut carried, mut conservative) = (Vec::new(), Vec::new());
         for _ in 0..16 {
             let (mut sums, steps) = ([0.0; 2], 160);
@@ -150,7 +150,7 @@ fn displaced_forces_carry_nothing_across_a_film() {
     simulation.prepare(0.01, Want::FORCES).unwrap();
     simulation.advance(400, 0.01, Integrator::VelocityVerlet).unwrap();
     simulation.advance(100, LONG, force_gradient()).unwrap();
-    simulation.record_flux(true);
+    simulation.record_flux(Recorded::Lines);
     let (mut carried, mut elsewhere) = (Vec::new(), Vec::new());
     for _ in 0..64 {
         let (mut sums, steps) = ([0.0; 2], 150);
@@ -161,7 +161,8 @@ fn displaced_forces_carry_nothing_across_a_film() {
             let kick = &simulation.flux().unwrap().forces[0];
             let place = kick.at.as_ref().unwrap();
             let to = place.displaced.as_ref().unwrap();
-            let there = fluid.evaluate(to, &place.species, &simulation.state().domain);
+            let there =
+                fluid.evaluate(simulation.engine().pool(), to, &place.species, &simulation.state().domain);
             sums[0] += carried;
             sums[1] += carried + kick.share * (there.virial[2] - kick.virial[2]) / frame.volume();
         }
@@ -188,7 +189,7 @@ fn a_film_on_a_wall_carries_its_weight() {
     simulation.prepare(0.01, Want::FORCES).unwrap();
     simulation.advance(600, 0.01, Integrator::VelocityVerlet).unwrap();
     simulation.advance(100, LONG, force_gradient()).unwrap();
-    simulation.record_flux(true);
+    simulation.record_flux(Recorded::Lines);
     let middles: Vec<f64> = (0..35).map(|k| 0.2 * (f64::from(k) + 0.5)).collect();
     let differences: Vec<f64> = (0..16)
         .map(|_| {

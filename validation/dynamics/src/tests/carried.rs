@@ -10,8 +10,8 @@ use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_core::model::Model;
 use psidpd_formats::data::DataFile;
-use psidpd_observe::Observers;
 use psidpd_observe::frame::Frame;
+use psidpd_observe::{Observers, Recorded};
 
 /// Two species with a many-body and a pair force, and drag.
 const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
@@ -93,7 +93,7 @@ fn slices_of_stress_add_up_to_the_momentum_flux() {
                 scene.enter(stage, &mut simulation).unwrap();
                 simulation.prepare_for(stage.integrator, stage.dt, Want::FORCES).unwrap();
                 let evaluator = Evaluator::new(scene.model.at(scene.kt).unwrap()).unwrap();
-                simulation.record_flux(true);
+                simulation.record_flux(Recorded::Lines);
                 for _ in 0..3 {
                     simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
                     let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
@@ -139,7 +139,7 @@ fn slices_beside_a_wall_add_up_to_the_momentum_flux() {
             let mut simulation = scene.simulation(scene.initial_state()).unwrap();
             scene.enter(stage, &mut simulation).unwrap();
             simulation.prepare_for(stage.integrator, stage.dt, Want::FORCES).unwrap();
-            simulation.record_flux(true);
+            simulation.record_flux(Recorded::Lines);
             let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
             for _ in 0..8 {
                 simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
@@ -177,7 +177,7 @@ fn recorded_drag_is_what_slows_particles() {
         state.v = vec![[0.3, 0.1, -0.2], [-0.2, 0.4, 0.1]];
         let mut run = Simulation::new(&model, 1e-20, state, 1).unwrap();
         run.prepare_for(integrator, dt, Want::FORCES).unwrap();
-        run.record_flux(true);
+        run.record_flux(Recorded::Lines);
         let in_forces = integrator.properties().drag_in_forces;
         let (mut before, mut impulse, mut acted) = (None::<f64>, 0.0, 0);
         for step in 1..=7 {
@@ -186,7 +186,12 @@ fn recorded_drag_is_what_slows_particles() {
             let flux = run.flux().unwrap();
             let apart = run.state().domain.minimum_image(run.state().x[0], run.state().x[1]);
             let dot = |d: [f64; 3]| d.iter().zip(apart).map(|(a, b)| a * b).sum::<f64>();
-            let drag: f64 = flux.drag.iter().map(|line| line.f[0] * dot(line.d).signum()).sum();
+            let drag: f64 = flux
+                .drag
+                .iter()
+                .flat_map(|drag| drag.lines.iter().flatten())
+                .map(|line| line.f[0] * dot(line.d).signum())
+                .sum();
             acted += usize::from(drag != 0.0);
             if in_forces {
                 // Such a force belongs to the kicks before and behind the present end of the step.

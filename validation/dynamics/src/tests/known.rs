@@ -6,12 +6,13 @@ use crate::scene::Scene;
 use crate::tests::support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::engine::pair_sums::{COMPONENTS, Evaluator};
 use psidpd_observe::Observation;
-use psidpd_observe::flux::{Flux, Line};
+use psidpd_observe::flux::{Drag, Flux, Line};
 use psidpd_observe::frame::{Frame, View};
 use psidpd_observe::meter::AnyMeter;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A model of particles without forces in a plane.
 const FLAT: &str =
@@ -88,12 +89,19 @@ fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
     }
 }
 
+/// The drag of one pair.
+fn drag(line: Line) -> Vec<Arc<Drag>> {
+    let Line { d, f, .. } = line;
+    let sum = COMPONENTS.map(|(a, b)| 0.5 * (d[a] * f[b] + d[b] * f[a]));
+    vec![Arc::new(Drag { sum, lines: vec![vec![line]] })]
+}
+
 /// One direction lies along the interface in a plane, two directions in space; P_T is their mean.
 #[test]
 fn the_tangential_pressure_is_the_mean_of_the_other_directions() {
     let flux = Flux {
         ways: vec![Line { from: [1.0, 1.0, 0.0], d: [0.3, 0.0, 0.0], f: [0.6, 0.0, 0.0] }],
-        drag: vec![Line { from: [1.0, 2.0, 0.0], d: [0.0, 0.4, 0.0], f: [0.0, 1.2, 0.0] }],
+        drag: drag(Line { from: [1.0, 2.0, 0.0], d: [0.0, 0.4, 0.0], f: [0.0, 1.2, 0.0] }),
         forces: Vec::new(),
     };
     let cases: [(&str, &[f64], f64); 2] = [(FLAT, &[4.0, 5.0], 1.0), (IDEAL, &[4.0, 5.0, 6.0], 2.0)];
@@ -285,7 +293,7 @@ fn flow_and_temperature_know_masses_and_frozen_particles() {
 #[test]
 fn the_pressures_around_a_drop_have_the_trace_of_the_force() {
     let flux = Flux {
-        drag: vec![Line { from: [3.0, 3.5, 3.0], d: [0.5, 0.0, 0.0], f: [2.0, 0.0, 0.0] }],
+        drag: drag(Line { from: [3.0, 3.5, 3.0], d: [0.5, 0.0, 0.0], f: [2.0, 0.0, 0.0] }),
         ..Flux::default()
     };
     let cases: [(&str, &[f64], f64); 2] = [(FLAT, &[6.0; 2], 1.0), (IDEAL, &[6.0; 3], 2.0)];
@@ -408,7 +416,7 @@ fn shells_lie_about_the_centre_of_mass() {
         let at = |x: f64| [(low + x).rem_euclid(8.0), 3.0, 5.0];
         let x = row.map(at);
         let flux = Flux {
-            drag: vec![Line { from: at(centre + 1.57), d: [0.04, 0.0, 0.0], f: [3.0, 0.0, 0.0] }],
+            drag: drag(Line { from: at(centre + 1.57), d: [0.04, 0.0, 0.0], f: [3.0, 0.0, 0.0] }),
             ..Flux::default()
         };
         let observe = "drop = { distance = 1.0, range = 3.0, bins = 30 }";

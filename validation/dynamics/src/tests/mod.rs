@@ -337,7 +337,7 @@ fn a_drop_of_liquid() {
     let mut time = 0.0;
     for stage in &scene.stages {
         simulation.prepare(stage.dt, Want::FORCES).unwrap();
-        simulation.record_flux(true);
+        simulation.record_flux(Recorded::Lines);
         for _ in 0..stage.steps {
             simulation.step(stage.dt, stage.integrator, Want::FORCES).unwrap();
             time += stage.dt;
@@ -387,7 +387,7 @@ fn a_run_that_goes_on_ends_the_same() {
     let (mut whole, mut parts) = (observers(&scene), observers(&scene));
     for stage in &scene.stages {
         simulation.prepare(stage.dt, Want::TOTALS).unwrap();
-        simulation.record_flux(true);
+        simulation.record_flux(Recorded::Lines);
         for _ in 0..stage.steps {
             simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
             let time = simulation.step_number() as f64 * stage.dt;

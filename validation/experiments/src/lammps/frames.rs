@@ -44,6 +44,7 @@ pub fn show(
             frozen: &[],
             temperature: 0.0,
             kinetic_energy: 0.0,
+            potential: [0.0; 2],
             pressure: [0.0; 6],
             conservative_pressure: [0.0; 6],
             flux: None,

@@ -4,8 +4,10 @@ use super::origin::Origin;
 use crate::ExperimentError;
 use crate::fluids::dpd_model;
 use crate::lammps::style::PairStyle;
+use psidpd_core::engine::Pool;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
+use std::num::NonZeroUsize;
 
 /// The style for the fluid of a scene, found by the model's parameters and compared with its forces.
 pub fn own_style(origin: &Origin) -> Result<Option<PairStyle>, ExperimentError> {
@@ -51,7 +53,8 @@ fn same(origin: &Origin, fluid: Fluid, other: &Model) -> Result<bool, Experiment
     let kt = origin.stage.kt;
     let evaluate = |fluid: Fluid| {
         let evaluator = Evaluator::new(fluid).ok()?;
-        Some(evaluator.evaluate(&state.x, &state.species, &state.domain).forces.clone())
+        let alone = Pool::new(NonZeroUsize::MIN);
+        Some(evaluator.evaluate(&alone, &state.x, &state.species, &state.domain).forces.clone())
     };
     let (Some(ours), Some(theirs)) = (evaluate(fluid), evaluate(other.at(kt)?)) else { return Ok(false) };
     let largest = ours.iter().flatten().fold(0.0, |m: f64, c| m.max(c.abs()));

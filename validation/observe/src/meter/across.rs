@@ -134,32 +134,4 @@ impl Across {
         }
         Some(((s * self.bins as f64) as usize).min(self.bins - 1))
     }
-
-    /// Divides a line from fraction `a` to `b` among the bins that it crosses.
-    pub fn share(&self, a: f64, b: f64, mut visit: impl FnMut(usize, f64)) {
-        let (low, high) = (a.min(b), a.max(b));
-        // A line that is nearly parallel to the bins is in one bin.
-        if high - low < 1e-14 {
-            if let Some(bin) = self.bin(0.5 * (low + high)) {
-                visit(bin, 1.0);
-            }
-            return;
-        }
-        // Convert the fractions to numbers of bins.
-        let (low, high) = (low * self.bins as f64, high * self.bins as f64);
-        let (first, bins) = (low.floor(), self.bins as i64);
-        let mut bin = if self.periodic { (first as i64).rem_euclid(bins) } else { first as i64 };
-        let (mut edge, per_length) = (first, 1.0 / (high - low));
-        while edge < high {
-            let part = (edge + 1.0).min(high) - edge.max(low);
-            if part > 0.0 && (0..bins).contains(&bin) {
-                visit(bin as usize, part * per_length);
-            }
-            edge += 1.0;
-            bin += 1;
-            if self.periodic && bin == bins {
-                bin = 0;
-            }
-        }
-    }
 }

@@ -47,7 +47,7 @@ impl Meter for Clusters {
         let only = self.species;
         let takes_part = |k: usize| only.is_none_or(|s| species[k] as usize == s);
         let distance = self.distance.at(view.x, view.domain, self.dimensions, takes_part);
-        let linked = Linked::new(view.x, view.domain, self.dimensions, distance, takes_part);
+        let linked = Linked::of(frame, distance, takes_part);
         let sizes: Vec<usize> = linked.sizes.into_iter().filter(|n| *n >= self.smallest).collect();
         let (count, largest) = (sizes.len() as f64, sizes.iter().max().copied().unwrap_or(0) as f64);
         let mean = sizes.iter().sum::<usize>() as f64 / count.max(1.0);

@@ -266,7 +266,7 @@ impl Meter for ContactAngle {
             self.found = heights.filter(|z| *z < half).reduce(f64::max);
         }
         let distance = self.distance.at(x, domain, self.dimensions, moves);
-        let linked = Linked::new(x, domain, self.dimensions, distance, moves);
+        let linked = Linked::of(frame, distance, moves);
         let Some(largest) = linked.largest() else { return false };
         let Some(centre) = circular_centre(x, domain, |k| linked.is_in(k, largest)) else { return false };
         let outwards = |c: &usize| *c != self.wall.0 && Some(*c) != self.along;

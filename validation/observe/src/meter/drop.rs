@@ -1,5 +1,6 @@
 use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
+use super::spheres::{Around, Spheres};
 use super::*;
 use crate::flux::Carrier;
 use crate::profile::flank_interface;
@@ -48,42 +49,6 @@ pub(super) fn circular_centre(
             },
         );
     (count > 0.0).then(|| domain.point(fraction))
-}
-
-/// Divides a line of length `r` from `from` to `from − d` among spherical shells of equal thickness around the origin. The
-/// result for each shell is the length of the line in it, its normal part `∫ (ê·r̂)² dl`, and `∫ (ê·r̂)/|r| dl`, which
-/// weighs the component of a force across the line.
-fn share(
-    d: [f64; 3],
-    r: f64,
-    from: [f64; 3],
-    thickness: f64,
-    bins: usize,
-    mut visit: impl FnMut(usize, f64, f64, f64),
-) {
-    let e = d.map(|c| -c / r);
-    let start = from[0] * e[0] + from[1] * e[1] + from[2] * e[2];
-    let end = start + r;
-    let square = from[0] * from[0] + from[1] * from[1] + from[2] * from[2];
-    // The distance of the line from the centre.
-    let b = (square - start * start).max(0.0).sqrt();
-    let nearest = if start * end < 0.0 { b } else { b.hypot(start.abs().min(end.abs())) };
-    let farthest = b.hypot(start.abs().max(end.abs()));
-    let normal = |u: f64| if b > 0.0 { u - b * (u / b).atan() } else { u };
-    let half_chord = |r: f64| (r * r - b * b).max(0.0).sqrt();
-    let first = (nearest / thickness) as usize;
-    for k in first..bins.min((farthest / thickness) as usize + 1) {
-        let (inner, outer) = (half_chord(k as f64 * thickness), half_chord((k + 1) as f64 * thickness));
-        for (low, high) in [(-outer, -inner), (inner, outer)] {
-            let (low, high) = (low.max(start), high.min(end));
-            if high > low {
-                // A force on a line through the centre has no component across the line there.
-                let square = |u: f64| (b * b + u * u).max(f64::MIN_POSITIVE);
-                let across = 0.5 * (square(high) / square(low)).ln();
-                visit(k, high - low, normal(high) - normal(low), across);
-            }
-        }
-    }
 }
 
 /// Properties of a drop from its mean profile.
@@ -191,7 +156,7 @@ impl Meter for Drop {
         ..PLAIN
     };
 
-    const NEEDS_FLUX: bool = true;
+    const FLUX: Recorded = Recorded::Lines;
     const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<Drop, FileError> {
@@ -211,7 +176,7 @@ impl Meter for Drop {
         let view = frame.view;
         let (x, domain) = (view.x, view.domain);
         let distance = self.distance.at(x, domain, self.dimensions, |_| true);
-        let linked = Linked::new(x, domain, self.dimensions, distance, |_| true);
+        let linked = Linked::of(frame, distance, |_| true);
         let Some(largest) = linked.largest() else { return false };
         let member = |k: usize| linked.is_in(k, largest);
         let Some(centre) = circular_centre(x, domain, member) else { return false };
@@ -237,31 +202,19 @@ impl Meter for Drop {
             }
             row[shell * WIDTH] += 1.0;
         }
-        let (thickness, bins) = (self.thickness(), self.bins);
-        let known = frame.lines(|carrier, line| {
-            let r = (line.d[0] * line.d[0] + line.d[1] * line.d[1] + line.d[2] * line.d[2]).sqrt();
-            if r == 0.0 {
-                return;
-            }
-            let image = domain.minimum_image(line.from, centre);
-            let mut from: [f64; 3] = std::array::from_fn(|c| image[c] - mean[c]);
-            if self.dimensions == 2 {
-                from[2] = 0.0;
-            }
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            let force = dot(line.d, line.f) / r;
-            // The foot of the perpendicular from the centre to the line of the force.
-            let foot = dot(from, line.f) - force * dot(from, line.d) / r;
-            let at = if carrier == Carrier::Particle { 1 } else { 3 };
-            share(line.d, r, from, thickness, bins, |shell, length, normal, across| {
-                let volume = self.volume(shell);
-                let radial = force * normal - foot * across;
-                row[shell * WIDTH + at] += radial / volume;
-                row[shell * WIDTH + at + 1] += (force * length - radial) / rest / volume;
-            });
+        let spheres = Spheres::new(self.bins, self.thickness(), self.dimensions);
+        let around = Around::new(domain, centre, mean);
+        let carried = frame.sum_lines(2 * spheres.width(), |lines, sums| {
+            let first = spheres.width() * usize::from(lines.carrier == Carrier::Pair);
+            spheres.add(&around, lines, &mut sums[first..first + spheres.width()]);
         });
-        if !known {
-            return false;
+        let Some(carried) = carried else { return false };
+        for (carrier, sums) in carried.chunks_exact(spheres.width()).enumerate() {
+            for (shell, [normal, whole]) in spheres.shells(sums).enumerate() {
+                let (at, volume) = (shell * WIDTH + 1 + 2 * carrier, self.volume(shell));
+                row[at] = normal / volume;
+                row[at + 1] = (whole - normal) / rest / volume;
+            }
         }
         let percolates = f64::from(u8::from(linked.percolates[largest]));
         self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares, percolates])
@@ -330,39 +283,6 @@ impl Meter for Drop {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt, SeedableRng, rngs::StdRng};
-
-    /// The parts of lines in shells add up to the whole line, and to ∫ (ê·r̂)² by small steps.
-    #[test]
-    fn lines_are_shared_out() {
-        let mut rng = StdRng::seed_from_u64(6);
-        for _ in 0..200 {
-            let from: [f64; 3] = std::array::from_fn(|_| 2.0 * rng.random::<f64>() - 1.0);
-            let d: [f64; 3] = std::array::from_fn(|_| rng.random::<f64>() - 0.5);
-            let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            let mut found = vec![[0.0; 2]; 40];
-            share(d, r, from, 0.1, 40, |k, length, normal, _| {
-                found[k][0] += length;
-                found[k][1] += normal;
-            });
-            let total: f64 = found.iter().map(|f| f[0]).sum();
-            assert!((total - r).abs() < 1e-12);
-            let steps = 20_000;
-            let mut expected = vec![[0.0; 2]; 40];
-            for k in 0..steps {
-                let t = (k as f64 + 0.5) / steps as f64;
-                let p: [f64; 3] = std::array::from_fn(|c| from[c] - t * d[c]);
-                let q = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
-                let cosine = (p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) / (q * r);
-                let shell = &mut expected[(q / 0.1) as usize];
-                shell[0] += r / steps as f64;
-                shell[1] += cosine * cosine * r / steps as f64;
-            }
-            for (f, e) in found.iter().zip(&expected) {
-                assert!((f[0] - e[0]).abs() < 3e-4 && (f[1] - e[1]).abs() < 3e-4, "{f:?} {e:?}");
-            }
-        }
-    }
 
     /// A drop of known profile and pressures gives all its known properties.
     #[test]

@@ -17,6 +17,8 @@ impl Meter for Energy {
         ..PLAIN
     };
 
+    const NEEDS: Want = Want { energy: true, ..Want::FORCES };
+
     fn read(options: &Options) -> Result<Energy, FileError> {
         let fluid = options.place.fluid;
         let mut names: Vec<String> = fluid.species.iter().map(|s| format!("psi_{s}")).collect();
@@ -29,13 +31,18 @@ impl Meter for Energy {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let count = frame.view.x.len() as f64;
-        let evaluation = frame.evaluation();
-        let pair_energies = evaluation.pair_energies(&frame.evaluator.fluid);
-        let terms = evaluation.excess.iter().chain(&pair_energies);
-        let all: Vec<f64> =
-            std::iter::once(&frame.view.kinetic_energy).chain(terms).map(|e| e / count).collect();
-        self.series.push(&all)
+        let (view, fluid) = (frame.view, &frame.evaluator.fluid);
+        let terms = match (fluid.species.len(), fluid.pairs.len()) {
+            // The totals of the step.
+            (1, pairs @ 0..=1) => view.potential[..1 + pairs].to_vec(),
+            _ => {
+                let evaluation = frame.evaluation();
+                [&evaluation.excess[..], &evaluation.pair_energies(view.pool, fluid)].concat()
+            }
+        };
+        let count = view.x.len() as f64;
+        let all = std::iter::once(view.kinetic_energy).chain(terms).map(|energy| energy / count);
+        self.series.push(&all.collect::<Vec<f64>>())
     }
 
     fn series(&mut self) -> Vec<&mut Series> {

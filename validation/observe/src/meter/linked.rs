@@ -2,8 +2,9 @@
 
 use super::rdf::shell_volume;
 use super::{Deserialize, FileError, Need, Options, PeriodicBox, Serialize, ValueKind};
+use crate::frame::Frame;
 use crate::keys::{Key, key};
-use psidpd_core::engine::pair_sums::for_each_pair;
+use psidpd_core::engine::pair_sums::{Pair, for_each_pair};
 
 /// Sets that are joined pair by pair (union-find). Each member has the vector to its parent.
 struct Union {
@@ -68,18 +69,20 @@ pub(super) struct Linked {
 }
 
 impl Linked {
-    /// Links particles that are closer than `distance`.
+    /// Links particles of a frame that are closer than `distance`.
+    pub fn of(frame: &Frame, distance: f64, takes_part: impl Fn(usize) -> bool) -> Linked {
+        Linked::new(frame.view.x.len(), takes_part, |join| frame.for_each_pair(distance, join))
+    }
+
+    /// Links the particles of each pair with which `pairs` calls its argument, of `n` particles.
     pub fn new(
-        x: &[[f64; 3]],
-        domain: &PeriodicBox,
-        dimensions: usize,
-        distance: f64,
+        n: usize,
         takes_part: impl Fn(usize) -> bool,
+        pairs: impl FnOnce(&mut dyn FnMut(Pair)),
     ) -> Linked {
-        let n = x.len();
         let mut union =
             Union { parent: (0..n).collect(), way: vec![[0.0; 3]; n], percolates: vec![false; n] };
-        for_each_pair(x, domain, dimensions, distance, |p| {
+        pairs(&mut |p| {
             if takes_part(p.i) && takes_part(p.j) {
                 union.join(p.i, p.j, p.d);
             }
@@ -189,6 +192,15 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng, rngs::StdRng, seq::SliceRandom};
 
+    fn link(
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        distance: f64,
+        takes_part: impl Fn(usize) -> bool,
+    ) -> Linked {
+        Linked::new(x.len(), takes_part, |join| for_each_pair(x, domain, 3, distance, join))
+    }
+
     /// A chain through the boundary, a ring and single particles, in any order.
     #[test]
     fn constructed_clusters() {
@@ -206,7 +218,7 @@ mod tests {
         for _ in 0..20 {
             all.shuffle(&mut rng);
             let x: Vec<[f64; 3]> = all.iter().map(|a| a.0).collect();
-            let linked = Linked::new(&x, &domain, 3, 0.6, |_| true);
+            let linked = link(&x, &domain, 0.6, |_| true);
             for (i, a) in all.iter().enumerate() {
                 for (j, b) in all.iter().enumerate() {
                     assert_eq!(linked.labels[i] == linked.labels[j], a.1 == b.1);
@@ -219,7 +231,7 @@ mod tests {
             assert!(linked.percolates.iter().all(|p| !p));
             // Without its seventh particle the chain is two clusters, and that particle is in no cluster.
             let cut = all.iter().position(|a| (a.0[0] - 8.0).abs() < 1e-9 && a.1 == 0).unwrap();
-            let linked = Linked::new(&x, &domain, 3, 0.6, |k| k != cut);
+            let linked = link(&x, &domain, 0.6, |k| k != cut);
             assert_eq!(linked.labels[cut], None);
             assert_eq!(linked.sizes.iter().filter(|n| **n > 3).count(), 3);
         }
@@ -233,9 +245,9 @@ mod tests {
         for _ in 0..20 {
             let mut x: Vec<[f64; 3]> = (0..20).map(|k| [5.0, 0.5 * f64::from(k), 5.0]).collect();
             x.shuffle(&mut rng);
-            let linked = Linked::new(&x, &domain, 3, 0.6, |_| true);
+            let linked = link(&x, &domain, 0.6, |_| true);
             assert!(linked.largest().is_some_and(|k| linked.percolates[k]));
-            let cut = Linked::new(&x[1..], &domain, 3, 0.6, |_| true);
+            let cut = link(&x[1..], &domain, 0.6, |_| true);
             assert!(cut.largest().is_some_and(|k| !cut.percolates[k] && cut.sizes[k] == 19));
         }
     }
@@ -282,13 +294,13 @@ mod tests {
         // The ball has ρ = 5.3, and more in its densest tenth.
         assert!(chosen > 0.55 && chosen < 0.8, "{chosen}");
         assert_eq!(distance.at(&x[..10], &domain, 3, |_| true), chosen);
-        let linked = Linked::new(&x, &domain, 3, chosen, |_| true);
+        let linked = link(&x, &domain, chosen, |_| true);
         let drop = linked.largest().unwrap();
         let members = (0..inside).filter(|k| linked.is_in(*k, drop)).count();
         assert!(members > 590 && linked.sizes[drop] < 680, "{members} {}", linked.sizes[drop]);
         assert!(!linked.percolates[drop]);
         // The range of the interaction, the obvious distance, links everything.
-        let wide = Linked::new(&x, &domain, 3, fluid_range, |_| true);
+        let wide = link(&x, &domain, fluid_range, |_| true);
         assert!(wide.largest().is_some_and(|k| wide.sizes[k] > 950 && wide.percolates[k]));
     }
 }

@@ -121,14 +121,24 @@ impl Meter for LocalDensity {
         let volume_of =
             |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
         let means: Vec<f64> = self.shells.iter().enumerate().map(|(k, w)| w / volume_of(k)).collect();
-        for p in evaluation.pairs() {
-            let (a, b) = (species[p.i] as usize, species[p.j] as usize);
-            let shell = means.get((p.r / width) as usize).copied().unwrap_or(0.0);
-            let slope = p.r * density.force_kernel.slope(p.r) / self.dimensions as f64;
-            for (a, b) in [(a, b), (b, a)] {
-                let mean = &mut rest[4 * (a * kinds + b)..4 * (a * kinds + b) + 4];
-                mean[2] += shell;
-                mean[3] -= slope;
+        let mut parts: Vec<(usize, Vec<f64>)> =
+            (0..evaluation.parts()).map(|part| (part, Vec::new())).collect();
+        view.pool.each(&mut parts, |(part, sums)| {
+            sums.resize(2 * kinds * kinds, 0.0);
+            for (p, _) in evaluation.pairs_of(*part) {
+                let (a, b) = (species[p.i] as usize, species[p.j] as usize);
+                let shell = means.get((p.r / width) as usize).copied().unwrap_or(0.0);
+                let slope = p.r * density.force_kernel.slope(p.r) / self.dimensions as f64;
+                for k in [a * kinds + b, b * kinds + a] {
+                    sums[2 * k] += shell;
+                    sums[2 * k + 1] -= slope;
+                }
+            }
+        });
+        for (_, sums) in &parts {
+            for (mean, sums) in rest.chunks_exact_mut(4).zip(sums.chunks_exact(2)) {
+                mean[2] += sums[0];
+                mean[3] += sums[1];
             }
         }
         for a in 0..kinds {

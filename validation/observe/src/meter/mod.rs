@@ -19,7 +19,9 @@ mod pressure;
 mod profiles;
 mod rdf;
 mod species_pairs;
+mod spheres;
 mod stress_profile;
+mod strips;
 mod structure_factor;
 pub mod surface_tension;
 mod temperature;
@@ -27,6 +29,7 @@ mod viscosity;
 mod waves;
 
 // Every observable uses these.
+use super::flux::Recorded;
 use super::frame::Frame;
 use super::keys::{AXIS, BINS, Need, PLAIN, Table, ValueKind, keys};
 use super::observation::{Kind, Observation};
@@ -47,8 +50,8 @@ pub trait Meter: Sized {
     /// The quantities that the forces of a sampled step must provide.
     const NEEDS: Want = Want::FORCES;
 
-    /// True if a sample needs the momentum transport of its step.
-    const NEEDS_FLUX: bool = false;
+    /// What a sample needs of the momentum transport of its step.
+    const FLUX: Recorded = Recorded::Nothing;
 
     /// True if the observable needs motion in time, which Monte Carlo does not have.
     const OF_MOTION: bool = false;
@@ -98,8 +101,8 @@ macro_rules! meters {
                 match self { $(AnyMeter::$variant(_) => <$meter as Meter>::NEEDS),+ }
             }
 
-            pub fn needs_flux(&self) -> bool {
-                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::NEEDS_FLUX),+ }
+            pub fn flux(&self) -> Recorded {
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::FLUX),+ }
             }
 
             pub fn of_liquids(&self) -> bool {

@@ -164,7 +164,7 @@ impl Meter for Pendant {
         let view = frame.view;
         let (x, domain) = (view.x, view.domain);
         let distance = self.distance.at(x, domain, self.dimensions, |_| true);
-        let linked = Linked::new(x, domain, self.dimensions, distance, |_| true);
+        let linked = Linked::of(frame, distance, |_| true);
         let Some(largest) = linked.largest() else { return false };
         let Some(centre) = circular_centre(x, domain, |k| linked.is_in(k, largest)) else { return false };
         let mut counts = vec![0.0; self.bins[0] * self.bins[1]];

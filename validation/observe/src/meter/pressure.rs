@@ -29,7 +29,7 @@ impl Meter for Pressure {
     };
 
     const NEEDS: Want = Want::TOTALS;
-    const NEEDS_FLUX: bool = true;
+    const FLUX: Recorded = Recorded::Sum;
 
     fn read(options: &Options) -> Result<Pressure, FileError> {
         Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(19) })

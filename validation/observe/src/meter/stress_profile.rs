@@ -1,7 +1,9 @@
 use super::across::Across;
+use super::strips::{Ends, Strips};
 use super::*;
-use crate::flux::Carrier;
+use crate::flux::{BLOCK, Carrier, Lines};
 use crate::keys::RECENTRE;
+use psidpd_core::engine::vectors::{Loop, run_best};
 
 /// The numbers in a bin: normal and tangential pressure of momenta, then of forces.
 const WIDTH: usize = 4;
@@ -18,28 +20,71 @@ impl StressProfile {
     fn pressures(&self, frame: &Frame) -> Option<Vec<f64>> {
         let view = frame.view;
         let fractions = self.across.fractions(&view)?;
-        let normal = self.across.normal(view.domain);
-        let along = |v: [f64; 3]| v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2];
-        let (volume, rest) = (self.across.bin_volume(), (self.dimensions - 1) as f64);
-        let mut sums = vec![0.0; self.across.bins * WIDTH];
         // Lines begin at any position, so they are shifted by as much as the particles.
         let shift = fractions.first()? - view.domain.fraction(*view.x.first()?)[self.across.axis];
-        let known = frame.lines(|carrier, line| {
-            let n = along(line.d);
-            let whole: f64 = line.d.iter().zip(line.f).map(|(d, f)| d * f).sum();
-            let normal = n * along(line.f) / volume;
-            let tangential = whole / rest / volume - normal / rest;
-            let from = view.domain.fraction(line.from)[self.across.axis] + shift;
-            let at = if carrier == Carrier::Particle { 0 } else { 2 };
-            self.across.share(from, from - n / self.across.height, |bin, share| {
-                sums[bin * WIDTH + at] += share * normal;
-                sums[bin * WIDTH + at + 1] += share * tangential;
-            });
-        });
-        if !known {
-            return None;
+        let stresses = Stresses {
+            normal: self.across.normal(view.domain),
+            along: view.domain.inverse()[self.across.axis],
+            origin: view.domain.origin(),
+            shift,
+            across: &self.across,
+            rest: (self.dimensions - 1) as f64,
+        };
+        let strips = Strips::of(&self.across);
+        let sums = frame.sum_lines(2 * strips.width(), |lines, sums| {
+            let own =
+                &mut sums[strips.width() * usize::from(lines.carrier == Carrier::Pair)..][..strips.width()];
+            let mut ends = run_best(Project { lines, stresses });
+            strips.add(&mut ends, lines.count, own);
+        })?;
+        let [momenta, forces] = [0, 1].map(|k| strips.bins(&sums[k * strips.width()..][..strips.width()]));
+        let bins = momenta.as_chunks::<2>().0.iter().zip(forces.as_chunks::<2>().0);
+        Some(bins.flat_map(|([a, b], [c, d])| [*a, *b, *c, *d]).collect())
+    }
+}
+
+/// What the pressures of lines depend on.
+#[derive(Clone, Copy)]
+struct Stresses<'a> {
+    across: &'a Across,
+    /// The unit normal of the faces, and the vector whose product with a position is its fraction of the height.
+    normal: [f64; 3],
+    along: [f64; 3],
+    origin: [f64; 3],
+    shift: f64,
+    /// The number of tangential directions.
+    rest: f64,
+}
+
+/// Computes where lines lie across the bins, and their normal and tangential pressures.
+struct Project<'a> {
+    lines: &'a Lines,
+    stresses: Stresses<'a>,
+}
+
+impl Loop for Project<'_> {
+    type Out = Ends;
+
+    #[inline(always)]
+    fn run(self) -> Ends {
+        let Project { lines: Lines { from, d, f, .. }, stresses } = self;
+        let Stresses { across, normal: n, along, origin, shift, rest } = stresses;
+        let (bins, volume) = (across.bins as f64, across.bin_volume());
+        let per_length = bins / across.height;
+        let mut ends = Ends { from: [0.0; BLOCK], to: [0.0; BLOCK], weights: [[0.0; BLOCK]; 2] };
+        for k in 0..BLOCK {
+            let x = [from[0][k] - origin[0], from[1][k] - origin[1], from[2][k] - origin[2]];
+            let start = along[0] * x[0] + along[1] * x[1] + along[2] * x[2] + shift;
+            let way = n[0] * d[0][k] + n[1] * d[1][k] + n[2] * d[2][k];
+            let force = n[0] * f[0][k] + n[1] * f[1][k] + n[2] * f[2][k];
+            let whole = (d[0][k] * f[0][k] + d[1][k] * f[1][k] + d[2][k] * f[2][k]) / volume;
+            let normal = way * force / volume;
+            ends.from[k] = start * bins;
+            ends.to[k] = start * bins - way * per_length;
+            ends.weights[0][k] = normal;
+            ends.weights[1][k] = (whole - normal) / rest;
         }
-        Some(sums)
+        ends
     }
 }
 
@@ -59,7 +104,7 @@ impl Meter for StressProfile {
         ..PLAIN
     };
 
-    const NEEDS_FLUX: bool = true;
+    const FLUX: Recorded = Recorded::Lines;
     const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<StressProfile, FileError> {

@@ -32,7 +32,7 @@ pub fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
     let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
     let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
     let x: Vec<[f64; 3]> = view.x.iter().map(|x| stretched.point(domain.fraction(*x))).collect();
-    frame.evaluator.energy(&x, view.species, &stretched)
+    frame.evaluator.energy(view.pool, &x, view.species, &stretched)
 }
 
 impl Meter for SurfaceTension {
@@ -60,7 +60,7 @@ impl Meter for SurfaceTension {
     };
 
     const NEEDS: Want = Want::TOTALS;
-    const NEEDS_FLUX: bool = true;
+    const FLUX: Recorded = Recorded::Sum;
     const OF_LIQUIDS: bool = true;
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {

@@ -3,12 +3,14 @@
 use super::{Simulation, State};
 use crate::integrator::Integrator;
 use crate::run::integrator::reflection::{Leg, Path};
-use psidpd_core::engine::thermostat::Pull;
-use psidpd_observe::flux::{Acted, Flux, Line, Place};
+use psidpd_core::engine::thermostat::{Pull, Pulls};
+use psidpd_observe::flux::{Acted, Drag, Flux, Line, Place, Recorded};
+use std::sync::Arc;
 
 /// The transport of momentum in the present step, whose length is `dt`.
 #[derive(Debug, Clone, Default)]
 pub struct Record {
+    what: Recorded,
     dt: f64,
     flux: Flux,
     /// Whether operators may add to the record.
@@ -16,11 +18,11 @@ pub struct Record {
 }
 
 impl Simulation {
-    /// Sets whether later steps record the transport of momentum. Trajectories do not depend on it.
-    pub fn record_flux(&mut self, on: bool) {
-        match on {
-            true => drop(self.record.get_or_insert_default()),
-            false => self.record = None,
+    /// Sets what later steps record of the transport of momentum. Trajectories do not depend on it.
+    pub fn record_flux(&mut self, what: Recorded) {
+        match what {
+            Recorded::Nothing => self.record = None,
+            _ => self.record.get_or_insert_default().what = what,
         }
     }
 
@@ -33,11 +35,15 @@ impl Simulation {
         self.record.as_ref().is_some_and(|record| record.open)
     }
 
+    fn records_lines(&self) -> bool {
+        self.record.as_ref().is_some_and(|record| record.what == Recorded::Lines)
+    }
+
     pub(super) fn open_record(&mut self, dt: f64) {
         if let Some(record) = &mut self.record {
             // Between two actions the drag of the last goes on.
             let flux = Flux { drag: self.thermostat.held_drag.clone(), ..Flux::default() };
-            **record = Record { dt, flux, open: true };
+            **record = Record { what: record.what, dt, flux, open: true };
         }
     }
 
@@ -112,20 +118,31 @@ impl Simulation {
             return;
         }
         let State { x, species, .. } = self.particles.now();
-        let place = Place { x: x.clone(), species: species.clone(), displaced };
-        let acted = Acted { share: 1.0, virial, at: Some(place) };
+        let place = || Place { x: x.clone(), species: species.clone(), displaced };
+        let acted = Acted { share: 1.0, virial, at: self.records_lines().then(place) };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);
         }
     }
 
-    /// Records the drag forces of pairs during a part `share` of the step.
-    pub(super) fn record_pulls(&mut self, share: f64, pulls: Vec<Pull>) {
-        let Simulation { record: Some(record), particles, .. } = self else { return };
-        record.flux.drag.extend(pulls.into_iter().map(|pull| Line {
-            from: particles.now().x[pull.i],
-            d: pull.d,
-            f: pull.d.map(|d| share * pull.strength * d),
-        }));
+    /// Records the drag during a part `share` of the step, which `of` computes: it is called with the function that makes lines of
+    /// pairs, if lines are recorded.
+    pub(super) fn record_drag(
+        &mut self,
+        share: f64,
+        of: impl FnOnce(&Simulation, Option<LineOf>) -> Pulls<Line>,
+    ) {
+        let x = &self.particles.now().x;
+        let line =
+            |pull: Pull| Line { from: x[pull.i], d: pull.d, f: pull.d.map(|d| share * pull.strength * d) };
+        let line: LineOf = &line;
+        let Pulls { virial, of_planes } = of(self, self.records_lines().then_some(line));
+        if let Some(record) = &mut self.record {
+            let drag = Drag { sum: virial.map(|w| share * w), lines: of_planes };
+            record.flux.drag.push(Arc::new(drag));
+        }
     }
 }
+
+/// Makes a line of the drag of a pair.
+pub(super) type LineOf<'a> = &'a (dyn Fn(Pull) -> Line + Sync);

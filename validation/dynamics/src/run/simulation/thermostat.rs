@@ -5,9 +5,10 @@ use super::forces::Forces;
 use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
+use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Pulls, Stream, Update, Warmth};
 use psidpd_core::engine::{Step, Want};
-use psidpd_observe::flux::Line;
+use psidpd_observe::flux::Drag;
+use std::sync::Arc;
 
 #[derive(Debug)]
 pub(super) struct Thermostat {
@@ -20,7 +21,7 @@ pub(super) struct Thermostat {
     /// Virial of the mean force of drag and noise since they last acted, where they are apart from the forces.
     pub impulse_virial: [f64; 6],
     /// The mean drag of the pairs when it last acted, for records of the steps up to the next time.
-    pub held_drag: Vec<Line>,
+    pub held_drag: Vec<Arc<Drag>>,
     /// Whether steps before it acts again ask for that virial.
     pub is_held: bool,
     /// Whether drag and noise are among the present forces, where they act; `None` if nobody has asked for these forces.
@@ -135,9 +136,10 @@ impl Simulation {
         self.record_forces(self.tally().virial, None);
         if self.is_recording() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
-            let pairs = thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
-            let pulls = pairs.map_or(Vec::new(), |pairs| pairs.drags(&particles.now().v));
-            self.record_pulls(1.0, pulls);
+            let found = thermostat.find_pairs(particles, external, forces, (dt, true, *number))?.is_some();
+            if found {
+                self.record_drag_at(1.0, &self.particles.now().v.clone());
+            }
         }
         Ok(())
     }
@@ -188,13 +190,18 @@ impl Simulation {
     pub(in crate::run) fn add_drag(&mut self) {
         let Simulation { particles, external, forces, thermostat, .. } = self;
         thermostat.add_pair_forces(particles, external, forces, true);
-        if self.is_recording()
-            && let Some(pairs) = self.thermostat.pairs.as_ref().filter(|_| self.thermostat.on)
-        {
+        if self.is_recording() && self.thermostat.on {
             // At the end of a step and at the beginning of the next.
-            let pulls = pairs.drags(&self.particles.now().v);
-            self.record_pulls(0.5, pulls);
+            self.record_drag_at(0.5, &self.particles.now().v.clone());
         }
+    }
+
+    /// Records the drag at velocities `v` during a part `share` of the step.
+    fn record_drag_at(&mut self, share: f64, v: &[[f64; 3]]) {
+        self.record_drag(share, |system, line| {
+            let pairs = system.thermostat.pairs.as_ref();
+            pairs.map_or_else(Pulls::default, |pairs| pairs.drags(system.engine().pool(), v, line))
+        });
     }
 
     /// Announces that the thermostat will act where the next forces are computed.
@@ -228,15 +235,6 @@ impl Simulation {
         if !virial.iter().all(|w| w.is_finite()) {
             return Err(RunError::Impulses { step: *number });
         }
-        let pulls = before.map_or(Vec::new(), |mut before| match heat.update {
-            // Drag at the velocities in the middle.
-            Update::Midpoint => {
-                before.iter_mut().zip(&*v).for_each(|(b, v)| (0..3).for_each(|c| b[c] = 0.5 * (b[c] + v[c])));
-                pairs.drags(&before)
-            }
-            Update::ImplicitDrag => pairs.drags(v),
-            Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => pairs.pulls(),
-        });
         // The drag that an implicit step ends with is a force, which `add_drag` counts.
         if heat.update != Update::ImplicitDrag {
             // That of a mean force over the step, or over the steps that it acts for.
@@ -249,7 +247,29 @@ impl Simulation {
         }
         // Implicit drag ends a step: that is half of it.
         let part = if heat.update == Update::ImplicitDrag { 0.5 } else { 1.0 };
-        self.record_pulls(part * (heat.time / dt).min(1.0), pulls);
+        let part = part * (heat.time / dt).min(1.0);
+        if let Some(mut acting) = before {
+            let v = &self.particles.now().v;
+            match heat.update {
+                // Drag at the velocities in the middle.
+                Update::Midpoint => {
+                    for (b, v) in acting.iter_mut().zip(v) {
+                        (0..3).for_each(|c| b[c] = 0.5 * (b[c] + v[c]));
+                    }
+                    self.record_drag_at(part, &acting);
+                }
+                Update::ImplicitDrag => {
+                    acting.copy_from_slice(v);
+                    self.record_drag_at(part, &acting);
+                }
+                Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => {
+                    self.record_drag(part, |system, line| {
+                        let pairs = system.thermostat.pairs.as_ref();
+                        pairs.map_or_else(Pulls::default, |pairs| pairs.pulls(system.engine().pool(), line))
+                    });
+                }
+            }
+        }
         if recording && heat.time > dt {
             self.hold_drag();
         }

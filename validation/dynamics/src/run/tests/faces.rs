@@ -5,6 +5,7 @@ use crate::particles::{BodyForce, Tags};
 use crate::run::bounce::fly;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_observe::Recorded;
 use psidpd_observe::frame::Frame;
 
 fn body_force(acceleration: [f64; 3], species: Vec<i32>) -> BodyForce {
@@ -87,7 +88,7 @@ fn momentum_is_carried_to_the_faces() {
         ] {
             let dt = 0.1;
             run.prepare_for(integrator, dt, Want::FORCES).unwrap();
-            run.record_flux(true);
+            run.record_flux(Recorded::Lines);
             let mut most = 0.0f64;
             for _ in 0..30 {
                 let before = run.state().clone();
@@ -167,7 +168,7 @@ fn the_configurational_temperature_knows_faces() {
             let evaluation = frame.evaluation();
             let probability = (-evaluation.energy / kt).exp();
             let terms = psidpd_observe::configurational::sums(&frame);
-            let laplacian = evaluation.laplacians(&evaluator.fluid, &[0, 1])[1];
+            let laplacian = evaluation.laplacians(run.engine().pool(), &evaluator.fluid)[1];
             let square: f64 = evaluation.forces[1].iter().map(|f| f * f).sum();
             (0..2).for_each(|c| sums[c] += probability * terms[c]);
             (plain[0], plain[1]) = (plain[0] + probability * square, plain[1] + probability * laplacian);

@@ -3,6 +3,7 @@
 use super::*;
 use crate::integrator::Coupling;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_observe::Recorded;
 
 const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n";
 
@@ -34,7 +35,7 @@ fn the_virial_is_that_of_the_mean_force_in_every_step() {
             Integrator::Baoab(coupling),
         ] {
             let mut run = Simulation::new(&model, 1e-60, state.clone(), 7).unwrap();
-            run.record_flux(true);
+            run.record_flux(Recorded::Lines);
             run.prepare_for(integrator, dt, Want::TOTALS).unwrap();
             let x = 0.5 * every as f64 * dt * 1.5 / mu;
             for step in 1..=9u64 {

@@ -4,6 +4,7 @@ use super::*;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::pair::PairForm;
+use psidpd_observe::Recorded;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use std::f64::consts::PI;
@@ -184,7 +185,7 @@ fn the_carried_pressure_is_the_conservative_one() {
     let scene = support::scene(SET6, text).unwrap();
     let evaluator = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
     let mut run = scene.simulation(scene.initial_state()).unwrap();
-    run.record_flux(true);
+    run.record_flux(Recorded::Lines);
     for _ in 0..3 {
         run.step(1.0, trials(20, Some(0.1)), Want::TOTALS).unwrap();
         let frame = Frame::new(run.view(0.0), &evaluator);

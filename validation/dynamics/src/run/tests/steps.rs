@@ -4,6 +4,7 @@ use super::*;
 use crate::checkpoint::Thermo;
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_observe::Recorded;
 use psidpd_observe::flux::Flux;
 
 /// A fluid of two masses, whose number of particles is not a multiple of four.
@@ -110,7 +111,7 @@ fn momentum_is_carried_by_mass() {
         }
     };
     let dt = 1e-3;
-    run.record_flux(true);
+    run.record_flux(Recorded::Lines);
     run.prepare(dt, Want::TOTALS).unwrap();
     let before: Vec<[f64; 3]> = run.state().v.to_vec();
     let pulls = run.forces().to_vec();
