@@ -394,7 +394,7 @@ fn skew_boxes() {
         for settings in all_settings() {
             let found = cloud.energy(&mut Engine::new(&fluid, settings).unwrap()).unwrap();
             assert!((found / sums - 1.0).abs() < 1e-4, "{length:?} {tilt:?} {settings:?}: {found} {sums}");
-            let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), 1.0, &settings).unwrap();
+            let mut thermostat = PairThermostat::new(&Plan::new(&fluid).unwrap(), &settings).unwrap();
             let _ = thermostat.find_pairs(&Pool::new(settings.threads), &cloud.bodies(&[1.0]), DT, true);
         }
     }
