@@ -16,24 +16,29 @@ const ATTRACTION: f64 = -40.0;
 const DENSITY: f64 = 6.05;
 const POWER: f64 = 2.3;
 
-/// How much of A a c₁ takes away in the tension: from four fluids with c₁ of 1.5 to 4.3.
-const REACH: f64 = 3.7;
+/// How much of A a c₁ takes away in the tension: 0 to 3 in fluids with c₁ of 0.5 to 4.3.
+const REACH: f64 = 1.5;
 
 /// What the theory says of the liquid at a density: pressure, ∂p/∂ρ and tension, and in rows their slopes by A, c₁ and c₂.
 ///
 /// The pressure is that of Warren, who measured what mean field has not: in these fluids correlations take away half of the pressure. The
-/// part of c₁ is that of mean field, with Warren's α. The tension grows as the square of the attraction.
+/// part of c₁ is that of mean field, with Warren's α. The tension grows as the square of the attraction, and is that of the liquid in
+/// its vapour: with a pressure at `density` it is thinner by p/(ρ ∂p/∂ρ), and its tension less.
 pub fn theory(at: &Strengths, density: f64) -> ([f64; 3], [[f64; 3]; 3]) {
     let rho = density;
     let share = 30.0 / PI * ALPHA;
-    let pressure = [ALPHA * rho * rho, share * rho * rho, 2.0 * share * (rho.powi(3) - C * rho * rho + D)];
-    let stiffness = [2.0 * ALPHA * rho, 2.0 * share * rho, 2.0 * share * (3.0 * rho * rho - 2.0 * C * rho)];
+    let pressures = [ALPHA * rho * rho, share * rho * rho, 2.0 * share * (rho.powi(3) - C * rho * rho + D)];
+    let stiffnesses = [2.0 * ALPHA * rho, 2.0 * share * rho, 2.0 * share * (3.0 * rho * rho - 2.0 * C * rho)];
     let sum = |of: [f64; 3]| of.iter().zip(at.array()).map(|(slope, x)| slope * x).sum::<f64>();
+    let (pressure, stiffness) = (rho + sum(pressures), 1.0 + sum(stiffnesses));
     let attraction = (at.attraction + REACH * at.linear).min(-1.0);
-    let tension = TENSION * (attraction / ATTRACTION).powi(2) * (rho / DENSITY).powf(POWER);
-    let slope = 2.0 * tension / attraction;
-    let values = [rho + sum(pressure), 1.0 + sum(stiffness), tension];
-    (values, [pressure, stiffness, [slope, REACH * slope, 0.0]])
+    let dense = TENSION * (attraction / ATTRACTION).powi(2) * (rho / DENSITY).powf(POWER);
+    let by_pressure = POWER / (rho * stiffness.max(5.0));
+    let thinner = (1.0 - by_pressure * pressure).clamp(0.2, 2.0);
+    let slope = 2.0 * dense / attraction * thinner;
+    let own = [slope, REACH * slope, 0.0];
+    let tensions = std::array::from_fn(|k| own[k] - by_pressure * dense * pressures[k]);
+    ([pressure, stiffness, dense * thinner], [pressures, stiffnesses, tensions])
 }
 
 /// Which strengths are free: as many as there are goals.
