@@ -10,6 +10,7 @@ use super::sheet::{Goals, Tolerance};
 use super::theory::{free, start, theory};
 use crate::ExperimentError;
 use nalgebra::{DMatrix, DVector};
+use psidpd_observe::Measured;
 use serde::Serialize;
 
 /// Most measurements.
@@ -31,6 +32,9 @@ const LONGEST: f64 = 2.0;
 /// The search is content with this share of the tolerance: the result is measured again.
 const CONTENT: f64 = 0.6;
 
+/// And with a distance within its error, up to so many tolerances.
+const UNTOLD: f64 = 1.5;
+
 /// A fluid that was measured.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Trial {
@@ -48,22 +52,30 @@ pub enum End {
     Blocked(String),
 }
 
-/// Distances of what was found from the goals, in tolerances: density, stiffness, tension.
-pub fn distances(found: &Equilibrium, goals: &Goals, tolerance: &Tolerance) -> [f64; 3] {
+/// Distances of what was found from the goals, with their errors, in tolerances: density, stiffness, tension.
+fn distances(found: &Equilibrium, goals: &Goals, tolerance: &Tolerance) -> [Measured; 3] {
     let stiffness = goals.stiffness.unwrap_or(found.stiffness.value).max(1.0);
-    let share = |value: f64, goal: Option<f64>, tolerance: f64| {
-        goal.map_or(0.0, |goal| (value / goal - 1.0) / tolerance)
+    let share = |got: Measured, goal: Option<f64>, tolerance: f64| match goal {
+        Some(goal) => got.times(1.0 / goal).minus(1.0).times(1.0 / tolerance),
+        None => Measured::from(0.0),
     };
     [
-        found.pressure.value / (goals.density * stiffness) / tolerance.density,
-        share(found.stiffness.value, goals.stiffness, tolerance.compressibility),
-        share(found.tension.value, goals.tension, tolerance.tension),
+        found.pressure.times(1.0 / (goals.density * stiffness * tolerance.density)),
+        share(found.stiffness, goals.stiffness, tolerance.compressibility),
+        share(found.tension, goals.tension, tolerance.tension),
     ]
 }
 
+/// The largest distance; infinite if one is not known.
 pub fn score(found: &Equilibrium, goals: &Goals, tolerance: &Tolerance) -> f64 {
-    let worst = distances(found, goals, tolerance).iter().fold(0.0, |worst: f64, d| worst.max(d.abs()));
-    if worst.is_nan() { f64::INFINITY } else { worst }
+    let all = distances(found, goals, tolerance).map(|d| d.value.abs());
+    if all.iter().any(|d| d.is_nan()) { f64::INFINITY } else { all.into_iter().fold(0.0, f64::max) }
+}
+
+/// Whether the search ends: what is left is small, or is not told from none and the result will tell.
+fn is_content(found: &Equilibrium, goals: &Goals, tolerance: &Tolerance) -> bool {
+    let near = |d: &Measured| d.value.abs() <= CONTENT.max(d.error.min(UNTOLD));
+    distances(found, goals, tolerance).iter().all(near)
 }
 
 /// Seeks the strengths; `trials` has what is known already, and what was measured comes to it.
@@ -101,7 +113,7 @@ pub fn search(
             found.tension.value,
             found.tension.error
         ));
-        if score(&found, goals, tolerance) <= CONTENT {
+        if is_content(&found, goals, tolerance) {
             return Ok(End::Met);
         }
         let Some(best) = best(trials) else { break };
@@ -161,7 +173,7 @@ fn toward(trials: &[Trial], best: &Trial, goals: &Goals) -> Strengths {
     Strengths::of([next[0].clamp(-200.0, -3.0), next[1], next[2].max(0.01)])
 }
 
-fn values(found: &Equilibrium) -> [psidpd_observe::Measured; 3] {
+fn values(found: &Equilibrium) -> [Measured; 3] {
     [found.pressure, found.stiffness, found.tension]
 }
 

@@ -369,7 +369,7 @@ fn dimensionless_numbers_are_those_of_textbooks() {
 fn runs_measure_a_published_liquid_and_see_a_crystal() {
     let of_set6 = [("density", 1000.0), ("temperature", 300.0), ("rc", 1e-9), ("number_density", 6.05)];
     let liquid = Liquid::new("set 6", &entries(&of_set6)).unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = temporary_folder().unwrap();
     let mut runs = runs::Runs { liquid: &liquid, folder: folder.path(), seed: 5 };
     let unit = std::f64::consts::PI / 30.0 * RANGE.powi(4);
     let warren = Strengths { attraction: -40.0, linear: 0.0, square: 25.0 * unit };
