@@ -121,6 +121,21 @@ fn nothing_is_written_or_read_beside_the_door() {
     assert!(found.is_empty(), "use psidpd_formats::files: {found:#?}");
 }
 
+/// `eprintln!` panics where standard error is closed or full, in the middle of the work.
+#[test]
+fn no_line_for_standard_error_can_panic() {
+    let mut all = Vec::new();
+    SOURCES.iter().for_each(|folder| files(&root().join(folder), &mut all));
+    let is_test =
+        |path: &Path| path.ends_with("tests.rs") || path.components().any(|part| part.as_os_str() == "tests");
+    for path in all.iter().filter(|path| !is_test(path)) {
+        let text = code(&std::fs::read_to_string(path).unwrap());
+        for word in ["eprintln!(", "eprint!(", "dbg!("] {
+            assert!(!uses(&text, word), "{}: use psidpd_report::to_stderr", path.display());
+        }
+    }
+}
+
 /// The Python part of the package writes nothing, and opens what a folder holds by one function.
 #[test]
 fn python_reads_by_one_function() {

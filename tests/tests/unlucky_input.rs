@@ -318,6 +318,24 @@ fn a_full_standard_output_is_an_error_of_every_verb() {
     }
 }
 
+/// Lines that nobody can read stop no verb.
+#[test]
+fn a_full_standard_error_stops_nothing() {
+    let folder = with_a_run();
+    write(folder.path(), "in.old", "pair_style hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 9872598\n");
+    for (line, expected) in [
+        ("lammps convert in.old --out in.new", 0),
+        ("run s.toml --out o --threads 1000 --resume", 0),
+        ("check m.toml", 0),
+        ("check nowhere.toml", 2),
+    ] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut program = Command::new(program());
+        let output = program.args(split(line)).current_dir(folder.path()).stderr(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(expected), "{line}: {}", said(&output));
+    }
+}
+
 /// Every error about a file names it: a damaged, empty or missing file, or a folder.
 #[test]
 fn errors_of_every_verb_name_the_file() {

@@ -1,5 +1,5 @@
 use std::borrow::Cow;
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -50,9 +50,14 @@ impl Overall {
         if let Some(told) = &self.told
             && told.fetch_max(minutes, Ordering::Relaxed) < minutes
         {
-            eprintln!("{}", so_far(&self.name, made, self.total, self.start.elapsed()));
+            to_stderr(&so_far(&self.name, made, self.total, self.start.elapsed()));
         }
     }
+}
+
+/// Prints a line to standard error. If that is closed or full, the line has no reader, and the work goes on.
+pub fn to_stderr(line: &str) {
+    let _ = writeln!(stderr(), "{line}");
 }
 
 fn so_far(name: &str, made: u64, total: u64, elapsed: Duration) -> String {
@@ -127,7 +132,7 @@ impl Progress {
         if self.visible {
             self.note(line);
         } else {
-            eprintln!("{line}");
+            to_stderr(line);
         }
     }
 

@@ -1,6 +1,7 @@
 use super::*;
 use psidpd_lammps_host::convert::{self, Law, Note};
 use psidpd_lammps_host::{Host, LammpsError, base_dir, install, plugin};
+use psidpd_report::to_stderr;
 
 /// LAMMPS and the plugin.
 #[derive(Debug, clap::Subcommand)]
@@ -101,7 +102,7 @@ pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
                 for note in notes {
                     let file =
                         note.file.as_ref().map_or(String::new(), |file| format!(" of {}", printable(file)));
-                    eprintln!("{what:8} line {:4}{file}: {}", note.line, printable(&note.text));
+                    to_stderr(&format!("{what:8} line {:4}{file}: {}", note.line, printable(&note.text)));
                 }
             }
             let by_hand = &new.by_hand;

@@ -109,13 +109,14 @@ impl PairSums {
             + particle_virial.capacity() * size_of::<[f64; 6]>()
     }
 
-    /// Finds the pairs of another configuration; after an error there are none.
+    /// Finds the pairs of another configuration; after an error there are none, and no results.
     fn find_pairs(&mut self, surroundings: Surroundings, particles: &Particles) -> Result<(), EngineError> {
         let done = self.search_pairs(surroundings, particles);
         if done.is_err() {
             self.pairs.clear(0, Newton::On);
             self.species.clear();
-            self.owned = 0;
+            [&mut self.densities, &mut self.excess, &mut self.slopes].map(Vec::clear);
+            (self.owned, self.has_all_densities) = (0, false);
         }
         done
     }
