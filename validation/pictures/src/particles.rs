@@ -50,7 +50,7 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
     let size = projection.size.map(|s| s * FINER);
     let mut canvas = Canvas {
         image: Image::filled(size[0], size[1], WHITE),
-        depth: vec![f64::NEG_INFINITY; size[0] * size[1]],
+        depth: vec![f32::NEG_INFINITY; size[0] * size[1]],
         foremost: vec![NONE; size[0] * size[1]],
         balls: Vec::with_capacity(frame.len()),
     };
@@ -77,7 +77,7 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
 struct Canvas {
     image: Image,
     /// The position of the surface in each pixel along the line of sight; larger is nearer to the viewer.
-    depth: Vec<f64>,
+    depth: Vec<f32>,
     /// The ball that is seen in each pixel, and [`NONE`] where there is none.
     foremost: Vec<u32>,
     balls: Vec<Ball>,
@@ -118,11 +118,11 @@ impl Canvas {
                 depth: &mut self.depth[row.clone()][columns.clone()],
                 foremost: &mut self.foremost[row][columns.clone()],
                 number,
-                first: ball.place(0, columns.start),
-                step: 1.0 / ball.radius,
-                ny,
-                toward,
-                reach,
+                first: ball.place(0, columns.start) as f32,
+                step: (1.0 / ball.radius) as f32,
+                ny: ny as f32,
+                toward: toward as f32,
+                reach: reach as f32,
             });
         }
         self.balls.push(ball);
@@ -157,7 +157,7 @@ impl Canvas {
                     for (dx, dy) in [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (-1.0, -1.0)] {
                         let x = (x + dx).clamp(0.0, (self.image.width - 1) as f64) as usize;
                         let y = (y + dy).clamp(0.0, (self.image.height - 1) as f64) as usize;
-                        if toward > self.depth[y * self.image.width + x] {
+                        if toward as f32 > self.depth[y * self.image.width + x] {
                             self.image.blend(x, y, EDGE, 0.5);
                         }
                     }
@@ -169,15 +169,15 @@ impl Canvas {
 
 /// Hides what is behind a ball in a row of pixels.
 struct Hide<'a> {
-    depth: &'a mut [f64],
+    depth: &'a mut [f32],
     foremost: &'a mut [u32],
     number: u32,
     /// The place of the first pixel in radii, the distance of pixels, and the place of the row.
-    first: f64,
-    step: f64,
-    ny: f64,
-    toward: f64,
-    reach: f64,
+    first: f32,
+    step: f32,
+    ny: f32,
+    toward: f32,
+    reach: f32,
 }
 
 impl Loop for Hide<'_> {
@@ -187,7 +187,7 @@ impl Loop for Hide<'_> {
     fn run(self) {
         let Hide { depth, foremost, number, first, step, ny, toward, reach } = self;
         for (k, (depth, foremost)) in depth.iter_mut().zip(foremost).enumerate() {
-            let nx = first + k as f64 * step;
+            let nx = first + k as f32 * step;
             let rest = 1.0 - nx * nx - ny * ny;
             let here = toward + reach * rest.max(0.0).sqrt();
             let is_seen = rest > 0.0 && here > *depth;
