@@ -97,7 +97,7 @@ impl Ball {
     fn range(&self, direction: usize, most: usize) -> Range<usize> {
         let low = (self.at[direction] - self.radius).floor().max(0.0) as usize;
         let high = (self.at[direction] + self.radius).ceil().clamp(0.0, most as f64) as usize;
-        low..high
+        low.min(high)..high
     }
 
     /// The place of the middle of a pixel, in radii.
