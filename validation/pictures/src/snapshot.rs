@@ -22,7 +22,8 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatErr
     folder_inside(&snapshots).map_err(PathError::at("write", &snapshots))?;
     let path = snapshots.join(snapshot_name(frame.step));
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
-    let png = image.to_png().map_err(FormatError::content(&path))?;
+    // A run does not wait for a smaller file.
+    let png = image.to_png_fast().map_err(FormatError::content(&path))?;
     // The resumed run makes the same step.
     replace_inside(&path, &png, false)?;
     Ok(path)

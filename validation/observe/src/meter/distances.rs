@@ -1,9 +1,12 @@
 //! Histograms of the distances of particles.
+//!
+//! Distances are computed in single precision, eight at a time, and those that are so near to the edge of a shell that rounding may
+//! matter once more in double precision, so that counts are those of double precision.
 
 use super::PeriodicBox;
 use psidpd_core::engine::Pool;
 use psidpd_core::engine::vectors::{self, Loop};
-use std::ops::Range;
+use std::ops::{Add, Range, Sub};
 
 /// Rows of particles per range. Narrower rows give fewer pairs beyond the range.
 const ROWS_PER_RANGE: f64 = 3.0;
@@ -33,8 +36,11 @@ pub fn count(
     dimensions: usize,
     shells: Shells,
 ) -> Vec<u64> {
-    let near = Near::new(domain, dimensions, shells);
+    let mut near = Near::new(domain, dimensions, shells);
     let sorted = Sorted::new(x, species, &near);
+    // Outside an open box fractions are large.
+    let farthest = sorted.s.iter().flatten().fold(1.0f64, |most, s| most.max(s.abs()));
+    near.doubt = (f64::from(near.doubt) * farthest).min(1.0) as f32;
     let planes = sorted.planes.len();
     let pairs: Vec<[usize; 2]> = (0..planes).flat_map(|a| (a..planes).map(move |b| [a, b])).collect();
     let of_none = Counts { numbers: vec![0; kinds * kinds * near.width], kinds, found: Vec::new() };
@@ -73,7 +79,12 @@ struct Near<'a> {
     per_length: f64,
     /// The number of counters for each pair of species.
     width: usize,
+    /// Distances in shells that are nearer to an edge are not known in single precision.
+    doubt: f32,
 }
+
+/// Roundings of 2⁻²⁴ of the longest edge that a distance in single precision may be off by.
+const ROUNDINGS: f64 = 16.0;
 
 /// The least and the greatest of some fractions.
 #[derive(Clone, Copy)]
@@ -103,8 +114,9 @@ struct Plane {
 
 /// Particles sorted into rows, and by the first fraction within a row.
 struct Sorted {
-    /// Fractions of the box, padded by the length of a vector.
+    /// Fractions of the box, padded by the length of a vector, in double and in single precision.
     s: [Vec<f64>; 3],
+    short: [Vec<f32>; 3],
     species: Vec<usize>,
     /// For each particle, the offset of its species in the counts of another species.
     offset: Vec<u32>,
@@ -154,6 +166,9 @@ impl Counts {
 impl<'a> Near<'a> {
     fn new(domain: &'a PeriodicBox, dimensions: usize, shells: Shells) -> Near<'a> {
         let periodic = domain.periodic();
+        let lengths = (0..dimensions).flat_map(|k| domain.edge(k)).map(f64::abs);
+        // Distances of up to all ranges that are counted are rounded too.
+        let longest = lengths.fold((1 + BEYOND) as f64 * shells.range, f64::max);
         Near {
             domain,
             dimensions,
@@ -164,6 +179,7 @@ impl<'a> Near<'a> {
             is_orthogonal: (0..3).all(|k| (0..3).all(|c| c == k || domain.edge(k)[c] == 0.0)),
             per_length: shells.bins as f64 / shells.range,
             width: (1 + BEYOND) * shells.bins,
+            doubt: (ROUNDINGS * longest * shells.bins as f64 / shells.range / 16_777_216.0).min(1.0) as f32,
         }
     }
 
@@ -201,29 +217,60 @@ impl Loop for Bins<'_> {
     #[inline(always)]
     fn run(self) {
         let Bins { near, sorted, i, span, found } = self;
-        let own = [sorted.s[0][i], sorted.s[1][i], sorted.s[2][i]];
-        let [a, b, c] = near.edges;
-        let last = (near.width - 1) as f64;
+        let own = [sorted.short[0][i], sorted.short[1][i], sorted.short[2][i]];
+        let [a, b, c] = near.edges.map(|edge| edge.map(|c| c as f32));
+        let period = near.period.map(|period| period as f32);
+        let per_length = near.per_length as f32;
+        let (last, beyond) = ((near.width - 1) as f32, (near.width / (1 + BEYOND) + 1) as f32);
         found.clear();
         for first in span.clone().step_by(LANES) {
-            let s = nearest(lanes(&sorted.s[0], first), own[0], near.period[0]);
-            let t = nearest(lanes(&sorted.s[1], first), own[1], near.period[1]);
-            let u = nearest(lanes(&sorted.s[2], first), own[2], near.period[2]);
+            let s = nearest(lanes(&sorted.short[0], first), own[0], period[0], 0.5);
+            let t = nearest(lanes(&sorted.short[1], first), own[1], period[1], 0.5);
+            let u = nearest(lanes(&sorted.short[2], first), own[2], period[2], 0.5);
             let offset = lanes(&sorted.offset, first);
-            let mut bins = [0; LANES];
+            let (mut bins, mut doubt) = ([0; LANES], [false; LANES]);
             for k in 0..LANES {
                 let x = s[k] * a[0] + t[k] * b[0] + u[k] * c[0];
                 let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
                 let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
-                let bin = (x * x + y * y + z * z).sqrt() * near.per_length;
+                let place = (x * x + y * y + z * z).sqrt() * per_length;
+                let place = if place < last { place } else { last };
                 // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
-                let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
+                let bin: i32 = unsafe { place.to_int_unchecked() };
+                let part = place - bin as f32;
+                doubt[k] = (part < near.doubt || part > 1.0 - near.doubt) & (place < beyond);
                 bins[k] = offset[k] + bin as u32;
+            }
+            if near.doubt > 0.5 || doubt.iter().fold(false, |any, doubt| any | doubt) {
+                bins = exact_bins(near, sorted, i, first);
             }
             found.extend_from_slice(&bins);
         }
         found.truncate(span.len());
     }
+}
+
+/// The counters of the pairs of `i` with the particles of a vector.
+#[inline(always)]
+fn exact_bins(near: &Near, sorted: &Sorted, i: usize, first: usize) -> [u32; LANES] {
+    let own = [sorted.s[0][i], sorted.s[1][i], sorted.s[2][i]];
+    let [a, b, c] = near.edges;
+    let last = (near.width - 1) as f64;
+    let s = nearest(lanes(&sorted.s[0], first), own[0], near.period[0], 0.5);
+    let t = nearest(lanes(&sorted.s[1], first), own[1], near.period[1], 0.5);
+    let u = nearest(lanes(&sorted.s[2], first), own[2], near.period[2], 0.5);
+    let offset = lanes(&sorted.offset, first);
+    let mut bins = [0; LANES];
+    for k in 0..LANES {
+        let x = s[k] * a[0] + t[k] * b[0] + u[k] * c[0];
+        let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
+        let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
+        let bin = (x * x + y * y + z * z).sqrt() * near.per_length;
+        // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
+        let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
+        bins[k] = offset[k] + bin as u32;
+    }
+    bins
 }
 
 /// The [`LANES`] numbers that begin at `first`.
@@ -232,14 +279,17 @@ fn lanes<T>(values: &[T], first: usize) -> &[T; LANES] {
     values[first..].first_chunk().expect("room for a vector behind the last particle")
 }
 
-/// Fractions from `own` to the nearest images of others. They are correct within half a height.
+/// Fractions from `own` to the nearest images of others, in either precision. They are correct within `half` a height.
 #[inline(always)]
-fn nearest(s: &[f64; LANES], own: f64, period: f64) -> [f64; LANES] {
-    let mut apart = [0.0; LANES];
+fn nearest<T>(s: &[T; LANES], own: T, period: T, half: T) -> [T; LANES]
+where
+    T: Copy + Default + PartialOrd + Add<Output = T> + Sub<Output = T>,
+{
+    let mut apart = [T::default(); LANES];
     for k in 0..LANES {
         let d = s[k] - own;
-        let above = if d > 0.5 { period } else { 0.0 };
-        let below = if d < -0.5 { period } else { 0.0 };
+        let above = if d > half { period } else { T::default() };
+        let below = if d + half < T::default() { period } else { T::default() };
         apart[k] = d - above + below;
     }
     apart
@@ -313,8 +363,11 @@ impl Sorted {
         let padding = LANES - 1;
         let fractions = |k: usize| particles.iter().map(move |particle| particle.1[k]);
         let offsets = particles.iter().map(|particle| (particle.2 * near.width) as u32);
+        let s =
+            [0, 1, 2].map(|k| fractions(k).chain(std::iter::repeat_n(0.0, padding)).collect::<Vec<f64>>());
         Sorted {
-            s: [0, 1, 2].map(|k| fractions(k).chain(std::iter::repeat_n(0.0, padding)).collect()),
+            short: s.each_ref().map(|s| s.iter().map(|s| *s as f32).collect()),
+            s,
             offset: offsets.chain(std::iter::repeat_n(0, padding)).collect(),
             species: particles.into_iter().map(|particle| particle.2).collect(),
             planes,
@@ -344,6 +397,7 @@ mod tests {
             (skew, [true; 3], 3, 1.5),
             (along(12.0, 7.0, 1.0), [true, true, false], 2, 3.5),
             (along(6.0, 12.0, 1.0), [false, true, false], 2, 0.7),
+            (along(9e4, 4.0, 4.0), [true; 3], 3, 2.0),
         ];
         for (edges, periodic, dimensions, range) in cases {
             let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
@@ -359,7 +413,7 @@ mod tests {
                 let kind = (a * 3 - a * (a + 1) / 2 + b) as usize;
                 expected[11 * kind + ((p.r / range * 11.0) as usize).min(10)] += 1;
             });
-            assert!(expected.iter().sum::<u64>() > 400, "pairs to count");
+            assert!(domain.height(0) > 1e3 || expected.iter().sum::<u64>() > 400, "pairs to count");
             for threads in [1, 3] {
                 let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
                 let found = count(&pool, &x, &species, 3, &domain, dimensions, shells);

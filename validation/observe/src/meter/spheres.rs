@@ -230,10 +230,11 @@ fn see(spheres: &Spheres, around: &Around, lines: &Lines, seen: &mut Seen) {
         let length = dot(d, d).sqrt();
         // A line of no length has no direction, and no force counts.
         let inverse = if length > 0.0 { 1.0 / length } else { 0.0 };
-        let (start, square) = (-dot(p, d) * inverse, dot(p, p));
+        let start = -dot(p, d) * inverse;
         let end = start + length;
-        let b2 = (square - start * start).max(0.0);
-        let b = b2.sqrt();
+        let area = cross(p, d);
+        let b = dot(area, area).sqrt() * inverse;
+        let b2 = b * b;
         let force = dot(d, f) * inverse;
         let across = dot(p, f) + force * start;
         (seen.b[k], seen.force[k], seen.across[k]) = (b, force, across);
@@ -262,6 +263,11 @@ fn see(spheres: &Spheres, around: &Around, lines: &Lines, seen: &mut Seen) {
 #[inline(always)]
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Φ(q) and √(1 − q²).
@@ -326,7 +332,8 @@ mod tests {
         }
         let start = -dot(line.from, line.d) / r;
         let end = start + r;
-        let b = (dot(line.from, line.from) - start * start).max(0.0).sqrt();
+        let area = cross(line.from, line.d);
+        let b = dot(area, area).sqrt() / r;
         let force = dot(line.d, line.f) / r;
         let foot = dot(line.from, line.f) + force * start;
         let normal = |u: f64| if b > 0.0 { u - b * (u / b).atan() } else { u };
@@ -369,7 +376,7 @@ mod tests {
                     let off = flat(vector(across));
                     let f = std::array::from_fn(|c| 2.0 * d[c] + off[c]);
                     // Through the centre.
-                    let place = if k % 50 == 0 { d } else { place };
+                    let place = if k % 50 == 0 { d.map(|c| 0.5 * c) } else { place };
                     Line { from: place, d, f }
                 })
                 .collect();
