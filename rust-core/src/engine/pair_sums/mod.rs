@@ -115,7 +115,7 @@ impl PairSums {
         if done.is_err() {
             self.pairs.clear(0, Newton::On);
             self.species.clear();
-            [&mut self.densities, &mut self.excess, &mut self.slopes].map(Vec::clear);
+            [&mut self.densities, &mut self.excess, &mut self.slopes].into_iter().for_each(Vec::clear);
             (self.owned, self.has_all_densities) = (0, false);
         }
         done
