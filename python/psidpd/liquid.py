@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, RunStoppedError
+from .files import read
 from .scenes import AnyPath
 
 
@@ -84,10 +85,12 @@ class Liquid:
         with tempfile.TemporaryDirectory() as folder:
             table = Path(folder, "found.json")
             command = [sys.executable, "-m", "psidpd", "model", "liquid", *options, f"--seed={seed}"]
-            command += ["--out", os.fspath(out), "--json", str(table)]
+            command += ["--out", os.path.abspath(out), "--json", str(table)]
             command += ["--anyway"] * anyway + ["--overwrite"] * overwrite + ["--", self.name]
-            run = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-            if table.is_file():
-                found: dict[str, Any] = json.loads(table.read_text(encoding="utf-8"))
+            # From an empty folder, as Python imports what lies in the working one.
+            run = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            text = read(table)
+            if text is not None:
+                found: dict[str, Any] = json.loads(text)
                 return found
         raise (InputError if run.returncode == 2 else RunStoppedError)(run.stderr.strip())
