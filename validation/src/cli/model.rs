@@ -179,11 +179,8 @@ fn print(found: &Found) {
     }
     say!("");
     say::table(&table);
-    if let Some(step) = found.step {
-        let seconds = step * found.units[3];
-        say!(
-            "step: integrator = \"force-gradient\", lambda = 0.17, thermostat_every = 2, dt = {step} ({seconds:.2e} s)"
-        );
+    if let Some(step) = found.advice() {
+        say!("step: {step}");
     }
     for number in &found.numbers {
         let shown = |x: Option<f64>| x.map_or("unknown".to_owned(), |x| format!("{x:.3e}"));
@@ -204,7 +201,7 @@ fn command(a: &OfLiquid) -> String {
     let mut text = format!("psidpd model liquid {:?}", a.name);
     for (entry, value) in ENTRIES.iter().zip(a.numbers.all()) {
         if let Some(value) = value {
-            text += &format!(" --{} {value}", entry.key.replace('_', "-"));
+            text += &format!(" --{} {value:?}", entry.key.replace('_', "-"));
         }
     }
     if let Some(data) = &a.data {

@@ -156,6 +156,45 @@ fn a_liquid_in_equilibrium() {
     }
 }
 
+/// The energies of a sample are those of its configuration, pair by pair and particle by particle, whatever moved the particles: Warren's
+/// set 6 at kT 0.7 with particles of mass 3. `w = 15/(2πR³) (1 − r/R)²`, `ψ = (π r_d⁴ B/30) n²`, `φ = ½A(1 − r)²`.
+#[test]
+fn energies_of_a_sample_are_those_of_its_configuration() {
+    for integrator in [
+        "integrator = \"monte-carlo\"\n",
+        "dt = 0.02\nintegrator = \"force-gradient\"\nthermostat_every = 3\n",
+    ] {
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 0.7\nseed = 5\nbox = [4.0, 5.0, 6.0]\ndensity = 6.0\n[masses]\nF = 3.0\n\
+             [[stage]]\nname = \"run\"\nsteps = 10\n{integrator}[observe]\nevery = 10\nenergy = true\n"
+        );
+        let (simulation, all) = run(&support::scene(SET6, &text).unwrap());
+        let (x, v) = (&simulation.state().x, &simulation.state().v);
+        let domain = &simulation.state().domain;
+        let (mut density, mut phi) = (vec![0.0; x.len()], 0.0);
+        for i in 0..x.len() {
+            for j in 0..i {
+                let r = domain.minimum_image(x[i], x[j]).iter().map(|d| d * d).sum::<f64>().sqrt();
+                let to = |range: f64| (1.0 - r / range).max(0.0).powi(2);
+                let w = 7.5 / (std::f64::consts::PI * 0.75f64.powi(3)) * to(0.75);
+                density[i] += w;
+                density[j] += w;
+                phi -= 20.0 * to(1.0);
+            }
+        }
+        let strength = std::f64::consts::PI * 0.75f64.powi(4) * 25.0 / 30.0;
+        let psi: f64 = density.iter().map(|n| strength * n * n).sum();
+        let kinetic: f64 = v.iter().flatten().map(|v| 1.5 * v * v).sum();
+        let found = find(&all, "energy");
+        for (name, expected) in
+            [("psi_F", psi), ("phi_1_F_F", phi), ("kinetic", kinetic), ("potential", psi + phi)]
+        {
+            let value = found.scalar(name).unwrap().value * x.len() as f64;
+            assert!((value / expected - 1.0).abs() < 1e-9, "{integrator} {name}: {value} {expected}");
+        }
+    }
+}
+
 /// A slab of liquid: the profile of the pressure tensor integrates to the tensor of the box, sample by
 /// sample. Both routes to the tension agree within five standard errors, as if they were independent. So do
 /// tension, width and density with their values from 60 000 steps: 7.55(6), 0.338(4), 6.0726(9). Each of the

@@ -13,6 +13,15 @@ const SHAPES: [[f64; 2]; 3] = [[1.0, 1.0], [1.0, 0.25], [1.5, 0.25]];
 pub const WEAKEST: f64 = 0.5;
 pub const STRONGEST: f64 = 400.0;
 
+/// The name of the end of the drags that are tried, for one at it or next to it: by noise the best may be a little before.
+pub fn end(gamma: f64) -> Option<&'static str> {
+    match gamma {
+        gamma if gamma <= 1.5 * WEAKEST => Some("weakest"),
+        gamma if gamma >= STRONGEST / 1.5 => Some("strongest"),
+        _ => None,
+    }
+}
+
 /// A wider weight is taken where this one would need more drag.
 const COMFORTABLE: f64 = 200.0;
 

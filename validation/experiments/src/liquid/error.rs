@@ -84,12 +84,27 @@ pub enum Refusal {
         why: Option<String>,
     },
     #[error(
-        "viscosity {viscosity:.3e} Pa s and particles of {volume:.3e} m3 conflict: with the {end} drag the liquid has {nearest:.3e} Pa s, \
-         which is the nearest"
+        "viscosity {viscosity:.3e} Pa s and particles of {volume:.3e} m3 conflict: with {} the liquid has {nearest:.3e} Pa s, \
+         which is the nearest",
+        drag(.end, .gamma)
     )]
-    Viscosity { viscosity: f64, volume: f64, end: &'static str, nearest: f64 },
+    Viscosity {
+        viscosity: f64,
+        volume: f64,
+        gamma: f64,
+        /// The end of the drags that are tried, if this is one.
+        end: Option<&'static str>,
+        nearest: f64,
+    },
     #[error("no liquid has these numbers: {why}")]
     NoLiquid { why: String },
+}
+
+fn drag(end: &Option<&str>, gamma: &f64) -> String {
+    end.map_or_else(
+        || format!("gamma = {gamma:.3}, the best that was found,"),
+        |end| format!("the {end} drag"),
+    )
 }
 
 fn molecules(count: &Option<f64>) -> String {

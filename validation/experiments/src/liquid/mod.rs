@@ -201,8 +201,7 @@ fn equilibrium(
     let mut result = None;
     for round in 0..ROUNDS {
         let end = search::search(goals, &TOLERANCE, instrument, &mut found.trials, told)?;
-        let off = |t: &&Trial| search::score(&t.found, goals, &TOLERANCE);
-        let Some(best) = found.trials.iter().min_by(|a, b| off(a).total_cmp(&off(b))).copied() else {
+        let Some(best) = search::best(&found.trials, goals, &TOLERANCE) else {
             if let End::Blocked(why) = end {
                 found.refusals.push(Refusal::NoLiquid { why });
             }
@@ -287,7 +286,10 @@ fn flow(
         let again = match instrument.flow(&found.fluid, &found.drag, guess, Care::Result(round)) {
             Ok(again) => again,
             Err(Trouble::Failed(error)) => return Err(error),
-            Err(_) => return Ok(None),
+            Err(trouble) => {
+                found.refusals.push(Refusal::NoLiquid { why: trouble.to_string() });
+                return Ok(None);
+            }
         };
         flow = Some(again);
         guess = again.viscosity.value;
@@ -305,7 +307,8 @@ fn flow(
         found.refusals.push(Refusal::Viscosity {
             viscosity: goal * liquid.viscosity_unit(),
             volume: liquid.volume(),
-            end: if flow.viscosity.value > goal { "weakest" } else { "strongest" },
+            gamma: found.drag.gamma,
+            end: drag::end(found.drag.gamma),
             nearest: flow.viscosity.value * liquid.viscosity_unit(),
         });
     }
@@ -376,6 +379,15 @@ fn compared(liquid: &Liquid, rows: &[Row]) -> Vec<Number> {
 }
 
 impl Found {
+    /// The step to take, in words.
+    pub fn advice(&self) -> Option<String> {
+        let (step, [.., time]) = (self.step?, self.units);
+        let seconds = step * time;
+        Some(format!(
+            "integrator = \"force-gradient\", lambda = 0.17, thermostat_every = 2, dt = {step} ({seconds:.2e} s)"
+        ))
+    }
+
     /// What the model file says of itself.
     fn head(&self, command: &str) -> String {
         let [length, mass, _, time] = self.units;
@@ -393,12 +405,8 @@ impl Found {
                 row.name, row.got.value, row.got.error, row.unit
             );
         }
-        if let Some(step) = self.step {
-            let _ = writeln!(
-                head,
-                "Step: integrator = \"force-gradient\", lambda = 0.17, thermostat_every = 2, dt = {step} ({:.2e} s).",
-                step * time
-            );
+        if let Some(step) = self.advice() {
+            let _ = writeln!(head, "Step: {step}.");
         }
         for refusal in &self.refusals {
             let _ = writeln!(head, "MISSED: {refusal}");

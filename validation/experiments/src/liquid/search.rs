@@ -72,6 +72,12 @@ pub fn score(found: &Equilibrium, goals: &Goals, tolerance: &Tolerance) -> f64 {
     if all.iter().any(|d| d.is_nan()) { f64::INFINITY } else { all.into_iter().fold(0.0, f64::max) }
 }
 
+/// The trial with the smallest score.
+pub fn best(trials: &[Trial], goals: &Goals, tolerance: &Tolerance) -> Option<Trial> {
+    let of = |t: &&Trial| score(&t.found, goals, tolerance);
+    trials.iter().min_by(|a, b| of(a).total_cmp(&of(b))).copied()
+}
+
 /// Whether the search ends: what is left is small, or is not told from none and the result will tell.
 fn is_content(found: &Equilibrium, goals: &Goals, tolerance: &Tolerance) -> bool {
     let near = |d: &Measured| d.value.abs() <= CONTENT.max(d.error.min(UNTOLD));
@@ -86,10 +92,7 @@ pub fn search(
     trials: &mut Vec<Trial>,
     told: &mut dyn FnMut(&str),
 ) -> Result<End, ExperimentError> {
-    let best = |trials: &[Trial]| {
-        let of = |t: &&Trial| score(&t.found, goals, tolerance);
-        trials.iter().min_by(|a, b| of(a).total_cmp(&of(b))).copied()
-    };
+    let best = |trials: &[Trial]| best(trials, goals, tolerance);
     let mut next = match best(trials) {
         None => start(goals),
         Some(best) => toward(trials, &best, goals),
