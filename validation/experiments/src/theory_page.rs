@@ -2,7 +2,7 @@
 
 use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, composition_critical_point, critical_point};
-use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, typeset};
+use psidpd_report::{Item, Overall, Plot, Progress, Report, ReportError, Section, Series, Style, typeset};
 
 const TEMPERATURES: usize = 25;
 
@@ -35,15 +35,17 @@ fn unit(name: &str, model: &Model) -> String {
 
 pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     let species = model.species().len();
+    // At extreme densities a temperature takes seconds.
+    let progress = &Progress::new().overall("curves of the page", (scope.kts.len() + TEMPERATURES) as u64);
     let mut sections = Vec::new();
     if !scope.doubts.is_empty() {
         let items = vec![Item::Prose(scope.doubts.join("\n\n"))];
         sections.push(Section::new("Where mean field fails", items));
     }
-    sections.push(Section::new("Equation of state", isotherms(model, scope)?));
+    sections.push(Section::new("Equation of state", isotherms(model, scope, progress)?));
     match species {
-        1 => sections.push(Section::new("Vapour and liquid", phases(model, scope)?)),
-        2 => sections.push(Section::new("Demixing", compositions(model, scope)?)),
+        1 => sections.push(Section::new("Vapour and liquid", phases(model, scope, progress)?)),
+        2 => sections.push(Section::new("Demixing", compositions(model, scope, progress)?)),
         _ => {}
     }
     let kts: Vec<String> = scope.kts.iter().map(ToString::to_string).collect();
@@ -56,10 +58,11 @@ pub fn page(model: &Model, scope: &Scope) -> Result<Report, ReportError> {
     })
 }
 
-fn isotherms(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
+fn isotherms(model: &Model, scope: &Scope, progress: &Overall) -> Result<Vec<Item>, ReportError> {
     let species = model.species().len();
     let (mut mean_field, mut correlated, mut highest) = (Vec::new(), Vec::new(), None);
     for kt in scope.kts {
+        progress.advance(1);
         let Some(theory) = theory(model, *kt) else { continue };
         let at = |k: usize| 2.0 * scope.density * k as f64 / DENSITIES as f64;
         let pressure = |rho: f64| theory.pressure(&vec![rho / species as f64; species]);
@@ -116,12 +119,14 @@ fn theory(model: &Model, kt: f64) -> Option<MeanField> {
 /// every temperature.
 fn diagram(
     model: &Model,
+    progress: &Overall,
     top: (f64, f64),
     sides: impl Fn(&MeanField) -> [Option<[f64; 2]>; 2],
     mut interface: impl FnMut(f64, &MeanField),
 ) -> Vec<Series> {
     let mut curves: [[Vec<(f64, f64)>; 2]; 2] = Default::default();
     for kt in below(top.1) {
+        progress.advance(1);
         let Some(theory) = theory(model, kt) else { continue };
         for (curves, found) in curves.iter_mut().zip(sides(&theory)) {
             curves.iter_mut().zip(found.into_iter().flatten()).for_each(|(curve, x)| curve.push((x, kt)));
@@ -133,7 +138,7 @@ fn diagram(
     vec![line("binodal", binodal), Series::new("spinodal", spinodal, Style::Dashed)]
 }
 
-fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
+fn phases(model: &Model, scope: &Scope, progress: &Overall) -> Result<Vec<Item>, ReportError> {
     let critical = match critical_point(&|kt| Ok(model.at(kt)?), scope.range) {
         Ok(critical) => critical,
         Err(error) => return Ok(vec![Item::Prose(format!("{error}."))]),
@@ -144,7 +149,7 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
         let spinodal = theory.spinodal().ok().and_then(|s| s.first().copied());
         [theory.binodal().ok().map(|b| [b.vapour, b.liquid]), spinodal]
     };
-    let mut series = diagram(model, top, sides, |kt, theory| match theory.interface(101) {
+    let mut series = diagram(model, progress, top, sides, |kt, theory| match theory.interface(101) {
         Ok(i) => {
             tension.push((kt, i.tension));
             width.push((kt, i.width));
@@ -184,7 +189,7 @@ fn phases(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
     Ok(items)
 }
 
-fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> {
+fn compositions(model: &Model, scope: &Scope, progress: &Overall) -> Result<Vec<Item>, ReportError> {
     let of = format!("fraction of {}", model.species()[0]);
     let found = composition_critical_point(&|kt| Ok(model.at(kt)?), scope.density, scope.range);
     let critical = match found {
@@ -198,7 +203,7 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
         let spinodal = theory.composition_spinodal(scope.density).ok();
         [phases.ok().map(|phases| phases.composition()), spinodal.and_then(|s| s.first().copied())]
     };
-    let series = diagram(model, (c, critical.parameter), sides, |kt, theory| {
+    let series = diagram(model, progress, (c, critical.parameter), sides, |kt, theory| {
         tension.extend(theory.composition_interface(scope.density, 101).ok().map(|i| (kt, i.tension)));
     });
     let title = format!("Composition diagram at density {}", scope.density);

@@ -7,6 +7,9 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+/// Linux's number for owners that a container does not know.
+const NOBODY: u32 = 65534;
+
 /// The checkout that this program was built in, if it is still there, belongs to the user, and holds the program: an installed
 /// copy has none. A program that psidpd is a part of, such as Python, may lie anywhere.
 pub(super) fn checkout() -> Result<PathBuf, LammpsError> {
@@ -32,33 +35,47 @@ pub(super) fn check_host(host: &Host, base: &Path) -> Result<(), LammpsError> {
     files.chain(&host.library_path).try_for_each(|file| check(file, base))
 }
 
-/// Checks that nobody but the user and the system can change a file, nor the folders from it up to `base`.
+/// Checks that nobody but the user and the system can change a file or the folders from it up to `base`, and that no other user can
+/// put another folder in the place of one above.
 pub(super) fn check(path: &Path, base: &Path) -> Result<(), LammpsError> {
     let me = geteuid().as_raw();
     let real = |path: &Path| path.canonicalize().map_err(PathError::at("find", path));
     let (path, base) = (real(path)?, real(base)?);
     for place in path.ancestors() {
         let about = fs::metadata(place).map_err(PathError::at("find", place))?;
-        // Where every user has a group of its own, it has the user's number.
-        let open_to_group = about.mode() & 0o020 != 0 && about.gid() != about.uid();
-        let why = if place.starts_with(&base) || place == path {
-            match about.uid() {
-                0 => None,
-                uid if uid == me => None,
-                uid => Some(format!("belongs to the user {uid}")),
-            }
-            .or_else(|| {
-                (about.mode() & 0o002 != 0 || open_to_group).then(|| "can be changed by others".into())
-            })
+        let within = place.starts_with(&base) || place == path;
+        let why = if !is_the_users_or_the_systems(about.uid(), me, within) {
+            Some(format!("belongs to the user {}", about.uid()))
         } else {
-            // In a folder above, others could put another in the place of this one.
-            (about.mode() & 0o1002 == 0o002).then(|| "can be changed by others".into())
+            is_open_to_others(&about, within).then(|| "can be changed by others".into())
         };
         if let Some(why) = why {
             return Err(LammpsError::Untrusted { path: place.to_owned(), why });
         }
     }
     Ok(())
+}
+
+fn is_the_users_or_the_systems(owner: u32, me: u32, within: bool) -> bool {
+    // In a container of the user's own, the system's folders belong to nobody's number, as the system's user has none there.
+    owner == 0 || owner == me || (!within && owner == NOBODY && !has_all_users())
+}
+
+fn is_open_to_others(about: &fs::Metadata, within: bool) -> bool {
+    let (mode, foreign_group) = (about.mode(), about.gid() != about.uid());
+    if within {
+        // Where every user has a group of its own, it has the user's number.
+        return mode & 0o002 != 0 || (mode & 0o020 != 0 && foreign_group);
+    }
+    // A folder above may be open if it keeps what belongs to others; the system knows whom it gives its own folders to.
+    let keeps = mode & 0o1000 != 0;
+    !keeps && (mode & 0o002 != 0 || (mode & 0o020 != 0 && foreign_group && about.uid() != 0))
+}
+
+/// Whether this process's user namespace has all users: false in a container that a user started.
+fn has_all_users() -> bool {
+    let map = fs::read_to_string("/proc/self/uid_map").unwrap_or_default();
+    map.split_whitespace().eq(["0", "0", "4294967295"])
 }
 
 #[cfg(test)]
@@ -85,6 +102,29 @@ mod tests {
         for (bits, harmless) in [(0o1777, true), (0o777, false)] {
             mode(folder.path(), bits);
             assert_eq!(check(&file, &base).is_ok(), harmless, "{bits:o}");
+        }
+        // Only the system's user can give folders away.
+        if geteuid().is_root() {
+            for (owner, group, bits, harmless) in [
+                (4321, 0, 0o755, false),
+                (0, 4321, 0o755, true),
+                // The system knows whom it gives its own folders to; a user's folder is open to his group.
+                (0, 4321, 0o775, true),
+                (NOBODY, NOBODY, 0o755, !has_all_users()),
+            ] {
+                std::os::unix::fs::chown(folder.path(), Some(owner), Some(group)).unwrap();
+                mode(folder.path(), bits);
+                assert_eq!(check(&file, &base).is_ok(), harmless, "{owner}:{group} {bits:o}");
+            }
+            for (owner, group, bits, open) in
+                [(1, 1, 0o775, false), (1, 2, 0o775, true), (1, 2, 0o1775, false)]
+            {
+                std::os::unix::fs::chown(folder.path(), Some(owner), Some(group)).unwrap();
+                mode(folder.path(), bits);
+                let about = fs::metadata(folder.path()).unwrap();
+                assert_eq!(is_open_to_others(&about, false), open, "{owner}:{group} {bits:o}");
+            }
+            std::os::unix::fs::chown(folder.path(), Some(0), Some(0)).unwrap();
         }
         mode(folder.path(), 0o700);
         let link = base.join("link");

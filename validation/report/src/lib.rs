@@ -20,7 +20,7 @@ pub use error::ReportError;
 pub use figure::Figure;
 pub use html::{Item, Report, Section};
 pub use plot::{Plot, Series, Style};
-pub use progress::{Bar, Progress, to_stderr};
+pub use progress::{Bar, Overall, Progress, to_stderr};
 pub use results::{Check, Results};
 pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
