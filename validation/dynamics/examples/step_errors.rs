@@ -1,7 +1,8 @@
 //! Errors of steps of random fluids: what a trial says beside what longer runs from other starts have.
 //!
 //! `cargo run --release --workspace --example step_errors FIRST LAST`: the numbers of the fluids, from 1; the number is the seed.
-//! Each line has the verdict first, so `sort -r` puts the worst first. `step_errors MODEL KT RHO DT...` tries steps of a model.
+//! Each line has the verdict first, so `sort -r` puts the worst first. `step_errors MODEL KT RHO...` tries a model, all masses 1, with
+//! the number density of each of its species.
 
 use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;
@@ -47,13 +48,13 @@ impl Draws {
 }
 
 struct Fluid {
-    text: String,
+    model: Model,
     masses: Vec<f64>,
     densities: Vec<f64>,
     kt: f64,
 }
 
-fn fluid(number: u64) -> Fluid {
+fn fluid(number: u64) -> Result<Fluid, Box<dyn std::error::Error>> {
     let mut d = Draws(number);
     let species = 1 + (3.0 * d.uniform()) as usize;
     let names = &["A", "B", "C"][..species];
@@ -119,30 +120,8 @@ fn fluid(number: u64) -> Fluid {
     }
     text += &format!("[[thermostat]]\ngamma = {gamma:.3}\nrange = 1.0\n");
     let sum: f64 = weights.iter().sum();
-    Fluid { text, masses, densities: weights.iter().map(|w| rho * w / sum).collect(), kt }
-}
-
-/// `step_errors MODEL KT RHO DT...` tries steps of a model of one species.
-fn of_model(arguments: &[String]) -> Result<(), Box<dyn std::error::Error>> {
-    let model = Model::open(std::path::Path::new(&arguments[0]))?;
-    let numbers: Vec<f64> = arguments[1..].iter().map(|a| a.parse()).collect::<Result<_, _>>()?;
-    let n = model.species().len();
-    let (masses, densities) = (vec![1.0; n], vec![numbers[1] / n as f64; n]);
-    let of = Composition { model: &model, masses: &masses, kt: numbers[0], densities: &densities, seed: 3 };
-    let piece = Piece::settled(&of)??;
-    println!(
-        "{} w {:.2} mean {:?} drag {:.2} cap {:.4} beta {:.2}",
-        arguments[0],
-        piece.frequency,
-        piece.mean_frequency,
-        piece.drag,
-        piece.cap(),
-        piece.thermal_pressure
-    );
-    for dt in &numbers[2..] {
-        println!("  dt {dt} z {:.2} {:?}", dt * piece.frequency, piece.errors(STEP, *dt)?);
-    }
-    Ok(())
+    let model = Model::parse("f.toml", &text).map_err(|e| format!("{number}: {e}\n{text}"))?;
+    Ok(Fluid { model, masses, densities: weights.iter().map(|w| rho * w / sum).collect(), kt })
 }
 
 /// The temperatures less 1, and the carried pressure in ρkT, of a long run after a time `settle`; `None` where it stops.
@@ -213,51 +192,57 @@ fn verdict(
     (verdict, text)
 }
 
+/// Prints what is estimated for two steps of a fluid, and what long runs have. `number` is the seed.
+fn compare(name: &str, fluid: &Fluid, number: u64) -> Result<(), Box<dyn std::error::Error>> {
+    let Fluid { model, masses, densities, kt } = fluid;
+    let kt = *kt;
+    let of = |seed| Composition { model, masses, kt, densities, seed };
+    let head = format!("{name} {}D masses {masses:.2?}", model.dimensions());
+    let (piece, other) = match (Piece::settled(&of(number))?, Piece::settled(&of(number + 1000))?) {
+        (Ok(piece), Ok(other)) => (piece, other),
+        (Err(why), _) | (_, Err(why)) => {
+            println!("no estimate | {head} {why}");
+            return Ok(());
+        }
+    };
+    let w = piece.frequency;
+    let head = format!("{head} w {w:.2} ({:.2}) k/w {:.2}", other.frequency, piece.drag / w);
+    let advised = piece.longest(STEP)?;
+    if advised.is_none() {
+        println!("no estimate | {head} no step is advised");
+    }
+    // Beyond what is advised errors are large enough to be compared.
+    let longer = 1.3 * advised.map_or(0.6 / w, |(dt, _)| dt);
+    // As long for all: fluids that demix change their pressure on the way.
+    let settle = 600.0 * longer;
+    let reference = long_run(&other, model, kt, (SHORT / w, settle, number + 2000))?;
+    let Some([.., reference]) = reference else {
+        println!("no reference | {head}");
+        return Ok(());
+    };
+    let tried = [advised.map(|(dt, said)| (dt, Some(said))), Some((longer, piece.errors(STEP, longer)?))];
+    for (dt, said) in tried.into_iter().flatten() {
+        let found = long_run(&other, model, kt, (dt, settle, number + 3000))?;
+        let (verdict, text) = verdict(said, found, reference);
+        let estimate = said.map_or("dies".to_owned(), |said| {
+            format!("{:.4} resolves {:.4}", said.worst(), said.resolution())
+        });
+        println!("{verdict} | {head} dt {dt:.4} wdt {:.2} said {estimate} has {text}", w * dt);
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let texts: Vec<String> = std::env::args().skip(1).collect();
-    if texts.first().is_some_and(|first| first.ends_with(".toml")) {
-        return of_model(&texts);
+    if let [path, kt, densities @ ..] = &texts[..]
+        && path.ends_with(".toml")
+    {
+        let model = Model::open(std::path::Path::new(path))?;
+        let densities = densities.iter().map(|a| a.parse()).collect::<Result<Vec<f64>, _>>()?;
+        let masses = vec![1.0; densities.len()];
+        return compare(path, &Fluid { model, masses, densities, kt: kt.parse()? }, 1);
     }
     let arguments: Vec<u64> = texts.iter().map(|a| a.parse()).collect::<Result<_, _>>()?;
     let [first, last] = arguments[..] else { return Err("FIRST LAST".into()) };
-    for number in first..=last {
-        let f = fluid(number);
-        let model = Model::parse("f.toml", &f.text).map_err(|e| format!("{number}: {e}\n{}", f.text))?;
-        let of =
-            |seed| Composition { model: &model, masses: &f.masses, kt: f.kt, densities: &f.densities, seed };
-        let dimensions = model.dimensions();
-        let head = format!("fluid {number} {dimensions}D masses {:.2?}", f.masses);
-        let (piece, other) = match (Piece::settled(&of(number))?, Piece::settled(&of(number + 1000))?) {
-            (Ok(piece), Ok(other)) => (piece, other),
-            (Err(why), _) | (_, Err(why)) => {
-                println!("no estimate | {head} {why}");
-                continue;
-            }
-        };
-        let w = piece.frequency;
-        let head = format!("{head} w {w:.2} ({:.2}) k/w {:.2}", other.frequency, piece.drag / w);
-        let advised = piece.longest(STEP)?;
-        if advised.is_none() {
-            println!("no estimate | {head} no step is advised");
-        }
-        // Beyond what is advised errors are large enough to be compared.
-        let longer = 1.3 * advised.map_or(0.6 / w, |(dt, _)| dt);
-        // As long for all: fluids that demix change their pressure on the way.
-        let settle = 600.0 * longer;
-        let reference = long_run(&other, &model, f.kt, (SHORT / w, settle, number + 2000))?;
-        let Some([.., reference]) = reference else {
-            println!("no reference | {head}");
-            continue;
-        };
-        let tried = [advised.map(|(dt, said)| (dt, Some(said))), Some((longer, piece.errors(STEP, longer)?))];
-        for (dt, said) in tried.into_iter().flatten() {
-            let found = long_run(&other, &model, f.kt, (dt, settle, number + 3000))?;
-            let (verdict, text) = verdict(said, found, reference);
-            let estimate = said.map_or("dies".to_owned(), |said| {
-                format!("{:.4} resolves {:.4}", said.worst(), said.resolution())
-            });
-            println!("{verdict} | {head} wdt {:.2} said {estimate} has {text}", w * dt);
-        }
-    }
-    Ok(())
+    (first..=last).try_for_each(|number| compare(&format!("fluid {number}"), &fluid(number)?, number))
 }

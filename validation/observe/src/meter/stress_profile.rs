@@ -128,12 +128,16 @@ impl Meter for StressProfile {
                 .collect()
         };
         let height = self.across.bin_height();
-        let upto = |row: &[f64], bins: usize| -> f64 {
-            row.chunks_exact(WIDTH).take(bins).map(|p| height * (p[0] + p[2] - p[1] - p[3])).sum()
-        };
-        // The integral goes up to the middle of each bin.
-        let integral = (0..self.across.bins)
-            .map(|bin| self.series.linear(|row| 0.5 * (upto(row, bin) + upto(row, bin + 1))));
+        let of_bin = |p: &[f64]| height * (p[0] + p[2] - p[1] - p[3]);
+        // The integral of each sample, which goes up to the middle of each bin.
+        let mut below = vec![0.0; self.series.len()];
+        let integral = (0..self.across.bins).map(|bin| {
+            let middles = self.series.rows().zip(&mut below).map(|(row, below)| {
+                let above = *below + of_bin(&row[bin * WIDTH..(bin + 1) * WIDTH]);
+                0.5 * (std::mem::replace(below, above) + above)
+            });
+            Measured::mean(&middles.collect::<Vec<_>>())
+        });
         let unit = "energy/volume";
         let profile =
             Observation::new("stress_profile", "Pressure tensor profile", Kind::Profile, &self.series)
@@ -146,7 +150,11 @@ impl Meter for StressProfile {
                 .note(self.across.note());
         let whole =
             Observation::new("stress_profile_integral", "Integral of P_N − P_T", Kind::Scalar, &self.series)
-                .column("integral", "energy/area", [self.series.linear(|row| upto(row, self.across.bins))]);
+                .column(
+                    "integral",
+                    "energy/area",
+                    [self.series.linear(|row| row.chunks_exact(WIDTH).map(of_bin).sum())],
+                );
         vec![profile, whole]
     }
 }
