@@ -46,7 +46,9 @@ pub(super) const BINS: Key = key(
 pub(super) const RECENTRE: Key = key(
     "recentre",
     ValueKind::Words("true, false, or the name of a species"),
-    Need::Default("true if the scene starts from a slab normal to the axis, else false"),
+    Need::Default(
+        "true if the scene starts from a slab normal to the axis, the species of the first layer if layers of several liquids fill the box, else false",
+    ),
     "Whether each sample is shifted so that the centre of mass of all particles, or of those of one species, taken on \
             the circle, is at 0: a slab that drifts, or a layer in a mixture that fills the box, is not smeared then.",
     "true",

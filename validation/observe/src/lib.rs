@@ -29,7 +29,7 @@ pub use error::ObserveError;
 pub use flux::Recorded;
 pub use observation::{Abscissa, Column, Kind, Observation};
 pub use observers::Observers;
-pub use options::{Drive, Place};
+pub use options::{Centre, Drive, Place, Slab};
 pub use profile::{ProfileAccumulator, interface_width};
 pub use request::{Observe, Request, read};
 pub use series::{Measured, Series};

@@ -3,6 +3,7 @@
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
+use serde::{Deserialize, Serialize};
 
 /// The names of the faces of a box: axis, and whether the face is the upper one.
 pub const FACES: [(&str, (usize, bool)); 6] = [
@@ -24,10 +25,29 @@ pub struct Place<'a> {
     pub stages: &'a [&'a str],
     /// Those of the stages whose steps take no time.
     pub timeless: Vec<&'a str>,
-    /// The normal of the slab in the initial state.
-    pub slab: Option<usize>,
+    pub slab: Option<Slab>,
     /// The body force of two opposite flows, if the scene has one.
     pub drive: Option<Drive>,
+}
+
+/// The point that is moved to the middle of the profile in each sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Centre {
+    /// No point is moved: positions are those of the box.
+    Box,
+    /// The centre of mass of all particles.
+    All,
+    /// The centre of mass of one species.
+    Species(i32),
+}
+
+/// A slab in the initial state, or layers of several liquids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slab {
+    /// Its normal.
+    pub axis: usize,
+    /// What has a centre along the normal: of all particles there is none where layers fill the box.
+    pub centre: Centre,
 }
 
 /// The body force of two opposite flows.

@@ -1,4 +1,4 @@
-use super::run::{at_least, threads_at_once};
+use super::run::{at_least, between, threads_at_once};
 use super::*;
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
@@ -19,8 +19,8 @@ pub struct Arguments {
     #[arg(long, value_name = "LOW:HIGH", default_value = "3:10", value_parser = range)]
     density: [f64; 2],
     /// How many densities are run.
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    points: u16,
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = between(1, 1000))]
+    points: u32,
     /// Shares of the species; equal ones if left out.
     #[arg(long, value_name = "X", value_delimiter = ',')]
     composition: Vec<f64>,
@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     }
     let options = Options {
         kt: a.kt,
-        densities: spaced(a.density[0], a.density[1], usize::from(a.points)),
+        densities: spaced(a.density[0], a.density[1], a.points as usize),
         composition: shares.iter().map(|share| share / sum).collect(),
         name: a.name.clone(),
         tolerance: a.tolerance,

@@ -100,6 +100,14 @@ pub fn at_least(least: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
     }
 }
 
+/// The reader of a whole number from `least` to `most`.
+pub fn between(least: u32, most: u32) -> impl Fn(&str) -> Result<u32, String> + Clone {
+    move |text| match text.parse::<u32>() {
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        _ => Err(format!("must be a whole number from {least} to {most}")),
+    }
+}
+
 /// The content of the file of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {

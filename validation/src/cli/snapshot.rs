@@ -1,3 +1,4 @@
+use super::run::between;
 use super::*;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
@@ -42,8 +43,8 @@ pub struct Arguments {
     #[arg(long = "kT", value_name = "T", allow_negative_numbers = true, value_parser = temperature)]
     kt: Option<f64>,
     /// The largest number of frames in a film; from a longer trajectory, frames are taken at even intervals.
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=1000))]
-    frames: u16,
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = between(2, 1000))]
+    frames: u32,
     /// The weighted local density in a plane through the middle of the box, instead of particles.
     #[arg(long)]
     density: bool,
@@ -54,7 +55,7 @@ pub struct Arguments {
     #[arg(long, value_name = "LENGTH", requires = "density")]
     range: Option<f64>,
     /// Largest width and height in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = clap::value_parser!(u32).range(16..=8192))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = between(16, 8192))]
     size: u32,
 }
 
@@ -117,7 +118,7 @@ pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
     };
     if kind == "gif" {
         let last = Configuration::count(&a.file)?.saturating_sub(1);
-        let most = usize::from(a.frames).min(last + 1);
+        let most = (a.frames as usize).min(last + 1);
         // The last frame is always chosen.
         let chosen = (0..most).map(|k| (k * last) / (most - 1).max(1));
         let frames = chosen.map(|k| open(Some(k))).collect::<Result<Vec<_>, _>>()?;

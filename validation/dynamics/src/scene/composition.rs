@@ -34,6 +34,11 @@ impl Composition {
         Ok(Composition(fractions))
     }
 
+    /// The most frequent species.
+    pub fn main(&self) -> usize {
+        (0..self.0.len()).max_by(|a, b| self.0[*a].total_cmp(&self.0[*b])).unwrap_or(0)
+    }
+
     /// Divides `count` particles among the species: whole numbers that add up to `count`, each less than one
     /// from its exact share.
     pub fn share(&self, count: usize) -> Vec<usize> {

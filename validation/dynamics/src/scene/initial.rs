@@ -8,6 +8,7 @@ use super::{
 use crate::checkpoint;
 use nalgebra::{Matrix3, Vector3};
 use psidpd_formats::data::DataFile;
+use psidpd_observe::{Centre, Slab};
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
@@ -40,9 +41,21 @@ impl Initial {
         }
     }
 
-    /// The normal of the first slab that is not frozen, if there is one.
-    pub fn slab_axis(&self) -> Option<usize> {
-        self.parts().iter().filter(|part| !part.frozen).find_map(|part| part.normal)
+    /// The first slab that is not frozen, if there is one, with what has a centre along its normal.
+    pub fn slab(&self, domain: &PeriodicBox, dimensions: usize) -> Option<Slab> {
+        /// Parts that fill more of the box leave all particles without a centre.
+        const FILLED: f64 = 0.9;
+        let mobile = || self.parts().iter().filter(|part| !part.frozen);
+        let axis = mobile().find_map(|part| part.normal)?;
+        let filled: f64 = self.parts().iter().map(|part| part.shape.volume(dimensions)).sum();
+        let mut species = mobile().map(|part| part.composition.main());
+        let first = species.next()?;
+        let centre = match filled > FILLED * domain.volume(dimensions) {
+            false => Centre::All,
+            true if species.any(|other| other != first) => Centre::Species(first as i32),
+            true => Centre::Box,
+        };
+        Some(Slab { axis, centre })
     }
 
     /// The tags of the particles in the parts for which `wanted` holds.

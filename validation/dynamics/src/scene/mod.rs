@@ -138,7 +138,7 @@ impl Scene {
         let drive = body_forces.iter().find_map(BodyForce::drive);
         let names: Vec<&str> = stages.iter().map(|s| s.name.as_str()).collect();
         let timeless = stages.iter().filter(|s| !s.integrator.has_time()).map(|s| s.name.as_str()).collect();
-        let (fluid, slab) = (&model.at(kt)?, initial.slab_axis());
+        let (fluid, slab) = (&model.at(kt)?, initial.slab(&domain, model.dimensions()));
         let place = Place { fluid, domain: &domain, stages: &names, timeless, slab, drive };
         let observe = observe::read(&root, &place)?;
         let scene = Scene {

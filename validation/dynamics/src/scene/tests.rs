@@ -1,5 +1,6 @@
 use super::*;
 use psidpd_core::document::FileError;
+use psidpd_observe::{Centre, Slab};
 
 const MIXTURE: &str = r#"
 title = "ideal mixture"
@@ -176,6 +177,35 @@ fn slabs_and_lattices_are_where_they_should_be() {
         .fold(f64::INFINITY, f64::min);
     let ideal = (210.0f64 / 500.0).cbrt();
     assert!(nearest > 0.85 * ideal, "{nearest} against {ideal}");
+}
+
+/// Of particles that fill the box there is no centre: profiles of layers are centred on the first liquid.
+#[test]
+fn slabs_have_the_centre_that_their_liquids_have() {
+    let start = SCENE.find("[initial]").unwrap();
+    let end = SCENE.find("[[stage]]").unwrap();
+    let slab = |parts: &str| {
+        let scene = parse(&format!("density = 3.0\n{}{parts}{}", &SCENE[..start], &SCENE[end..]));
+        let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+        scene.initial.slab(&scene.domain, 3)
+    };
+    let layer = |name: &str, at: f64, species: &str| {
+        format!(
+            "[[part]]\nname = \"{name}\"\nshape = \"slab\"\nat = {at}\nthickness = 3.5\nspecies = \"{species}\"\n"
+        )
+    };
+    let rest = |species: &str| format!("[[part]]\nname = \"r\"\nshape = \"rest\"\nspecies = \"{species}\"\n");
+    let of = |centre| Some(Slab { axis: 2, centre });
+    let liquid = layer("one", 1.75, "B");
+    for (parts, expected) in [
+        (liquid.clone(), of(Centre::All)),
+        (format!("{liquid}{}", layer("two", 5.25, "A")), of(Centre::Species(1))),
+        (format!("{liquid}{}", rest("A")), of(Centre::Species(1))),
+        (format!("{liquid}{}", rest("B")), of(Centre::Box)),
+        (rest("B"), None),
+    ] {
+        assert_eq!(slab(&parts), expected, "{parts}");
+    }
 }
 
 #[test]

@@ -69,7 +69,8 @@ pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Resul
     let text = format!("[observe]\n{forces}rdf = {{ bins = 100 }}\n{motion}");
     let document = Document::parse("pareto", &text)?;
     let names = [stage.name.as_str()];
-    let (fluid, slab) = (&scene.model.at(stage.kt)?, scene.initial.slab_axis());
+    let (fluid, slab) =
+        (&scene.model.at(stage.kt)?, scene.initial.slab(&scene.domain, scene.model.dimensions()));
     let timeless = Vec::new();
     let place = Place { fluid, domain: &scene.domain, stages: &names, timeless, slab, drive: None };
     let mut found = read(&document.root(), &place)?;

@@ -2,18 +2,8 @@
 
 use super::{Deserialize, FileError, Options, PeriodicBox, Serialize};
 use crate::frame::View;
+use crate::options::Centre;
 use crate::profile::centre;
-
-/// The point that is moved to the middle of the profile in each sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Centre {
-    /// No point is moved: positions are those of the box.
-    Box,
-    /// The centre of mass of all particles.
-    All,
-    /// The centre of mass of one species.
-    Species(i32),
-}
 
 /// Bins along one direction of the box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,15 +23,18 @@ impl Across {
     /// Reads the bins of an observable; `centred` is true if its samples are always recentred.
     pub fn read(options: &Options, centred: bool) -> Result<Across, FileError> {
         let mut across = Across::read_along(options, options.axis("axis")?)?;
-        let preset = across.periodic && options.place.slab == Some(across.axis);
+        let slab = options.place.slab.filter(|slab| across.periodic && slab.axis == across.axis);
+        let preset = slab.map_or(Centre::Box, |slab| slab.centre);
         across.centre = if centred {
             Centre::All
         } else if let Some(species) = options.as_species("recentre")? {
             Centre::Species(species as i32)
-        } else if options.flag("recentre")?.unwrap_or(preset) {
-            Centre::All
         } else {
-            Centre::Box
+            match options.flag("recentre")? {
+                None => preset,
+                Some(true) => Centre::All,
+                Some(false) => Centre::Box,
+            }
         };
         if across.centre != Centre::Box && !across.periodic {
             return Err(options.error("recentre", "the box is not periodic along the axis"));
@@ -52,7 +45,8 @@ impl Across {
     /// Reads bins that are never recentred. They lie along `axis`, else along the normal of the initial slab, else along the
     /// last direction.
     pub fn read_along(options: &Options, axis: Option<usize>) -> Result<Across, FileError> {
-        let axis = axis.or(options.place.slab).unwrap_or(options.place.fluid.dimensions - 1);
+        let axis =
+            axis.or(options.place.slab.map(|slab| slab.axis)).unwrap_or(options.place.fluid.dimensions - 1);
         let across = Across::at(options, axis);
         Ok(Across { bins: options.bins(across.height, 0.1, 1)?, ..across })
     }

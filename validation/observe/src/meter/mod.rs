@@ -13,6 +13,7 @@ mod interface_width;
 pub(crate) mod linked;
 mod local_density;
 mod msd;
+mod peak;
 mod pendant;
 mod poiseuille;
 mod pressure;

@@ -234,7 +234,8 @@ impl Quantity for Temperature {
         path: "temperature_profile",
         title: "temperature along an axis",
         about: "Kinetic kT in slices of the box, about the mean flow of the slice: \
-                (⟨Σ m v²⟩ − ⟨Σ m v⟩²/⟨Σ m⟩)/(d ⟨n⟩). Jackknife errors.",
+                (⟨Σ m v²⟩ − ⟨Σ m v⟩²/⟨Σ m⟩)/(d ⟨n⟩), and their `temperature_profile_mean` over all particles that move. \
+                Jackknife errors.",
         keys: KEYS,
         ..PLAIN
     };
@@ -242,17 +243,38 @@ impl Quantity for Temperature {
     const MOMENTS: bool = true;
 
     fn columns(Profile(bins, _): &Profile<Self>) -> Observation {
-        let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
-        let temperature = bins.series.jackknife(|means| {
-            let of = |at: &[f64]| {
-                let flow: f64 = at[count + 1..count + 1 + d].iter().map(|p| p * p).sum::<f64>() / at[count];
-                (at[count + 1 + d] - flow) / (d as f64 * at[count + 2 + d])
-            };
-            Some(means.chunks_exact(width).map(of).collect())
-        });
+        let temperature = bins
+            .series
+            .jackknife(|means| Some(heat(bins, means).map(|[heat, freedom]| heat / freedom).collect()));
         let out = bins.observation("temperature_profile", "Temperature profile");
         out.column("temperature", "energy", temperature)
     }
+
+    fn scalars(Profile(bins, _): &Profile<Self>) -> Vec<Observation> {
+        let mean = bins.series.jackknife(|means| {
+            let [heat, freedom] = heat(bins, means)
+                // A bin that is empty has neither.
+                .filter(|of| of[1] > 0.0)
+                .fold([0.0; 2], |[a, b], of| [a + of[0], b + of[1]]);
+            Some(vec![heat / freedom])
+        });
+        let out = Observation::new(
+            "temperature_profile_mean",
+            "Temperature without flow",
+            Kind::Scalar,
+            &bins.series,
+        );
+        vec![out.column("mean", "energy", mean)]
+    }
+}
+
+/// Twice the kinetic energy of each bin about its mean flow, and its degrees of freedom.
+fn heat<'a>(bins: &Bins, means: &'a [f64]) -> impl Iterator<Item = [f64; 2]> + 'a {
+    let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
+    means.chunks_exact(width).map(move |at| {
+        let flow: f64 = at[count + 1..count + 1 + d].iter().map(|p| p * p).sum::<f64>() / at[count];
+        [at[count + 1 + d] - flow, d as f64 * at[count + 2 + d]]
+    })
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -262,7 +284,8 @@ impl Quantity for Velocity {
     const TABLE: Table = Table {
         path: "velocity_profile",
         title: "flow velocity along an axis",
-        about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on.",
+        about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on. `velocity_profile_mean` is that of all \
+                particles that move: `x` and so on.",
         keys: KEYS,
         ..PLAIN
     };
@@ -279,6 +302,18 @@ impl Quantity for Velocity {
             out = out.column(&format!("velocity_{name}"), "r_c/time", velocity);
         }
         out
+    }
+
+    fn scalars(Profile(bins, _): &Profile<Self>) -> Vec<Observation> {
+        let (width, count) = (bins.width(), bins.species.len());
+        let sum = |row: &[f64], k: usize| row.chunks_exact(width).map(|at| at[k]).sum::<f64>();
+        let mut out =
+            Observation::new("velocity_profile_mean", "Mean flow velocity", Kind::Scalar, &bins.series);
+        for (c, name) in ["x", "y", "z"].iter().enumerate().take(bins.dimensions) {
+            let mean = bins.series.ratio(|row| sum(row, count + 1 + c), |row| sum(row, count));
+            out = out.column(name, "r_c/time", [mean]);
+        }
+        vec![out]
     }
 }
 

@@ -1,4 +1,5 @@
 use super::distances::{Shells, count};
+use super::peak::peak;
 use super::species_pairs::SpeciesPairs;
 use super::*;
 use std::f64::consts::PI;
@@ -26,7 +27,8 @@ impl Meter for Rdf {
         title: "radial distribution functions",
         about: "Pairs in spherical shells (in two dimensions rings) over their number in an ideal gas of as many \
                 particles in the same box, N_A (N_A − 1)/2 or N_A N_B pairs in V: exactly 1 on average in an ideal \
-                gas. `g` of all particles, and `g_A_B` of each two of several species.",
+                gas. `g` of all particles, and `g_A_B` of each two of several species. `rdf_peak` is the highest point \
+                of `g`, by a parabola: its `height`, and the distance that it is `at`.",
         keys: keys! {
             "range": ValueKind::Words("positive number, at most half the box"), Need::Default("three times the range of the model, or half the box"),
                 "Up to which distance."
@@ -78,12 +80,13 @@ impl Meter for Rdf {
 
     fn finish(&self) -> Vec<Observation> {
         let width = self.range / self.bins as f64;
-        let middles = (0..self.bins).map(|b| (b as f64 + 0.5) * width).collect();
+        let middles: Vec<f64> = (0..self.bins).map(|b| (b as f64 + 0.5) * width).collect();
+        let peak = peak("rdf_peak", "Highest point of g", "length", &middles, &self.series);
         let mut out = Observation::new("rdf", "Radial distribution function", Kind::Curve, &self.series)
             .against("r", "length", middles);
         for (k, name) in self.pairs.names("g").iter().enumerate() {
             out = out.column(name, "1", (0..self.bins).map(|b| self.series.mean(k * self.bins + b)));
         }
-        vec![out]
+        [out].into_iter().chain(peak).collect()
     }
 }

@@ -1,3 +1,4 @@
+use super::peak::peak;
 use super::species_pairs::SpeciesPairs;
 use super::waves::waves;
 use super::*;
@@ -35,7 +36,8 @@ impl Meter for StructureFactor {
         about: "Direct sums over the wave vectors of the periodic box, averaged over shells of about equal |k|: `s` \
                 = ⟨|Σ exp(ik·r)|²⟩/N of all particles, and of each two of several species `s_A_B` = \
                 ⟨Re ρ_A(k) ρ_B(−k)⟩/√(N_A N_B) (Ashcroft and Langreth). Shells with many vectors keep an even \
-                choice of them, one of each ±k. The box must be periodic.",
+                choice of them, one of each ±k. The box must be periodic. `structure_factor_peak` is the highest point of \
+                `s`, by a parabola: its `height`, and the |k| that it is `at`.",
         keys: keys! {
             "range": ValueKind::Words("positive number"), Need::Default("20, or less in a large box"),
                 "The largest |k|."
@@ -153,6 +155,7 @@ impl Meter for StructureFactor {
         for (p, name) in self.pairs.names("s").iter().enumerate() {
             out = out.column(name, "1", (0..shells).map(|b| self.series.mean(p * shells + b)));
         }
-        vec![out]
+        let peak = peak("structure_factor_peak", "Highest point of S", "1/r_c", &self.lengths, &self.series);
+        [out].into_iter().chain(peak).collect()
     }
 }

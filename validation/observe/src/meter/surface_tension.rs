@@ -65,7 +65,8 @@ impl Meter for SurfaceTension {
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
         let place = options.place;
-        let axis = options.axis("axis")?.or(place.slab).unwrap_or(place.fluid.dimensions - 1);
+        let axis =
+            options.axis("axis")?.or(place.slab.map(|slab| slab.axis)).unwrap_or(place.fluid.dimensions - 1);
         options.require_right_angles("axis")?;
         if !place.fluid.is_conservative() {
             return Err(options.error("", "a force of the model has no potential: there is no free energy"));

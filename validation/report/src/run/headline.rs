@@ -102,7 +102,12 @@ pub fn gather(
             Err(_) => Some((values.iter().sum::<f64>() / values.len() as f64, None, source)),
         }
     };
-    add("temperature", "energy", scalar(&[("temperature", "kinetic")]).or_else(|| from_rows("temperature")));
+    // A flow that body forces drive is no heat.
+    let driven = stage.is_some_and(|s| s.body_forces);
+    let without_flow = driven.then(|| scalar(&[(WITHOUT_FLOW, "mean")])).flatten();
+    let whole = || scalar(&[("temperature", "kinetic")]).or_else(|| from_rows("temperature"));
+    let has_flow = driven && without_flow.is_none();
+    add("temperature", "energy", without_flow.or_else(whole));
     add("pressure", &energy_density, scalar(&[("pressure", "carried")]).or_else(|| from_rows("pressure")));
     let both = |c| [("interface_width", c), ("drop", c)];
     let liquid = ["interface_width", "drop", "pendant", "contact_angle"].map(|name| (name, "liquid"));
@@ -119,7 +124,9 @@ pub fn gather(
     add("radius", "length", scalar(&[("drop", "radius")]));
     add("contact_angle", "degree", scalar(&[("contact_angle", "angle")]));
     add("viscosity", &of_viscosity, scalar(&[("poiseuille", "viscosity"), ("viscosity", "viscosity")]));
-    for (name, observable, column) in others(observables.iter().filter(of_stage)) {
+    let others = others(observables.iter().filter(of_stage));
+    for (name, observable, column) in others.into_iter().filter(|(_, o, _)| !driven || o.name != WITHOUT_FLOW)
+    {
         let source = format!("{}.{}", observable.name, column.name);
         let value = observable.scalar(&column.name).map(|found| (found.value, Some(found.error), source));
         add(&name, &of_lengths(&column.unit, d), value);
@@ -172,7 +179,7 @@ pub fn gather(
         && (t.value - s.kt).abs() > (4.0 * error).max(0.01 * s.kt)
     {
         // A flow that body forces drive counts as heat, at any time step.
-        let because = match s.body_forces {
+        let because = match has_flow {
             true => "it includes the flow that the body forces drive; `temperature_profile` in [observe] leaves the flow out".into(),
             false => format!("a smaller time step than {} brings it nearer", s.dt),
         };
@@ -189,8 +196,11 @@ pub fn gather(
     all
 }
 
-/// Scalars that have no name of their own among the results: all coexisting compositions and diffusion coefficients, and the
-/// first number of any other observable.
+/// The temperature about the mean flow of slices.
+const WITHOUT_FLOW: &str = "temperature_profile_mean";
+
+/// Scalars that have no name of their own among the results: all coexisting compositions, diffusion coefficients, mean flows and
+/// peaks, and the first number of any other observable.
 fn others<'a>(all: impl Iterator<Item = &'a Observation>) -> Vec<(String, &'a Observation, &'a Column)> {
     const NAMED: [&str; 8] = [
         "temperature",
@@ -206,9 +216,10 @@ fn others<'a>(all: impl Iterator<Item = &'a Observation>) -> Vec<(String, &'a Ob
         all.filter(|o| o.kind == Kind::Scalar && o.x.is_none() && !NAMED.contains(&o.name.as_str()));
     let mut found = Vec::new();
     for observable in scalars {
-        let whole = ["coexistence", "diffusion"].contains(&observable.name.as_str());
+        let plain = ["coexistence", "diffusion"].contains(&observable.name.as_str());
+        let whole = plain || observable.name == "velocity_profile_mean" || observable.name.ends_with("_peak");
         for column in observable.columns.iter().take(if whole { usize::MAX } else { 1 }) {
-            let name = match whole {
+            let name = match plain {
                 true => column.name.clone(),
                 // `stress_profile_integral` has the column `integral`.
                 false if observable.name.ends_with(&column.name) => observable.name.clone(),
@@ -389,6 +400,8 @@ mod tests {
                 "diffusion",
                 &[("diffusion_oil", "r_c^2/time", Some(0.3)), ("diffusion_water", "r_c^2/time", None)],
             ),
+            observed("rdf_peak", &[("height", "1", Some(2.1)), ("at", "length", Some(0.8))]),
+            observed("velocity_profile_mean", &[("x", "r_c/time", Some(0.5)), ("y", "r_c/time", Some(0.1))]),
             observed("clusters", &[("count", "1", Some(3.0)), ("largest", "1", Some(40.0))]),
             observed("contact_angle", &[("angle", "degree", Some(100.0)), ("liquid", "1/volume", Some(6.0))]),
             observed("interface_width", &[("liquid", "1/volume", None)]),
@@ -409,6 +422,10 @@ mod tests {
                     ("rich_oil", 0.9, "1"),
                     ("poor_oil", 0.2, "1"),
                     ("diffusion_oil", 0.3, "length^2/time"),
+                    ("rdf_peak_height", 2.1, "1"),
+                    ("rdf_peak_at", 0.8, "length"),
+                    ("velocity_profile_mean_x", 0.5, "length/time"),
+                    ("velocity_profile_mean_y", 0.1, "length/time"),
                     ("clusters_count", 3.0, "1"),
                 ]
             );
@@ -430,6 +447,24 @@ mod tests {
             let temperature: Vec<&String> =
                 notes.iter().filter(|n| n.starts_with("the temperature is")).collect();
             assert!(temperature.len() == 1 && temperature[0].contains(says), "{notes:?}");
+        }
+        // Without the flow the temperature is that of the profile, and what is off then is the step's.
+        let profile = |value: f64| -> Observation {
+            let column =
+                serde_json::json!({"name": "mean", "unit": "energy", "values": [value], "errors": [0.002]});
+            let all = serde_json::json!({"name": WITHOUT_FLOW, "kind": "scalar", "columns": [column]});
+            serde_json::from_value(all).unwrap()
+        };
+        let kt = about.stages.last().unwrap().kt;
+        for (value, says) in [(kt, None), (1.2 * kt, Some("a smaller time step"))] {
+            let found = gather(Some(&about), None, Some(&hot), &[profile(value)]);
+            assert_eq!(found.values.iter().filter(|v| v.unit == "energy").count(), 1, "{found:?}");
+            assert_eq!(found.get("temperature").unwrap().value, value);
+            let said = found.notes.iter().find(|n| n.starts_with("the temperature is"));
+            assert!(
+                said.is_some() == says.is_some() && said.is_none_or(|n| n.contains(says.unwrap())),
+                "{said:?}"
+            );
         }
     }
 
