@@ -21,7 +21,7 @@ pub struct Correlations<'a> {
     measure: Vec<f64>,
     /// Transforms `ŵ` and `ŵ + kŵ′/d` of each density.
     kernels: Vec<[Vec<f64>; 2]>,
-    /// The same transforms of the sum of all pair potentials.
+    /// The Fourier transforms of the sum of all pair potentials.
     pairs: [Vec<f64>; 2],
 }
 

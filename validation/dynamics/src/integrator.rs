@@ -31,7 +31,7 @@ pub enum Integrator {
     SelfConsistent { noise: Law },
     /// Pair by pair, half explicit and half implicit; then velocity Verlet.
     ShardlowS1 { noise: Law },
-    /// The same by halves, before and after.
+    /// [`Integrator::ShardlowS1`] by halves: pairs for half a step before velocity Verlet, and for half a step after it.
     ShardlowS2 { noise: Law },
     /// Velocity Verlet, then the Ornstein–Uhlenbeck process of each pair.
     Peters { noise: Law },
@@ -47,7 +47,7 @@ pub enum Integrator {
         lambda: f64,
         coupling: Coupling,
     },
-    /// The same, its middle kick by forces at displaced positions.
+    /// Two-stage steps whose middle kick is by forces at displaced positions.
     ForceGradient {
         /// Share of a step in the first kick and in the last.
         lambda: f64,
@@ -88,9 +88,9 @@ impl Coupling {
 /// What is known of an integrator's errors, for estimates; `docs/integrators.md` has the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Of the temperature of configurations, relative: `a` and `b` of `a (ωΔt)⁴ + b κΔt`.
+    /// The relative error of the configurational temperature: `a` and `b` of `a (ωΔt)⁴ + b κΔt`.
     pub temperature: [f64; 2],
-    /// Of the pressure of the momentum flux, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
+    /// The error of the pressure of the momentum flux, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
     pub pressure: [f64; 3],
 }
 
@@ -166,7 +166,7 @@ impl Integrator {
         ("monte-carlo", Integrator::MonteCarlo { sweeps: 1, max_move: None }),
     ];
 
-    /// Those with a time step.
+    /// The integrators with a time step.
     pub const ALL: [(&str, Integrator); 12] = {
         let [timed @ .., _] = Integrator::NAMED;
         timed

@@ -43,7 +43,7 @@ pub const DPD: Subject = Subject {
     dt: 0.04,
 };
 
-/// The same fluid as a pair style of LAMMPS's own.
+/// The fluid of standard DPD as a pair style of LAMMPS's own.
 pub const DPD_PAIR: PairStyle = PairStyle::Dpd { a: 25.0, gamma: 4.5, rc: 1.0 };
 
 /// The fluid of LAMMPS's `dpd` with these coefficients; a term whose coefficient is 0 is left out.
@@ -92,7 +92,7 @@ impl Subject {
 /// One of Warren's parameter sets, with what he measured at kT = 1 (Phys. Rev. E 68, 066702, Table 2).
 #[derive(Debug, Clone, Copy)]
 pub struct WarrenSet {
-    /// Its name in the paper.
+    /// The name of the parameter set in the paper.
     pub name: &'static str,
     /// The fluid as it is shipped, at the density of the liquid in equilibrium with its vapour.
     pub fluid: Subject,
@@ -140,7 +140,7 @@ impl WarrenSet {
         [[self.fluid.density, self.liquid_error], self.tension, self.width]
     }
 
-    /// Its name in files.
+    /// The name of the parameter set in files.
     pub fn slug(&self) -> String {
         self.name.replace(' ', "")
     }

@@ -31,7 +31,7 @@ pub fn each<I: Send, T: Send>(items: Vec<I>, work: impl Fn(I) -> T + Sync) -> Ve
     on(workers.min(items.len()), items.into_iter().enumerate().rev(), work)
 }
 
-/// The same with a bar of the items that are done.
+/// Works through items as [`each`] does, with a bar of those that are done.
 pub fn counted<I: Send, T: Send>(
     (progress, name): (&Progress, &str),
     items: Vec<I>,

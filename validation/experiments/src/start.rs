@@ -71,7 +71,7 @@ pub fn random(subject: &Subject, filling: Filling, seed: u64) -> Result<State, E
     Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })
 }
 
-/// The same brought to equilibrium by `steps` steps with the thermostat on, after 100 short ones.
+/// A fluid brought to equilibrium by `steps` steps with the thermostat on, after 100 short ones.
 pub fn equilibrated(
     precision: Precision,
     subject: &Subject,
@@ -94,9 +94,9 @@ pub fn equilibrated(
 #[derive(Debug, Clone)]
 pub struct Start {
     pub state: State,
-    /// As `atom_style atomic`.
+    /// The data file for `atom_style atomic`.
     pub data: PathBuf,
-    /// As `atom_style mdpd`.
+    /// The data file for `atom_style mdpd`.
     pub data_mdpd: PathBuf,
 }
 

@@ -23,7 +23,7 @@ pub struct Place<'a> {
     pub domain: &'a PeriodicBox,
     /// The names of all stages.
     pub stages: &'a [&'a str],
-    /// Those of the stages whose steps take no time.
+    /// The names of the stages whose steps take no time.
     pub timeless: Vec<&'a str>,
     pub slab: Option<Slab>,
     /// The body force of two opposite flows, if the scene has one.
@@ -44,7 +44,7 @@ pub enum Centre {
 /// A slab in the initial state, or layers of several liquids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slab {
-    /// Its normal.
+    /// The normal of the slab.
     pub axis: usize,
     /// What has a centre along the normal: of all particles there is none where layers fill the box.
     pub centre: Centre,

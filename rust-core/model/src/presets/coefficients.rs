@@ -48,9 +48,9 @@ pub enum PresetError {
     NoPotential {
         /// The coefficient: `B`, or its product with a power of `rd`.
         name: &'static str,
-        /// Its value for one pair.
+        /// The value of the coefficient for one pair.
         first: f64,
-        /// Its value for another pair.
+        /// The value of the coefficient for another pair.
         second: f64,
         /// The text of the model file that comes nearest.
         nearest: String,

@@ -24,7 +24,7 @@ impl Listed {
 pub struct FromForces {
     /// A number that no other thermostat has.
     pub asker: u64,
-    /// Those that an engine has listed, for a search that follows.
+    /// The pairs that an engine has listed, for a search that follows.
     pub listed: Option<Listed>,
     /// Whether the present pairs are of the forces.
     pub are_present: bool,

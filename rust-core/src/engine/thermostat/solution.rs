@@ -6,7 +6,7 @@ use super::pass::Wide;
 /// temperature is below 0.1 % (see `the_temperature_is_right`).
 pub const TOLERANCE: f64 = 2e-2;
 
-/// The same for drag alone, where no noise makes up for a residual.
+/// The largest relative residual for drag alone, where no noise makes up for a residual.
 pub const TOLERANCE_OF_DRAG: f64 = 1e-4;
 
 /// Least relative residual, which rounding errors leave. With drag so strong that it should be less, the solution is inaccurate.

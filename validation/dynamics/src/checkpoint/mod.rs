@@ -125,7 +125,7 @@ mod shared {
 pub struct BeforeEnd {
     pub sums: Sums,
     pub last: Option<Thermo>,
-    /// Of the file of rows, if there is one.
+    /// What is written of the file of rows, if there is one.
     pub rows: Option<Written>,
 }
 

@@ -30,9 +30,9 @@ const VAGUE: f64 = 0.03;
 /// What steps of one kind have, less what a step without error has.
 #[derive(Debug, Clone, Copy)]
 pub struct StepErrors {
-    /// Of the kinetic temperature, in kT.
+    /// The error of the kinetic temperature, in kT.
     pub kinetic: Measured,
-    /// Of the configurational temperature, in kT.
+    /// The error of the configurational temperature, in kT.
     pub configurational: Option<Measured>,
     /// The thermal pressure `∂p/∂kT / ρ` of the fluid.
     pub thermal_pressure: f64,
@@ -50,7 +50,7 @@ impl StepErrors {
         self.kinetic.value.abs().max(self.told().unwrap_or(0.0))
     }
 
-    /// Of the pressure of the momentum flux, in ρkT. The heat that a step adds presses like heat; half of an error of
+    /// The error of the pressure of the momentum flux, in ρkT. The heat that a step adds presses like heat; half of an error of
     /// the configurations alone does, over fluids and steps of `docs/force-gradient.md`.
     pub fn carried(&self) -> f64 {
         self.thermal_pressure * self.kinetic.value.abs().max(0.5 * self.told().unwrap_or(0.0))
@@ -74,7 +74,7 @@ impl StepErrors {
         self.resolution() <= SURE * VAGUE
     }
 
-    /// Of steps of `dt` from a state in equilibrium; `None` where the fluid does not last.
+    /// The errors of steps of `dt` from a state in equilibrium; `None` where the fluid does not last.
     pub(super) fn measured(
         mut run: Simulation,
         (integrator, dt): (Integrator, f64),

@@ -39,7 +39,7 @@ pub struct Speed {
     pub bytes_per_particle: f64,
     /// Nanoseconds of each kernel per particle and step, by timestamps; empty for a device without them.
     pub kernels: BTreeMap<String, f64>,
-    /// Of one thread of the CPU with portable instructions, in the same state; `None` above [`FEW_ABOVE`] particles.
+    /// The speed of one thread of the CPU with portable instructions, in the same state; `None` above [`FEW_ABOVE`] particles.
     pub portable_cpu: Option<f64>,
 }
 

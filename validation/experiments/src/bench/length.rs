@@ -20,12 +20,12 @@ pub const CYCLE: u64 = psidpd_dynamics::run::REORDERING;
 const MOST: u64 = 1_000_000;
 
 impl Length {
-    /// Of `steps` that are timed, after a tenth as many.
+    /// The length of a run of `steps` that are timed, after a tenth as many.
     pub fn of(steps: u64) -> Length {
         Length { warm_up: (steps / 10).max(5), steps }
     }
 
-    /// As long as fits into `seconds` for a contender that takes `step` seconds for one, but no shorter than
+    /// The length that fits into `seconds` for a contender that takes `step` seconds for one, but no shorter than
     /// [`FEWEST`], or one [`CYCLE`], whatever time these take.
     pub fn within(seconds: f64, contender: &Contender, step: f64) -> Length {
         // The cast takes NaN to zero and what is too large to the greatest number.

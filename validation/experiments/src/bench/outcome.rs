@@ -82,10 +82,10 @@ pub struct Timed {
     pub pairs_per_particle: f64,
     pub ranks: usize,
     pub threads: usize,
-    /// Of the native runner, and of the plugin where it was told.
+    /// The precision of the native runner, and of the plugin where it was told.
     pub precision: Option<String>,
     pub instructions: Option<String>,
-    /// Of LAMMPS: the fastest of those tried.
+    /// The skin of LAMMPS's lists: the fastest of those tried.
     pub skin: Option<f64>,
     /// Steps in each round.
     pub steps: u64,

@@ -10,7 +10,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of `values`; `None` if there are none, or one is not finite.
+    /// The spread of `values`; `None` if there are none, or one is not finite.
     pub fn of(values: &[f64]) -> Option<Spread> {
         if values.is_empty() || !values.iter().all(|v| v.is_finite()) {
             return None;
@@ -25,7 +25,7 @@ impl Spread {
         Some(Spread { min: sorted[0], median, max: sorted[sorted.len() - 1] })
     }
 
-    /// Of the ratios of what was measured in the same round: what slows a whole round down cancels.
+    /// The spread of the ratios of what was measured in the same round: what slows a whole round down cancels.
     pub fn of_ratios(above: &[f64], below: &[f64]) -> Option<Spread> {
         let ratios: Vec<f64> = above.iter().zip(below).map(|(a, b)| a / b).collect();
         Spread::of(&ratios)

@@ -65,7 +65,7 @@ pub struct Calibration {
     pub title: String,
     pub kt: f64,
     pub density: String,
-    /// Its (α, β): the density of β felt by α, as `"β|α"`, in the order of the coefficients.
+    /// The pairs of species of the correction: the density of β felt by α, as `"β|α"`, in the order of the coefficients.
     pub pairs: Vec<String>,
     pub converged: bool,
     pub tolerance: f64,
@@ -107,7 +107,7 @@ pub fn calibrate(
     calibrate_by(&|bulk| bulk.run(path, &folder.path().join("run")), path, options, command, told)
 }
 
-/// The same with the fluid measured by `run`.
+/// Calibrates a model, with the fluid measured by `run`.
 fn calibrate_by(
     run: Measure,
     path: &Path,

@@ -23,7 +23,7 @@ pub struct Failed {
 /// What was measured under one correction.
 #[derive(Debug, Clone, Default)]
 pub struct Batch {
-    /// Of the densities whose runs came to their end.
+    /// The points of the densities whose runs came to their end.
     pub points: Vec<Point>,
     /// Which targets these are.
     pub of: Vec<usize>,

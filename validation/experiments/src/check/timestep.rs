@@ -66,7 +66,7 @@ pub struct Steps {
 const NO_DRAG: &str =
     "nothing takes the heat that steps add, so the error grows with the length of the stage";
 
-/// Of each stage with conditions of its own, of a ramp the first level and the last.
+/// The errors of the steps of each stage with conditions of its own; of a ramp those of the first level and the last.
 pub fn estimates(scene: &Scene) -> Result<Steps, RunError> {
     let mut found: Vec<StepEstimate> = Vec::new();
     let mut unknown: Vec<UnknownStep> = Vec::new();

@@ -150,7 +150,7 @@ pub fn open(context: &Context, setup: &Setup, state: &State, name: &str) -> Resu
     open_deck(context, &setup.prepare(context, state, &context.work.join(name), true)?)
 }
 
-/// The same with any commands up to the pair style.
+/// Opens LAMMPS with a deck: any commands up to the pair style.
 pub(super) fn open_deck(context: &Context, deck: &str) -> Result<Lammps, ExperimentError> {
     let lammps = Lammps::open(&context.lammps.host, &[])?;
     lammps.commands(deck)?;

@@ -37,7 +37,7 @@ pub struct Trace {
     pub potential: Vec<f64>,
     /// Pressure tensor xx, yy, zz, xy, xz, yz.
     pub pressure: [Vec<f64>; 6],
-    /// The same without drag and noise; of the native runner alone.
+    /// The pressure tensor without drag and noise; of the native runner alone.
     pub conservative: [Vec<f64>; 6],
     /// z of every particle, for each frame.
     pub frames: Vec<Vec<f64>>,

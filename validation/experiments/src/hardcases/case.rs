@@ -88,7 +88,7 @@ pub struct Case {
     pub name: &'static str,
     pub run: Inputs,
     pub must: Must,
-    /// The same for integrators that keep the Maxwell distribution of an ideal gas at any time step, if that is another.
+    /// What must happen with integrators that keep the Maxwell distribution of an ideal gas at any time step, if that is another.
     pub exact: Option<Must>,
 }
 

@@ -6,7 +6,7 @@ use crate::models::{SET6, SPLINE};
 /// A gas that has a thermostat alone.
 const IDEAL: &str = "title = \"ideal gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 
-/// The same with two species.
+/// An ideal gas of two species.
 const IDEAL_TWO: &str =
     "title = \"ideal gas\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 

@@ -108,7 +108,7 @@ pub fn model(
     Ok(found)
 }
 
-/// The same by any instrument, without step.
+/// Finds a model with what `instrument` measures, without a recommended step.
 fn model_by(
     liquid: &Liquid,
     instrument: &mut dyn Instrument,

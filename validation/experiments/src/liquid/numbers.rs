@@ -55,7 +55,7 @@ const NUMBERS: [(&str, Formula); 7] = [
     ("Schmidt    viscosity/(density diffusion)", |p, _| Some(p.viscosity? / (p.density? * p.diffusion?))),
 ];
 
-/// Those that the scales and at least one side's properties give.
+/// The dimensionless numbers that the scales and the properties of the liquid or of the model give.
 pub fn numbers(liquid: &Properties, model: &Properties, scales: &Scales) -> Vec<Number> {
     let of = |(name, formula): &(&'static str, Formula)| Number {
         name,

@@ -60,7 +60,7 @@ struct Setting<'a> {
     title: &'a str,
     edges: [f64; 3],
     initial: String,
-    /// Of the force along x, reversed in the upper half of z.
+    /// The acceleration of the force along x, which is reversed in the upper half of z.
     acceleration: f64,
     settle: f64,
     time: f64,

@@ -19,7 +19,7 @@ use std::rc::Rc;
 pub enum Size {
     /// Half an hour for all cases.
     Quick,
-    /// Those of the papers. Runs that were interrupted go on.
+    /// Boxes and times of the papers. Runs that were interrupted go on.
     Full,
 }
 
@@ -124,7 +124,7 @@ impl Context {
         self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
     }
 
-    /// The same in a folder that several cases share: their runs are made once.
+    /// This context in a folder that several cases share: their runs are made once.
     pub fn shared(&self, case: &str) -> Context {
         let folder = self.folder.parent().map_or_else(|| self.folder.clone(), |all| all.join(case));
         Context { folder, ..self.clone() }

@@ -18,9 +18,9 @@ pub struct EnergyDrift {
     pub precision: String,
     /// Simulated time up to the last energy.
     pub time: f64,
-    /// Of the energy per particle in kT, for a unit of time; nothing where the run stopped.
+    /// The slope of the energy per particle in kT, for a unit of time; nothing where the run stopped.
     pub slope: Option<f64>,
-    /// One standard deviation of that.
+    /// One standard deviation of the slope.
     pub slope_error: Option<f64>,
     /// The largest departure from the first value, in kT per particle.
     pub largest: Option<f64>,

@@ -241,7 +241,7 @@ struct References<'a> {
 }
 
 impl References<'_> {
-    /// Their quantities: those of configurations from Monte Carlo, if there is one.
+    /// The quantities of the references: those of configurations from Monte Carlo, if there is one.
     fn quantities(&self, origin: &Origin) -> Result<Quantities, ExperimentError> {
         let made = |sampled: Sampled, physics: &Physics| match sampled {
             Ok(made) => Ok(made.quantities),
@@ -422,7 +422,7 @@ fn native_points(
     points
 }
 
-/// The same steps by the plugin, where a deck can have them.
+/// Points of the plugin with the steps of the native points, where a deck can have them.
 fn plugin_points(origin: &Origin, points: &mut Vec<Point>) {
     let mut more: Vec<Point> = Vec::new();
     for p in points.iter().filter(|p| p.stable) {

@@ -24,7 +24,7 @@ pub struct Comparison {
     pub temperature_is_known: bool,
     /// What errors are compared with, with its own: of its temperatures, and in the errors of its values.
     pub reference: Reference,
-    /// What those of diffusion and viscosities are compared with, if the reference has no time step.
+    /// What diffusion coefficients and viscosities are compared with, if the reference has no time step.
     pub reference_of_dynamics: Option<Reference>,
     pub lammps_reference: Option<Reference>,
     /// Why LAMMPS, or one of its styles, is not among the points.
@@ -46,7 +46,7 @@ pub struct Comparison {
 /// The cheapest setting within tolerances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Recommended {
-    /// Its place among the points.
+    /// The place of the recommended setting among the points.
     pub point: usize,
     pub scene: String,
     /// The lines of a LAMMPS script: of the same steps, or of the cheapest that LAMMPS can make.
@@ -64,7 +64,7 @@ pub struct Reference {
     pub samples: u64,
     /// Simulated time; in Monte Carlo, sweeps.
     pub time: f64,
-    /// Its values; errors of the temperatures where these are known.
+    /// The values of the reference; errors of the temperatures where these are known.
     #[serde(serialize_with = "quantity::by_name")]
     pub values: Vec<Deviation>,
 }
@@ -80,7 +80,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Of rounds; `None` if there were none.
+    /// The cost that rounds of timing give; `None` if there were none.
     pub fn of(rounds: &[f64]) -> Option<Cost> {
         let Spread { min, median, max } = Spread::of(rounds)?;
         Some(Cost { value: median, error: 0.5 * (max - min), min, max })

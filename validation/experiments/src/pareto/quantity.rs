@@ -124,7 +124,7 @@ impl Quantities {
         Quantities { scalars, structure }
     }
 
-    /// The same values as if they were known without error.
+    /// These quantities as if they were known without error.
     pub fn as_if_exact(&self) -> Quantities {
         let mut same = self.clone();
         same.scalars.iter_mut().for_each(|q| q.measured.error = 0.0);
@@ -132,7 +132,7 @@ impl Quantities {
         same
     }
 
-    /// The same with the diffusion and viscosities of another run, if there is one.
+    /// These quantities with the diffusion and viscosities of another run, if there is one.
     pub fn with_dynamics_of(mut self, other: Option<&Quantities>) -> Quantities {
         self.scalars.retain(|q| q.class.is_of_configurations());
         let theirs = other.iter().flat_map(|other| &other.scalars);
@@ -155,7 +155,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// The same for a code with another force law, whose temperature is what its own small steps have.
+    /// What is known of a code with another force law, whose temperature is what its own small steps have.
     pub fn of_another_law(self) -> Known {
         Known { temperature: false, ..self }
     }

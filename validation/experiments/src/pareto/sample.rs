@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Effort {
-    /// As much as the clock allows, of a reference so many times as much.
+    /// Samples for so many seconds; a reference takes a multiple of them.
     Seconds(f64),
     Samples(u64),
 }
@@ -148,7 +148,7 @@ impl<'a> Sampler<'a> {
         };
     }
 
-    /// The same after more samples.
+    /// This sampler after more samples.
     pub fn more(mut self, effort: Effort) -> Sampler<'a> {
         self.sample(effort);
         self

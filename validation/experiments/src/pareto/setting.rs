@@ -87,7 +87,7 @@ pub fn longest() -> Integrator {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
     Few,
-    /// Those that are known to do well, beside velocity Verlet.
+    /// The integrators that are known to do well, beside velocity Verlet.
     Quick,
     /// All integrators, and both precisions of each.
     Full,

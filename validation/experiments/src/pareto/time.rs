@@ -41,7 +41,7 @@ pub fn time(
     time_by(clock, settings, pace, |setting| origin.dt(&setting.physics))
 }
 
-/// The same by a clock that gives the seconds of a step from so many of them, if it has the setting, and with the Δt of settings.
+/// Times settings by a clock, which gives the seconds of a step from so many steps if it has the setting.
 fn time_by(
     mut clock: impl FnMut(&Setting, u64) -> Result<Option<f64>, ExperimentError>,
     settings: &[Setting],

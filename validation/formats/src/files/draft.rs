@@ -21,7 +21,7 @@ pub struct Draft {
     out: BufWriter<File>,
     folder: OwnedFd,
     name: OsString,
-    /// Its name so far.
+    /// The name of the file until it is complete.
     temporary: Option<OsString>,
     /// Whether it replaces a file of its name.
     replaces: bool,

@@ -218,16 +218,27 @@ fn draw_curve(o: &Observation, all: &[Observation], items: &mut Vec<Item>) {
         let name = |c: &Column| if single { String::new() } else { c.name.clone() };
         let mut series: Vec<Series> =
             columns.iter().map(|c| with_errors(c, &x.values, name(c), style)).collect();
-        if x.name == "height"
+        // The outline of a drop stands upright; errors of its radius are in the table.
+        let upright = x.name == "height";
+        if upright {
+            for outline in &mut series {
+                outline.points.iter_mut().for_each(|point| *point = (point.1, point.0));
+                outline.errors = None;
+            }
+        }
+        if upright
             && let Some(points) = o.name.strip_suffix("_profile").and_then(|drop| circle(drop, o, all))
         {
             series[0].name = "measured".into();
-            let points = points.into_iter().map(|(r, height)| (height, r)).collect();
             series.push(Series::new("fitted circle", points, Style::Dashed));
         }
         let shares = columns.iter().all(|c| c.name.starts_with("fraction_"));
         let bounds = shares.then_some([0.0, 1.0]);
-        let plot = Plot { bounds, ..Plot::new(label(o), [named(&x.name, &x.unit), y_label], series) };
+        let mut labels = [named(&x.name, &x.unit), y_label];
+        if upright {
+            labels.reverse();
+        }
+        let plot = Plot { bounds, ..Plot::new(label(o), labels, series) };
         push(plot.render());
     }
 }

@@ -25,7 +25,7 @@ pub struct Sorting<'a> {
 /// The part of one thread.
 pub struct SortPart<'a> {
     pub number: usize,
-    /// Its particles, their cells and fractions.
+    /// The particles of a part, their cells and fractions.
     pub particles: Range<usize>,
     pub cell: &'a mut [u32],
     pub fixed32: &'a mut [[u32; 3]],
