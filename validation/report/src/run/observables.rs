@@ -226,8 +226,7 @@ fn draw_curve(o: &Observation, all: &[Observation], items: &mut Vec<Item>) {
                 outline.errors = None;
             }
         }
-        if upright
-            && let Some(points) = o.name.strip_suffix("_profile").and_then(|drop| circle(drop, o, all))
+        if upright && let Some(points) = o.name.strip_suffix("_profile").and_then(|drop| circle(drop, o, all))
         {
             series[0].name = "measured".into();
             series.push(Series::new("fitted circle", points, Style::Dashed));
