@@ -3,6 +3,7 @@
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
+use super::rows::Rows;
 use super::text::{Problem, TextError, any_f64, finite, shown, whole};
 use super::{FormatError, PathError};
 
@@ -272,14 +273,14 @@ pub fn write_dump(frame: &super::Frame, out: &mut impl Write) -> io::Result<()> 
         }
     }
     writeln!(out, "ITEM: ATOMS id type x y z vx vy vz")?;
+    let mut rows = Rows::new(out);
     for i in 0..n {
-        write!(out, "{} {}", frame.tag[i] as u32, frame.species[i] as u32 + 1)?;
-        for x in frame.x[i].into_iter().chain(frame.v.map_or([0.0; 3], |v| v[i])) {
-            write!(out, " {x:.16e}")?;
-        }
-        writeln!(out)?;
+        rows.whole(frame.tag[i] as u32);
+        rows.whole(frame.species[i] as u32 + 1);
+        frame.x[i].into_iter().chain(frame.v.map_or([0.0; 3], |v| v[i])).for_each(|x| rows.number(x));
+        rows.end()?;
     }
-    Ok(())
+    rows.finish()
 }
 
 #[cfg(test)]

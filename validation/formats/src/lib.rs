@@ -14,6 +14,7 @@ mod frame;
 mod gsd;
 pub mod memory;
 mod open;
+mod rows;
 pub mod setfl;
 pub mod text;
 mod vtk;

@@ -3,6 +3,7 @@
 //! The columns `species`, `pos`, `velo`, `id` have the names of libAtoms and OVITO. The column `Z` stands before `species`
 //! for readers such as ASE that take only chemical elements. It holds the number of the species, counted from 1.
 
+use super::rows::Rows;
 use super::{Configuration, FormatError, Frame, PathError};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
@@ -30,16 +31,17 @@ pub fn write_xyz(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
         frame.step
     )?;
     let names: Vec<String> = frame.names.iter().map(|n| name_of(n)).collect();
+    let mut rows = Rows::new(to);
     for i in 0..frame.len() {
         let species = frame.species[i] as usize;
-        let [x, y, z] = frame.x[i];
-        write!(to, "{} {x:?} {y:?} {z:?} ", names[species])?;
-        if let Some([x, y, z]) = frame.v.map(|v| v[i]) {
-            write!(to, "{x:?} {y:?} {z:?} ")?;
-        }
-        writeln!(to, "{} {}", frame.tag[i], species + 1)?;
+        rows.word(&names[species]);
+        frame.x[i].into_iter().for_each(|x| rows.number(x));
+        frame.v.iter().flat_map(|v| v[i]).for_each(|v| rows.number(v));
+        rows.whole(frame.tag[i]);
+        rows.whole(species + 1);
+        rows.end()?;
     }
-    Ok(())
+    rows.finish()
 }
 
 /// The elements of the periodic table in order.
