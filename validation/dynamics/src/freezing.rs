@@ -86,7 +86,7 @@ pub fn freezing(fluid: &Fluid, density: Option<f64>) -> Option<Freezing> {
 }
 
 /// A, B and r_c of a fluid of Warren's form with r_d = 0.75 r_c.
-fn warren(fluid: &Fluid) -> Option<[f64; 3]> {
+pub fn warren(fluid: &Fluid) -> Option<[f64; 3]> {
     let ([density], [pair], [ExcessFreeEnergy::Formula(psi)]) =
         (&fluid.densities[..], &fluid.pairs[..], &fluid.excess[..])
     else {

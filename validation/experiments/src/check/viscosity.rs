@@ -6,6 +6,7 @@
 
 use psidpd_core::model::Fluid;
 use psidpd_core::model::pair::PairPotential;
+use psidpd_dynamics::freezing::warren;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::scene::Scene;
 use serde::Serialize;
@@ -26,8 +27,10 @@ const fn row(gamma: f64, viscosity: Value, diffusion: Option<Value>) -> Row {
 
 struct Usual {
     name: &'static str,
-    /// a r_c/kT of the soft repulsion a (1 − r/r_c).
-    repulsion: f64,
+    /// a r_c/kT of the soft force a (1 − r/r_c).
+    strength: f64,
+    /// B/(kT r_c²) of the force B (n_i + n_j) (1 − r/r_d) with r_d = 0.75 r_c.
+    many_body: f64,
     density: f64,
     /// By rising drag.
     rows: &'static [Row],
@@ -36,7 +39,8 @@ struct Usual {
 const USUAL: &[Usual] = &[
     Usual {
         name: "no forces",
-        repulsion: 0.0,
+        strength: 0.0,
+        many_body: 0.0,
         density: 3.0,
         rows: &[
             // Below, the paths of particles are as long as the flow is wide: at 1 it gave 2.74, 3.52 and 3.85 at heights 12, 24 and 48.
@@ -49,7 +53,8 @@ const USUAL: &[Usual] = &[
     },
     Usual {
         name: "standard DPD, a = 25",
-        repulsion: 25.0,
+        strength: 25.0,
+        many_body: 0.0,
         density: 3.0,
         rows: &[
             row(1.0, [0.774, 0.007], Some([0.330, 0.001])),
@@ -94,13 +99,13 @@ pub fn flow_of_scene(scene: &Scene) -> Option<Flow> {
 /// The measured viscosity of a fluid of particles of a mass; without a density, at that of the table.
 pub fn flow(fluid: &Fluid, mass: f64, density: Option<f64>) -> Option<Flow> {
     let [Some(drag)] = &fluid.thermostats[..] else { return None };
-    let (repulsion, range) = repulsion(fluid, drag.range)?;
+    let (strength, many_body, range) = forces(fluid, drag.range)?;
     if fluid.dimensions != 3 || drag.exponent != 1.0 || (drag.range / range - 1.0).abs() > 1e-9 {
         return None;
     }
-    let near = |x: f64, y: f64| (x - y).abs() <= SAME * y;
+    let near = |x: f64, y: f64| (x - y).abs() <= SAME * y.abs();
     let same = |usual: &&Usual| {
-        near(repulsion, usual.repulsion) && density.is_none_or(|rho| near(rho * range.powi(3), usual.density))
+        near(strength, usual.strength) && near(many_body, usual.many_body) && density.is_none_or(|rho| near(rho * range.powi(3), usual.density))
     };
     let usual = USUAL.iter().find(same)?;
     let speed = (fluid.kt / mass).sqrt();
@@ -127,14 +132,17 @@ fn schmidt(viscosity: Value, diffusion: Value, density: f64) -> Value {
     [value, value * (viscosity[1] / viscosity[0]).hypot(diffusion[1] / diffusion[0])]
 }
 
-/// The repulsion of a fluid that has no other forces, and its range; without repulsion, that of the drag.
-fn repulsion(fluid: &Fluid, drag: f64) -> Option<(f64, f64)> {
+/// The strengths of the soft and of the many-body force of a fluid that has no others, and their range; without forces that of the drag.
+fn forces(fluid: &Fluid, drag: f64) -> Option<(f64, f64, f64)> {
+    if let Some([a, b, range]) = warren(fluid) {
+        return Some((a * range / fluid.kt, b / (fluid.kt * range * range), range));
+    }
     match (&fluid.densities[..], &fluid.pairs[..]) {
-        ([], []) => Some((0.0, drag)),
+        ([], []) => Some((0.0, 0.0, drag)),
         ([], [pair]) => {
             let PairPotential::Soft(soft) = &pair.potential else { return None };
             let range = if soft.strength == 0.0 { drag } else { soft.range };
-            Some((soft.strength * range / fluid.kt, range))
+            Some((soft.strength * range / fluid.kt, 0.0, range))
         }
         _ => None,
     }

@@ -82,9 +82,13 @@ fn drags_between_rows_are_interpolated_and_no_others() {
 fn units_do_not_matter() {
     let (l, e, m) = (2.0, 3.0, 5.0);
     let time = l * f64::sqrt(m / e);
-    for (plain, scaled) in [(IDEAL.to_owned(), IDEAL.to_owned()), (soft(25.0, 1.0), soft(25.0 * e / l, l))] {
-        let one = flow(&at(&plain, 4.5, 1.0, 1.0, ""), 1.0, Some(3.0)).unwrap();
-        let other = flow(&at(&scaled, 4.5 * m / time, l, e, ""), m, Some(3.0 / l.powi(3))).unwrap();
+    for (plain, scaled, rho) in [
+        (IDEAL.to_owned(), IDEAL.to_owned(), 3.0),
+        (soft(25.0, 1.0), soft(25.0 * e / l, l), 3.0),
+        (warrens(-40.0, 25.0, 1.0), warrens(-40.0 * e / l, 25.0 * e * l * l, l), 6.05),
+    ] {
+        let one = flow(&at(&plain, 4.5, 1.0, 1.0, ""), 1.0, Some(rho)).unwrap();
+        let other = flow(&at(&scaled, 4.5 * m / time, l, e, ""), m, Some(rho / l.powi(3))).unwrap();
         let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
         assert!(near(other.viscosity[0], one.viscosity[0] * m / (l * time)), "{one:?} {other:?}");
         assert!(
@@ -105,7 +109,10 @@ fn other_fluids_are_not_judged() {
     silent(at(&standard, 4.5, 1.5, 1.0, ""), 3.0);
     silent(at(&standard, 4.5, 1.0, 1.0, "dimensions = 2\n"), 3.0);
     silent(at(&format!("{standard}{standard}"), 4.5, 1.0, 1.0, ""), 3.0);
-    silent(at(&warrens(-40.0, 25.0, 1.0), 18.0, 1.0, 1.0, ""), 6.05);
+    for (a, b, rho) in [(-40.0, 30.0, 6.05), (-38.0, 25.0, 6.05), (-40.0, 25.0, 5.08), (-40.0, 40.0, 6.05)] {
+        silent(at(&warrens(a, b, 1.0), 18.0, 1.0, 1.0, ""), rho);
+    }
+    assert!(flow(&at(&warrens(-40.0, 25.0, 1.0), 18.0, 1.0, 1.0, ""), 1.0, Some(6.05)).is_some());
     let steep = at(IDEAL, 4.5, 1.0, 1.0, "");
     let drag = steep.thermostats[0].map(|t| psidpd_core::model::Thermostat { exponent: 0.5, ..t });
     silent(Fluid { thermostats: vec![drag], ..steep.clone() }, 3.0);
@@ -137,12 +144,11 @@ fn table() -> String {
         for (k, row) in usual.rows.iter().enumerate() {
             let Row { gamma, viscosity, diffusion } = row;
             let name = if k == 0 { format!("{}, ρ = {}", usual.name, usual.density) } else { String::new() };
-            let kinetic = match usual.repulsion {
-                0.0 => {
-                    let (pi, rho) = (std::f64::consts::PI, usual.density);
-                    format!("{:.2}", 45.0 / (4.0 * pi * gamma) + 2.0 * pi * gamma * rho * rho / 1575.0)
-                }
-                _ => String::new(),
+            let kinetic = if usual.strength == 0.0 {
+                let (pi, rho) = (std::f64::consts::PI, usual.density);
+                format!("{:.2}", 45.0 / (4.0 * pi * gamma) + 2.0 * pi * gamma * rho * rho / 1575.0)
+            } else {
+                String::new()
             };
             let schmidt = diffusion.map(|d| schmidt(*viscosity, d, usual.density));
             let [eta, d, sc] =
