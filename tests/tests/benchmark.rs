@@ -82,6 +82,26 @@ fn a_small_benchmark_has_every_documented_field() {
     assert!(read("b/report.html").contains("<svg"));
 }
 
+/// Every template and ten shipped scenes, a few steps of each, with times of both.
+#[test]
+fn whole_scenes_are_timed() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "bench --scenes --steps 2 --threads 1 --out b --json c.json";
+    let output = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let text = std::fs::read_to_string(folder.path().join("c.json")).unwrap();
+    let outcome: Value = serde_json::from_str(&text).unwrap();
+    let scenes = outcome["scenes"].as_array().unwrap();
+    let templates = scenes.iter().filter(|s| s["is_template"] == true).count();
+    assert!(templates == 7 && scenes.len() == 17, "{text}");
+    for scene in scenes {
+        let [shipped, bare] = ["as_shipped", "bare"].map(|of| scene[of]["processor"].as_f64().unwrap());
+        assert!(shipped > 0.0 && bare > 0.0 && scene["particles"].as_u64().unwrap() > 500, "{scene}");
+        assert!((scene["ratio"].as_f64().unwrap() - shipped / bare).abs() < 1e-9, "{scene}");
+    }
+    assert!(said(&output).contains("new --template droplet"), "{}", said(&output));
+}
+
 #[test]
 fn what_cannot_be_timed_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -353,6 +353,8 @@ impl ThermostatPlan {
             Exponent::One
         } else if all(2.0) {
             Exponent::Two
+        } else if let Some(quarters) = (1..=16).find(|n| all(0.25 * f64::from(*n))) {
+            Exponent::Quarters(quarters)
         } else {
             Exponent::Any(SpeciesPairTable::new(self.exponent.iter().map(|x| T::of(*x))))
         }

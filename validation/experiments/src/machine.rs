@@ -15,6 +15,12 @@ pub fn machine() -> String {
     format!("{model}, {cores} core(s)")
 }
 
+/// Processor time of all threads of this process so far, in seconds.
+pub fn processor_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
 /// The most memory that this process ever had.
 pub fn peak_kilobytes() -> Result<u64, ExperimentError> {
     let status = Path::new("/proc/self/status");

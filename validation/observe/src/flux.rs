@@ -31,6 +31,8 @@ pub const BLOCK: usize = 256;
 #[derive(Debug, Clone)]
 pub struct Lines {
     pub carrier: Carrier,
+    /// True if every `f` is parallel to `d`.
+    pub parallel: bool,
     pub count: usize,
     /// The three arrays have the components of [`Line::from`]; so have `d` and `f`.
     pub from: [[f64; BLOCK]; 3],
@@ -40,13 +42,19 @@ pub struct Lines {
 
 impl Lines {
     /// No lines.
-    pub fn of(carrier: Carrier) -> Lines {
-        Lines { carrier, count: 0, from: [[0.0; BLOCK]; 3], d: [[0.0; BLOCK]; 3], f: [[0.0; BLOCK]; 3] }
+    pub fn of(carrier: Carrier, parallel: bool) -> Lines {
+        let none = [[0.0; BLOCK]; 3];
+        Lines { carrier, parallel, count: 0, from: none, d: none, f: none }
     }
 
     /// Passes lines on in blocks.
-    pub fn in_blocks(carrier: Carrier, all: impl Iterator<Item = Line>, mut visit: impl FnMut(&Lines)) {
-        let mut lines = Lines::of(carrier);
+    pub fn in_blocks(
+        carrier: Carrier,
+        parallel: bool,
+        all: impl Iterator<Item = Line>,
+        mut visit: impl FnMut(&Lines),
+    ) {
+        let mut lines = Lines::of(carrier, parallel);
         for Line { from, d, f } in all {
             let at = lines.count;
             for c in 0..3 {

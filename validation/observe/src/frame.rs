@@ -174,7 +174,10 @@ enum Part<'a> {
 impl Part<'_> {
     fn in_blocks(&self, visit: impl FnMut(&Lines)) {
         match *self {
-            Part::Recorded(carrier, lines) => Lines::in_blocks(carrier, lines.iter().copied(), visit),
+            // A particle that met a face turned on its way.
+            Part::Recorded(carrier, lines) => {
+                Lines::in_blocks(carrier, carrier == Carrier::Pair, lines.iter().copied(), visit);
+            }
             Part::Forces { acted, evaluation, part, x, displacements } => {
                 let back = |k: usize| displacements.get(k).copied().unwrap_or([0.0; 3]);
                 // Pairs at zero distance have no direction.
@@ -187,7 +190,7 @@ impl Part<'_> {
                         f: pair.d.map(|d| acted.share * force / pair.r * d),
                     }
                 });
-                Lines::in_blocks(Carrier::Pair, lines, visit);
+                Lines::in_blocks(Carrier::Pair, displacements.is_empty(), lines, visit);
             }
         }
     }

@@ -5,10 +5,10 @@ use super::flux::Recorded;
 use super::frame::{Frame, View};
 use super::meter::AnyMeter;
 use super::observation::Observation;
-use super::order::{Order, Sight};
+use super::order::{Order, SearchPairs, Sight};
 use super::request::Observe;
 use psidpd_core::engine::Want;
-use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::engine::pair_sums::{Evaluator, Pair};
 use serde::{Deserialize, Serialize};
 
 /// The requested observables of a scene with their samples so far.
@@ -121,7 +121,8 @@ impl Observers {
                 self.order.push((stage.to_owned(), Order::default()));
                 self.order.len() - 1
             });
-            self.order[at].1.sample(&sight(frame), |k| frame.moves(k));
+            let pairs = |range: f64, visit: &mut dyn FnMut(Pair)| frame.for_each_pair(range, visit);
+            self.order[at].1.sample(&sight(frame, &pairs), |k| frame.moves(k));
         }
         for observer in self.observers.iter_mut().filter(|o| due(o)) {
             for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
@@ -146,6 +147,12 @@ impl Observers {
             sampled.meter.forget();
         }
         if forgetful == self.observers { Ok(restored) } else { Err(ObserveError::OtherObservables) }
+    }
+
+    /// The number of steps between measurements of the temperatures of a stage, from its start on, if it measures them.
+    pub fn interval_of_temperature(&self, stage: &str) -> Option<u64> {
+        let is_of_stage = |s: &Sampled| s.stage == stage && matches!(s.meter, AnyMeter::Temperature(_));
+        self.observers.iter().find(|o| o.skip == 0 && o.stages.iter().any(is_of_stage)).map(|o| o.every)
     }
 
     /// The temperatures of a stage, if it measures them.
@@ -178,11 +185,12 @@ impl Observers {
 }
 
 /// What tells a crystal from a liquid in a configuration.
-fn sight<'a>(frame: &Frame<'a>) -> Sight<'a> {
+fn sight<'a>(frame: &'a Frame<'a>, pairs: &'a SearchPairs<'a>) -> Sight<'a> {
     let view = frame.view;
     let mass = (0..view.x.len()).map(|k| frame.mass(k)).sum::<f64>() / view.x.len() as f64;
     Sight {
         time: view.time,
+        pairs,
         domain: view.domain,
         dimensions: view.dimensions,
         x: view.x,

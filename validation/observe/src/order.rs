@@ -4,12 +4,12 @@
 //! until it melts.
 //!
 //! ```text
-//! order          c_i = ⟨ S_ij/√(S_ii S_jj) ⟩_j      S_ij = Σ_{a,b} P₆(â·b̂)
+//! order          c_i = ⟨ S_ij/√(S_ii S_jj) ⟩_j      S_ij = Σ_{a,b} P₆(â·b̂) = Σ_m q_im q_jm
 //! displacement   u_i² = ⟨ (|r_ij(t)| − |r_ij(0)|)² ⟩_j
 //! ```
 //!
 //! j runs over the nearest neighbours of i, and a, b over the directions from i and from j to theirs. By the addition theorem
-//! S_ij is the product of the bond-order vectors q_6m of the two (Steinhardt, Nelson and Ronchetti, Phys. Rev. B 28, 784 (1983)),
+//! S_ij is the product of the bond-order vectors of the two, q_im = Σ_a Y_6m(â) with real harmonics of this norm (Steinhardt, Nelson and Ronchetti, Phys. Rev. B 28, 784 (1983)),
 //! and c_i the mean product by which ten Wolde, Ruiz-Montero and Frenkel, J. Chem. Phys. 104, 9932 (1996), tell solid particles
 //! from liquid ones; in two dimensions cos 6θ takes the place of P₆. c is near 0.1 in liquids, and 0.5 to 1 in crystals, whichever
 //! their lattice, also where grains, drops or slabs have no common direction. Distances from neighbours leave out drift and
@@ -20,7 +20,7 @@
 
 use crate::meter::linked::density_of_densest_tenth;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::pair_sums::for_each_pair;
+use psidpd_core::engine::pair_sums::Pair;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -48,10 +48,14 @@ const GROWTH: f64 = 1.4;
 const LEAST_SAMPLES: u64 = 16;
 const LEAST_FLIGHTS: f64 = 10.0;
 
+/// Visits every pair of particles closer than a range, with the vector from j to i.
+pub type SearchPairs<'a> = dyn Fn(f64, &mut dyn FnMut(Pair)) + 'a;
+
 /// A configuration as this module needs it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Sight<'a> {
     pub time: f64,
+    pub pairs: &'a SearchPairs<'a>,
     pub domain: &'a PeriodicBox,
     pub dimensions: usize,
     /// Positions in the box, the numbers of periods that each particle has crossed, and tags.
@@ -150,45 +154,111 @@ fn reach(dimensions: usize, rho: f64) -> f64 {
     if dimensions == 2 { (4.5 / rho).sqrt() } else { (7.2 / rho).cbrt() }
 }
 
-/// P₆, in two dimensions cos 6θ, of the cosine of an angle.
-fn sixfold(cosine: f64, dimensions: usize) -> f64 {
-    let s = cosine * cosine;
-    match dimensions {
-        2 => ((32.0 * s - 48.0) * s + 18.0) * s - 1.0,
-        _ => (((231.0 * s - 315.0) * s + 105.0) * s - 5.0) / 16.0,
+/// A bond-order vector.
+type Bonds = [f64; 13];
+
+/// Harmonics of sixth order of a unit vector: for two of them the sum of products is P₆ of the cosine of their angle, in two
+/// dimensions cos 6θ.
+fn harmonics([x, y, z]: [f64; 3], dimensions: usize) -> Bonds {
+    // (x + iy)^m
+    let mut powers = [[1.0, 0.0]; 7];
+    for m in 1..7 {
+        let [re, im] = powers[m - 1];
+        powers[m] = [re * x - im * y, re * y + im * x];
     }
+    let mut all = [0.0; 13];
+    if dimensions == 2 {
+        all[..2].copy_from_slice(&powers[6]);
+        return all;
+    }
+    // The derivatives of 16 P₆(z), each with √[2 (6 − m)!/(6 + m)!]/16.
+    let s = z * z;
+    let derivatives = [
+        ((231.0 * s - 315.0) * s + 105.0) * s - 5.0,
+        z * ((1386.0 * s - 1260.0) * s + 210.0),
+        (6930.0 * s - 3780.0) * s + 210.0,
+        z * (27720.0 * s - 7560.0),
+        83160.0 * s - 7560.0,
+        z * 166_320.0,
+        166_320.0,
+    ];
+    let mut ratio: f64 = 2.0;
+    all[0] = derivatives[0] / 16.0;
+    for m in 1..7 {
+        ratio /= ((7 - m) * (6 + m)) as f64;
+        let factor = ratio.sqrt() / 16.0 * derivatives[m];
+        (all[2 * m - 1], all[2 * m]) = (factor * powers[m][0], factor * powers[m][1]);
+    }
+    all
+}
+
+fn product(a: &Bonds, b: &Bonds) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// A near particle: distance, index and unit vector.
 type Near = (f64, usize, [f64; 3]);
 
 /// The nearest neighbours of some particles, by distance.
-type Nearest = HashMap<usize, Vec<Near>>;
+struct Nearest {
+    /// The place of each particle in `lists`.
+    at: Vec<Option<usize>>,
+    lists: Vec<Vec<Near>>,
+}
 
-fn nearest(
-    sight: &Sight,
-    of: impl IntoIterator<Item = usize>,
-    moves: impl Fn(usize) -> bool,
-    reach: f64,
-) -> Nearest {
-    let most = neighbours(sight.dimensions);
-    let mut found: Nearest = of.into_iter().map(|k| (k, Vec::with_capacity(most + 1))).collect();
-    for_each_pair(sight.x, sight.domain, sight.dimensions, reach, |p| {
-        if !(moves(p.i) && moves(p.j) && p.r > 0.0) {
-            return;
+impl Nearest {
+    /// Finds the neighbours of the particles `of`; those with too few are left out.
+    fn new(
+        sight: &Sight,
+        of: impl IntoIterator<Item = usize>,
+        moves: impl Fn(usize) -> bool,
+        reach: f64,
+    ) -> Nearest {
+        let most = neighbours(sight.dimensions);
+        let mut found = Nearest { at: vec![None; sight.x.len()], lists: Vec::new() };
+        for k in of {
+            found.at[k].get_or_insert_with(|| {
+                found.lists.push(Vec::with_capacity(most + 1));
+                found.lists.len() - 1
+            });
         }
-        // `d` is the vector from j to i.
-        for (k, other, sign) in [(p.i, p.j, -1.0), (p.j, p.i, 1.0)] {
-            let Some(list) = found.get_mut(&k) else { continue };
-            let at = list.partition_point(|(r, ..)| *r <= p.r);
-            if at < most {
-                list.insert(at, (p.r, other, p.d.map(|c| sign * c / p.r)));
+        let Nearest { at, lists } = &mut found;
+        (sight.pairs)(reach, &mut |p| {
+            if !(moves(p.i) && moves(p.j) && p.r > 0.0) {
+                return;
+            }
+            // `d` is the vector from j to i.
+            for (k, other, sign) in [(p.i, p.j, -1.0), (p.j, p.i, 1.0)] {
+                let Some(list) = at[k].map(|k| &mut lists[k]) else { continue };
+                if list.len() == most && list[most - 1].0 <= p.r {
+                    continue;
+                }
+                let place = list.partition_point(|(r, ..)| *r <= p.r);
+                list.insert(place, (p.r, other, p.d.map(|c| sign * c / p.r)));
                 list.truncate(most);
             }
-        }
-    });
-    found.retain(|_, list| list.len() == most);
-    found
+        });
+        at.iter_mut().for_each(|at| *at = at.filter(|k| lists[*k].len() == most));
+        found
+    }
+
+    fn of(&self, particle: usize) -> Option<&Vec<Near>> {
+        self.at[particle].map(|k| &self.lists[k])
+    }
+
+    /// The bond-order vector of each particle, divided by its length.
+    fn bonds(&self, dimensions: usize) -> Vec<Bonds> {
+        let of_list = |list: &Vec<Near>| {
+            let mut sum = [0.0; 13];
+            for (_, _, direction) in list {
+                let harmonics = harmonics(*direction, dimensions);
+                sum.iter_mut().zip(harmonics).for_each(|(sum, q)| *sum += q);
+            }
+            let length = product(&sum, &sum).sqrt();
+            sum.map(|q| q / length)
+        };
+        self.lists.iter().map(of_list).collect()
+    }
 }
 
 impl Order {
@@ -200,7 +270,8 @@ impl Order {
         if self.samples > 1 && !(passed.is_multiple_of(unit) && (passed / unit).is_power_of_two()) {
             return;
         }
-        let rho = density_of_densest_tenth(sight.x, sight.domain, sight.dimensions, sight.range, &moves);
+        let within = |visit: &mut dyn FnMut(Pair)| (sight.pairs)(sight.range, visit);
+        let rho = density_of_densest_tenth(sight.x.len(), sight.dimensions, sight.range, &moves, within);
         let mut reach = reach(sight.dimensions, rho);
         if !(rho > 0.0 && reach.is_finite()) {
             return;
@@ -234,17 +305,18 @@ impl Order {
         let mut mobile: Vec<usize> = (0..sight.x.len()).filter(|k| moves(*k)).collect();
         mobile.sort_unstable_by_key(|k| sight.tags[*k]);
         let chosen = mobile.iter().copied().step_by(mobile.len().div_ceil(PROBES).max(1));
-        let mut found: Vec<_> = nearest(sight, chosen, moves, reach).into_iter().collect();
-        found.sort_unstable_by_key(|(k, _)| sight.tags[*k]);
-        let probe = |(k, list): (usize, Vec<Near>)| {
+        let chosen: Vec<usize> = chosen.collect();
+        let found = Nearest::new(sight, chosen.iter().copied(), moves, reach);
+        let probe = |k: usize| {
+            let list = found.of(k)?;
             let neighbour = |&(distance, j, e): &Near| {
                 let apart = apart(sight, k, j);
                 let image = std::array::from_fn(|c| distance * e[c] - apart[c]);
                 Neighbour { tag: sight.tags[j], image, distance }
             };
-            Probe { tag: sight.tags[k], neighbours: list.iter().map(neighbour).collect() }
+            Some(Probe { tag: sight.tags[k], neighbours: list.iter().map(neighbour).collect() })
         };
-        self.probes = found.into_iter().map(probe).collect();
+        self.probes = chosen.into_iter().filter_map(probe).collect();
     }
 
     fn look(&self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) -> Option<Look> {
@@ -255,25 +327,17 @@ impl Order {
             index.entry(*tag).and_modify(|at| *at = k);
         }
         let at = |tag: &i32| index.get(tag).copied().filter(|k| *k < sight.x.len());
-        let of_probes = nearest(sight, self.probes.iter().filter_map(|p| at(&p.tag)), moves, reach);
-        let beside = of_probes.values().flatten().map(|n| n.1).chain(of_probes.keys().copied());
-        let all = nearest(sight, beside, moves, reach);
-        let product = |a: usize, b: usize| {
-            let (a, b) = (all.get(&a)?, all.get(&b)?);
-            let each = |(_, _, e): &Near| {
-                b.iter()
-                    .map(|(_, _, f)| sixfold(e[0] * f[0] + e[1] * f[1] + e[2] * f[2], dimensions))
-                    .sum::<f64>()
-            };
-            Some(a.iter().map(each).sum::<f64>())
-        };
-        let own: HashMap<usize, f64> = all.keys().filter_map(|k| Some((*k, product(*k, *k)?))).collect();
+        let probes = || self.probes.iter().filter_map(|p| at(&p.tag));
+        let of_probes = Nearest::new(sight, probes(), moves, reach);
+        let beside = probes().filter_map(|k| of_probes.of(k)).flatten().map(|near| near.1);
+        let all = Nearest::new(sight, probes().chain(beside), moves, reach);
+        let bonds = all.bonds(dimensions);
         let (mut ordered, mut of_each, mut spacing) = (0.0, Vec::new(), 0.0);
         for probe in &self.probes {
-            let Some((k, list)) = at(&probe.tag).and_then(|k| Some((k, of_probes.get(&k)?))) else {
+            let Some((k, list)) = at(&probe.tag).and_then(|k| Some((k, of_probes.of(k)?))) else {
                 continue;
             };
-            let share = |j: usize| Some(product(k, j)? / (own.get(&k)? * own.get(&j)?).sqrt());
+            let share = |j: usize| Some(product(&bonds[all.at[k]?], &bonds[all.at[j]?]));
             let c = list.iter().filter_map(|n| share(n.1)).sum::<f64>() / list.len() as f64;
             let stretched = |n: &Neighbour| {
                 let d = apart(sight, k, at(&n.tag)?);

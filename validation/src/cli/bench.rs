@@ -1,7 +1,9 @@
 use super::run::{at_least, thread_count};
 use super::*;
 use psidpd_dynamics::device::Device;
-use psidpd_experiments::bench::{Asked, Options, advice, contender::FEW_ABOVE, memory, page, run as measure};
+use psidpd_experiments::bench::{
+    Asked, Options, advice, contender::FEW_ABOVE, memory, page, run as measure, scenes, whole_scenes,
+};
 use psidpd_experiments::fluids::SIZES;
 use psidpd_experiments::start::SEED;
 
@@ -49,6 +51,10 @@ pub struct Arguments {
     /// Time this GPU alone, at these sizes, in place of all codes; --json has the results.
     #[arg(long, value_name = "gpu|gpu:N")]
     device: Option<Device>,
+    /// Time whole scenes in place of codes: each template of `psidpd new` and ten shipped scenes, as they are and without
+    /// observables and output. --threads, --rounds [default: 1] and --steps of each stage apply; --json has the results.
+    #[arg(long, conflicts_with = "device")]
+    scenes: bool,
     /// Folder for bench.json, report.html and the runs.
     #[arg(long, value_name = "DIR", default_value = "target/bench")]
     out: PathBuf,
@@ -80,6 +86,9 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     }
     if let Some(device) = arguments.device.filter(|device| *device != Device::Cpu) {
         return time_device(device, arguments, told);
+    }
+    if arguments.scenes {
+        return time_scenes(arguments, told);
     }
     let full = arguments.full;
     let sizes = if full { &SIZES[..] } else { &SIZES[..2] };
@@ -135,6 +144,25 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         say!("the machine was busy before (load {load:.1}): do not trust these figures\n");
     }
     say!("report: {}", arguments.out.join("report.html").display());
+    conclude(told, &outcome, true)
+}
+
+fn time_scenes(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
+    let options = scenes::Options {
+        threads: &arguments.threads,
+        rounds: arguments.rounds.map_or(1, NonZeroUsize::get),
+        steps: arguments.steps,
+        out: &arguments.out,
+    };
+    let outcome = whole_scenes(&options, &Progress::new())?;
+    say!(
+        "Whole scenes, processor time as shipped and without observables and output; the last column is the ratio of wall times:\n"
+    );
+    say::table(&outcome.table());
+    say!("{}", outcome.machine.processor);
+    if let Some(load) = outcome.machine.load.filter(|l| *l > 0.5) {
+        say!("the machine was busy before (load {load:.1}): ratios of processor times are known to a tenth");
+    }
     conclude(told, &outcome, true)
 }
 

@@ -70,6 +70,8 @@ pub struct ThermostatTables<T> {
 pub enum Exponent<T> {
     One,
     Two,
+    /// So many quarters, from 1 to 16: square roots and products take the place of a power.
+    Quarters(u8),
     Any(SpeciesPairTable<T>),
 }
 

@@ -107,6 +107,7 @@ impl<'a, R: Reals> ThermostatWeight<'a, R> {
             exponent: match exponent {
                 Exponent::One => Power::One,
                 Exponent::Two => Power::Two,
+                Exponent::Quarters(quarters) => Power::Quarters(*quarters),
                 Exponent::Any(table) => Power::Any(table),
             },
         }
@@ -123,6 +124,7 @@ impl<'a, R: Reals> ThermostatWeight<'a, R> {
             match self.exponent {
                 Power::One => t,
                 Power::Two => t * t,
+                Power::Quarters(quarters) => of_quarters(t, quarters),
                 Power::Any(exponent) => {
                     power(t, TableLookup::<R>::new(exponent).lookup::<MULTISPECIES>(species_pair))
                 }
@@ -135,6 +137,7 @@ impl<'a, R: Reals> ThermostatWeight<'a, R> {
 enum Power<'a, T> {
     One,
     Two,
+    Quarters(u8),
     Any(&'a SpeciesPairTable<T>),
 }
 
@@ -169,6 +172,43 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
             w * (xi - self.gamma.lookup::<MULTISPECIES>(species_pair) * w * pairs.geometry.radial_velocity)
         }
     }
+}
+
+/// The power `t^(n/4)` of a number from 0 to 1, from the bits of n.
+#[inline(always)]
+unsafe fn of_quarters<R: Reals>(t: R, n: u8) -> R {
+    // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
+    unsafe {
+        let mut product = R::constant(1.0);
+        if n & 3 != 0 {
+            let root = square_root(t);
+            if n & 1 != 0 {
+                product = square_root(root);
+            }
+            if n & 2 != 0 {
+                product = product * root;
+            }
+        }
+        if n & 4 != 0 {
+            product = product * t;
+        }
+        if n & 24 != 0 {
+            let square = t * t;
+            if n & 8 != 0 {
+                product = product * square;
+            }
+            if n & 16 != 0 {
+                product = product * (square * square);
+            }
+        }
+        product
+    }
+}
+
+#[inline(always)]
+unsafe fn square_root<R: Reals>(t: R) -> R {
+    // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
+    unsafe { t * t.larger(R::constant(1e-30)).inverse_root() }
 }
 
 /// The power `t^e` for positive `t`, else zero, by the library function for each lane.

@@ -194,6 +194,7 @@ impl ListTerms {
             exponent: match &double.exponent {
                 Exponent::One => Exponent::One,
                 Exponent::Two => Exponent::Two,
+                Exponent::Quarters(quarters) => Exponent::Quarters(*quarters),
                 Exponent::Any(exponent) => Exponent::Any(table(exponent, 1.0)),
             },
         };

@@ -51,7 +51,12 @@ pub struct Evaluation {
     pub(super) planes: Vec<PlaneList>,
     /// Range of the conservative interactions.
     range: f64,
+    /// The distance up to which all pairs are there.
+    reach: f64,
 }
+
+/// How much farther than their range pairs are kept, in ranges, for [`Evaluator::energy_of_stretched`].
+const SLACK: f64 = 3e-4;
 
 impl Evaluator {
     /// Computes the derivatives of the fluid's formulas.
@@ -67,7 +72,9 @@ impl Evaluator {
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
     /// are not finite do not interact.
     pub fn evaluate(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
-        let mut planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
+        let range = self.fluid.conservative_range();
+        let reach = range * (1.0 + SLACK);
+        let mut planes = self.planes(pool, x, species, domain, reach);
         let (densities, psi) = self.excess(pool, &mut planes, species);
         pool.each(&mut planes, |plane| plane.add_forces(&self.plan, &psi.slopes));
         let forces = merge(planes.iter().map(PlaneList::sums), x.len(), 3).as_chunks().0.to_vec();
@@ -78,13 +85,36 @@ impl Evaluator {
             energy += tally.pair;
             (0..6).for_each(|c| virial[c] += tally.virial[c]);
         }
-        let range = self.fluid.conservative_range();
-        Evaluation { energy, densities, forces, virial, psi, excess, planes, range }
+        Evaluation { energy, densities, forces, virial, psi, excess, planes, range, reach }
     }
 
     /// Computes the energy `U` only.
     pub fn energy(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
-        let mut planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
+        let planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
+        self.energy_of_pairs(pool, planes, species)
+    }
+
+    /// Computes the energy `U` of an evaluated configuration after it is stretched, with its box, by a factor along each axis; `None` if
+    /// pairs may come into range that are not among those of the evaluation.
+    pub fn energy_of_stretched(
+        &self,
+        pool: &Pool,
+        evaluation: &Evaluation,
+        species: &[i32],
+        factors: [f64; 3],
+    ) -> Option<f64> {
+        let least = factors.into_iter().fold(f64::INFINITY, f64::min);
+        if evaluation.reach * least < evaluation.range {
+            return None;
+        }
+        let mut planes = self.work().spare.pop().unwrap_or_default();
+        planes.resize_with(evaluation.planes.len(), PlaneList::default);
+        let mut work: Vec<_> = planes.iter_mut().zip(&evaluation.planes).collect();
+        pool.each(&mut work, |(plane, of)| plane.stretch(of, factors));
+        Some(self.energy_of_pairs(pool, planes, species))
+    }
+
+    fn energy_of_pairs(&self, pool: &Pool, mut planes: Vec<PlaneList>, species: &[i32]) -> f64 {
         let (_, psi) = self.excess(pool, &mut planes, species);
         let energy =
             psi.value.iter().sum::<f64>() + pair_energies(pool, &planes, &self.fluid).iter().sum::<f64>();
@@ -329,6 +359,27 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             for (w, v) in found.virial.iter().zip(truth.virial) {
                 assert!((w - v).abs() < 1e-10 * scale, "{domain:?}: {w} {v}");
             }
+        }
+    }
+
+    /// The energy of a stretched configuration is that of its positions in the stretched box; pairs out of reach are not ignored.
+    #[test]
+    fn stretched_energies_are_those_of_stretched_positions() {
+        for (model, axis) in MODELS.into_iter().flat_map(|model| [(model, 0), (model, 1)]) {
+            let (evaluator, x, species, domain) = random(model, 12);
+            let found = evaluator.evaluate(&alone(), &x, &species, &domain);
+            for change in [1e-4, -1e-4] {
+                let mut factors = [1.0; 3];
+                (factors[axis], factors[1 - axis]) = (1.0 + change, 1.0 / (1.0 + change));
+                let lengths = [0, 1, 2].map(|c| domain.lengths()[c] * factors[c]);
+                let stretched = PeriodicBox::orthogonal(domain.origin(), lengths, [true; 3]).unwrap();
+                let moved: Vec<_> = x.iter().map(|x| stretched.point(domain.fraction(*x))).collect();
+                let expected = evaluator.energy(&alone(), &moved, &species, &stretched);
+                let energy = evaluator.energy_of_stretched(&alone(), &found, &species, factors).unwrap();
+                let close = (energy - expected).abs() < 1e-11 * expected.abs().max(1.0);
+                assert!(close && energy != found.energy, "{energy} {expected}");
+            }
+            assert!(evaluator.energy_of_stretched(&alone(), &found, &species, [1.0, 0.99, 1.0]).is_none());
         }
     }
 

@@ -60,6 +60,18 @@ impl PairList {
         self.thermostat_factor.clear();
     }
 
+    /// Copies another list into the same arrays.
+    pub fn copy_from(&mut self, of: &PairList) {
+        self.i.clone_from(&of.i);
+        self.j.clone_from(&of.j);
+        self.species_i.clone_from(&of.species_i);
+        self.species_j.clone_from(&of.species_j);
+        self.d.iter_mut().zip(&of.d).for_each(|(d, of)| d.clone_from(of));
+        self.r.clone_from(&of.r);
+        self.factor.clone_from(&of.factor);
+        self.thermostat_factor.clone_from(&of.thermostat_factor);
+    }
+
     /// Makes room for so many pairs, whose values are unspecified; there are no factors.
     pub fn resize(&mut self, count: usize) {
         self.i.resize(count, 0);

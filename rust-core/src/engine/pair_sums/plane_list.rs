@@ -75,6 +75,14 @@ impl PlaneList {
         run_best(Distances { list, images: places.images });
     }
 
+    /// Takes the pairs of another list, stretched by a factor along each axis.
+    pub fn stretch(&mut self, of: &PlaneList, factors: [f64; 3]) {
+        self.hosts.clone_from(&of.hosts);
+        self.species.clone_from(&of.species);
+        self.list.copy_from(&of.list);
+        run_best(Stretch { list: &mut self.list, factors });
+    }
+
     /// Sums the densities of a plan over the pairs: [`Fluid::variables`](crate::model::Fluid::variables) numbers for each
     /// particle, density-major.
     pub fn add_densities(&mut self, plan: &Plan) {
@@ -202,6 +210,25 @@ fn to_nearest<const N: usize>(images: Images, [x, y, z]: [&mut [f64; N]; 3], r: 
     [*x, *y, *z] = d;
     for k in 0..N {
         r[k] = (d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k]).sqrt();
+    }
+}
+
+/// Stretches the separations of a list, and computes distances.
+struct Stretch<'a> {
+    list: &'a mut PairList,
+    factors: [f64; 3],
+}
+
+impl Loop for Stretch<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Stretch { list: PairList { d: [x, y, z], r, .. }, factors: [a, b, c] } = self;
+        for (((x, y), z), r) in x.iter_mut().zip(y).zip(z).zip(r) {
+            (*x, *y, *z) = (a * *x, b * *y, c * *z);
+            *r = (*x * *x + *y * *y + *z * *z).sqrt();
+        }
     }
 }
 

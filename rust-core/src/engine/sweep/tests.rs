@@ -152,6 +152,11 @@ fn fluids() -> Vec<(String, Fluid)> {
         let model = Model::parse("many", text).unwrap_or_else(|e| panic!("{e}"));
         fluids.push((format!("own {k}"), model.at(0.7).unwrap()));
     }
+    for exponent in [0.25, 0.5, 0.75, 1.75, 3.0, 4.0, 1.0 / 3.0] {
+        let text = EXPONENTS.replace("exponent = 2", &format!("exponent = {exponent}"));
+        let model = Model::parse("exponent", &text).unwrap_or_else(|e| panic!("{e}"));
+        fluids.push((format!("exponent {exponent}"), model.at(0.7).unwrap()));
+    }
     fluids
 }
 

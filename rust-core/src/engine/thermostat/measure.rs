@@ -181,6 +181,12 @@ impl Loop for Weigh<'_> {
                     factor[n] = amplitude[n] * t * t / factor[n];
                 }
             }
+            Exponent::Quarters(quarters) => {
+                for n in 0..BLOCK {
+                    let t = inside(factor[n] * inverse_range[n]);
+                    factor[n] = amplitude[n] * of_quarters(t, *quarters) / factor[n];
+                }
+            }
             Exponent::Any(exponent) => {
                 for n in 0..BLOCK {
                     let t = inside(factor[n] * inverse_range[n]);
@@ -190,4 +196,15 @@ impl Loop for Weigh<'_> {
             }
         }
     }
+}
+
+/// The power `t^(n/4)`, from the bits of n.
+#[inline(always)]
+fn of_quarters(t: f64, n: u8) -> f64 {
+    let (root, square) = (t.sqrt(), t * t);
+    let mut product = if n & 1 != 0 { root.sqrt() } else { 1.0 };
+    product *= if n & 2 != 0 { root } else { 1.0 };
+    product *= if n & 4 != 0 { t } else { 1.0 };
+    product *= if n & 8 != 0 { square } else { 1.0 };
+    product * if n & 16 != 0 { square * square } else { 1.0 }
 }

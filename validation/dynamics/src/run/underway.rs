@@ -1,7 +1,7 @@
 //! The course of a run: its steps, its output and its end.
 
 use super::output::{Output, write_json, write_observations};
-use super::watch::{Deviation, Thermometer, Watch};
+use super::watch::{Deviation, Thermometer, Watch, interval_of_looks};
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
 use crate::scene::{Stage, every};
@@ -93,11 +93,12 @@ impl Runner<'_> {
         self.simulation.set_settling(self.scene.settles(self.position.stage, self.position.done));
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
-        let watched = Watch::is_due(stage, self.position.done + 1);
+        let looks = !self.measures_forces(stage, interval_of_looks(stage));
+        let watched = Watch::is_due(stage, self.position.done + 1, looks);
         if watched {
             self.simulation.end_step()?;
             self.simulation.fetch()?;
-            self.watch.sample(&mut self.simulation, stage, self.position.done + 1)?;
+            self.watch.sample(&mut self.simulation, stage, self.position.done + 1, looks)?;
         }
         let sampled = self.observers.may_sample(number, &stage.name);
         if is_last || totals || sampled || self.scene.output.writes_particles(number) {
@@ -173,12 +174,21 @@ impl Runner<'_> {
     /// The deviation of the configurational temperature that a stage measures, with more configurations than the watch looks at.
     /// The first stage may still settle.
     fn measured_deviation(&self, stage: &Stage) -> Option<Deviation> {
-        let steady = self.position.stage > 0 && stage.level.is_none();
-        if !steady || !stage.thermostat || self.simulation.has_body_forces() {
+        if !self.measures_forces(stage, u64::MAX) {
             return None;
         }
         let found = self.observers.temperature(&stage.name)?;
         Deviation::measured(stage, found.scalar("configurational")?, found.samples as usize)
+    }
+
+    /// Whether the observables of a stage that may have come to rest measure its temperatures, at least once in `interval` steps.
+    fn measures_forces(&self, stage: &Stage, interval: u64) -> bool {
+        let steady = self.position.stage > 0 && stage.level.is_none();
+        let every = self.observers.interval_of_temperature(&stage.name);
+        steady
+            && stage.thermostat
+            && !self.simulation.has_body_forces()
+            && every.is_some_and(|every| every <= interval)
     }
 
     /// Keeps the present state as the last good one. The output of this step must be written already.

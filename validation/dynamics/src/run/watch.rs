@@ -4,7 +4,7 @@
 //! a flow does not count. Each stage has a number of samples, a long stage one every [`INTERVAL`] steps, at a
 //! hundredth of the cost of the steps; sampling changes no step. The configurational temperature, which is
 //! most sensitive to errors of the forces, is sampled [`LOOKS`] times in a stage of at least [`WORTH_A_LOOK`] steps, at
-//! most at a twentieth of the cost of the steps.
+//! most at a twentieth of the cost of the steps; not where an observable measures it with more configurations.
 //!
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
@@ -197,25 +197,30 @@ impl Configurational {
 }
 
 impl Watch {
-    pub fn is_due(stage: &Stage, done: u64) -> bool {
+    /// Whether a sample is due. Without `looks` there are no configurational temperatures.
+    pub fn is_due(stage: &Stage, done: u64, looks: bool) -> bool {
         let interval = (stage.steps / SAMPLES).clamp(LEAST, INTERVAL);
-        stage.thermostat && (done.is_multiple_of(interval) || looks_at_forces(stage, done))
+        stage.thermostat && (done.is_multiple_of(interval) || looks && looks_at_forces(stage, done))
     }
 
     /// Takes a sample; the step must be complete.
-    pub fn sample(&mut self, simulation: &mut Simulation, stage: &Stage, done: u64) -> Result<(), RunError> {
+    pub fn sample(
+        &mut self,
+        simulation: &mut Simulation,
+        stage: &Stage,
+        done: u64,
+        looks: bool,
+    ) -> Result<(), RunError> {
+        let due = looks && looks_at_forces(stage, done);
         if !stage.integrator.has_time() {
             // Monte Carlo draws velocities at kT, so their temperature reveals no error.
-            let due = looks_at_forces(stage, done);
             self.configurational.extend(due.then(|| configurational(simulation)).flatten());
             return Ok(());
         }
         let Some(warmth) = simulation.warmth(stage.dt)? else { return Ok(()) };
         let ratio = warmth.kt / stage.kt;
         self.kinetic.push(ratio);
-        if looks_at_forces(stage, done)
-            && let Some(sums) = configurational(simulation)
-        {
+        if due && let Some(sums) = configurational(simulation) {
             self.configurational.push(sums);
         }
         // A body force may drive a flow that is hot by itself.
@@ -263,10 +268,13 @@ impl Watch {
 
 /// Whether a configurational temperature is due.
 fn looks_at_forces(stage: &Stage, done: u64) -> bool {
-    // Odd, for steps with and without a thermostat.
+    stage.steps >= WORTH_A_LOOK && stage.level.is_none() && done.is_multiple_of(interval_of_looks(stage))
+}
+
+/// The number of steps between configurational temperatures; odd, for steps with and without a thermostat.
+pub(super) fn interval_of_looks(stage: &Stage) -> u64 {
     let least = LEAST_RARE / stage.integrator.properties().evaluations;
-    let interval = (stage.steps / LOOKS).clamp(least, RARE) | 1;
-    stage.steps >= WORTH_A_LOOK && stage.level.is_none() && done.is_multiple_of(interval)
+    (stage.steps / LOOKS).clamp(least, RARE) | 1
 }
 
 /// Whether a temperature in units of kT deviates by more than [`TOLERANCE`] and chance.
@@ -631,7 +639,7 @@ mod tests {
     /// 24 samples of a short stage, ten steps apart at least and 250 at most; none without thermostat.
     #[test]
     fn samples_are_taken_when_the_page_says() {
-        let every = |stage: &Stage| (1..=stage.steps).find(|done| Watch::is_due(stage, *done));
+        let every = |stage: &Stage| (1..=stage.steps).find(|done| Watch::is_due(stage, *done, true));
         for (steps, expected) in [(48, 10), (240, 10), (720, 30), (960, 40)] {
             let mut usual = stage(steps, Integrator::VelocityVerlet);
             assert_eq!(every(&usual), Some(expected));

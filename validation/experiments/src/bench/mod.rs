@@ -16,6 +16,7 @@ pub mod native;
 pub mod outcome;
 pub mod page;
 mod pairs;
+pub mod scenes;
 mod spread;
 mod turns;
 
@@ -122,18 +123,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     let outcome = Benchmark {
         format: 3,
         version: env!("CARGO_PKG_VERSION"),
-        machine: Machine {
-            processor: machine(),
-            cores: std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
-            instructions: Instructions::ALL
-                .into_iter()
-                .filter(|(_, i)| i.available())
-                .map(|(name, _)| name.to_owned())
-                .collect(),
-            better: better(),
-            gigahertz: clock::gigahertz(),
-            load,
-        },
+        machine: this_machine(load),
         lammps: LammpsFacts { version, missing },
         options: options.asked.clone(),
         fluids,
@@ -145,6 +135,30 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     write_json(&out.join("bench.json"), options.existing, &outcome)?;
     write_bytes(&out.join("report.html"), options.existing, page::report(&outcome)?.as_bytes())?;
     Ok(outcome)
+}
+
+/// The machine, with the load before the benchmark.
+fn this_machine(load: Option<f64>) -> Machine {
+    Machine {
+        processor: machine(),
+        cores: std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
+        instructions: Instructions::ALL
+            .into_iter()
+            .filter(|(_, i)| i.available())
+            .map(|(name, _)| name.to_owned())
+            .collect(),
+        better: better(),
+        gigahertz: clock::gigahertz(),
+        load,
+    }
+}
+
+/// Times whole scenes; see [`scenes`].
+pub fn whole_scenes(
+    options: &scenes::Options,
+    progress: &Progress,
+) -> Result<scenes::Outcome, ExperimentError> {
+    scenes::run(options, this_machine(load()), progress)
 }
 
 /// Who can be timed here, and the styles that LAMMPS lacks.

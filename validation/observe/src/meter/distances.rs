@@ -1,18 +1,22 @@
 //! Histograms of the distances of particles.
 //!
-//! Distances are computed in single precision, eight at a time, and those that are so near to the edge of a shell that rounding may
+//! Particles are sorted into rows. Each few neighbours in a row share a list of all particles that may be in their range, whose
+//! distances are computed in single precision, eight at a time, and those that are so near to the edge of a shell that rounding may
 //! matter once more in double precision, so that counts are those of double precision.
 
 use super::PeriodicBox;
 use psidpd_core::engine::Pool;
 use psidpd_core::engine::vectors::{self, Loop};
-use std::ops::{Add, Range, Sub};
+use std::ops::{Add, Mul, Range, Sub};
 
 /// Rows of particles per range. Narrower rows give fewer pairs beyond the range.
 const ROWS_PER_RANGE: f64 = 3.0;
 
 /// The number of distances in a vector.
 const LANES: usize = 8;
+
+/// The number of particles that share a list.
+const GROUP: usize = 8;
 
 /// Shells beyond the range, in ranges. Pairs out of range are counted in these shells, which are never read.
 const BEYOND: usize = 3;
@@ -40,14 +44,11 @@ pub fn count(
     let sorted = Sorted::new(x, species, &near);
     // Outside an open box fractions are large.
     let farthest = sorted.s.iter().flatten().fold(1.0f64, |most, s| most.max(s.abs()));
-    near.doubt = (f64::from(near.doubt) * farthest).min(1.0) as f32;
-    let planes = sorted.planes.len();
-    let pairs: Vec<[usize; 2]> = (0..planes).flat_map(|a| (a..planes).map(move |b| [a, b])).collect();
-    let of_none = Counts { numbers: vec![0; kinds * kinds * near.width], kinds, found: Vec::new() };
+    near.single.doubt = (f64::from(near.single.doubt) * farthest).min(1.0) as f32;
+    let of_none = Counts { numbers: vec![0; kinds * kinds * near.width], kinds };
     let mut shares: Vec<(usize, Counts)> = (0..pool.threads()).map(|t| (t, of_none.clone())).collect();
     pool.each(&mut shares, |(t, counts)| {
-        let pairs = pairs.iter().skip(*t).step_by(pool.threads());
-        pairs.for_each(|pair| counts.add_planes(&near, &sorted, pair.map(|k| &sorted.planes[k])));
+        vectors::run_best(AddRows { near: &near, sorted: &sorted, first: *t, step: pool.threads(), counts });
     });
     let mut counts = of_none.numbers;
     for (_, share) in &shares {
@@ -79,6 +80,17 @@ struct Near<'a> {
     per_length: f64,
     /// The number of counters for each pair of species.
     width: usize,
+    single: Single,
+}
+
+/// The same in single precision.
+struct Single {
+    edges: [[f32; 3]; 3],
+    period: [f32; 3],
+    per_length: f32,
+    /// The last counter, and the first that is not read.
+    last: f32,
+    beyond: f32,
     /// Distances in shells that are nearer to an edge are not known in single precision.
     doubt: f32,
 }
@@ -103,24 +115,46 @@ impl Interval {
 /// Particles in a row along the first edge, with nearly equal fractions along the other edges.
 struct Row {
     particles: Range<usize>,
-    across: Interval,
+    across: [Interval; 2],
 }
 
-/// Neighbouring rows.
-struct Plane {
-    rows: Vec<Row>,
-    across: Interval,
-}
-
-/// Particles sorted into rows, and by the first fraction within a row.
+/// Particles sorted into rows, and by the first fraction within a row. A vector of places without particles follows the last one.
 struct Sorted {
-    /// Fractions of the box, padded by the length of a vector, in double and in single precision.
+    /// Fractions of the box in double and in single precision; NaN in places without particles.
     s: [Vec<f64>; 3],
     short: [Vec<f32>; 3],
     species: Vec<usize>,
     /// For each particle, the offset of its species in the counts of another species.
     offset: Vec<u32>,
-    planes: Vec<Plane>,
+    rows: Vec<Row>,
+}
+
+/// The particles that may be in range of a group, in whole vectors.
+#[derive(Default)]
+struct Candidates {
+    short: [Vec<f32>; 3],
+    offset: Vec<u32>,
+    index: Vec<u32>,
+}
+
+impl Candidates {
+    #[inline(always)]
+    fn clear(&mut self) {
+        for c in 0..3 {
+            self.short[c].clear();
+        }
+        self.offset.clear();
+        self.index.clear();
+    }
+
+    #[inline(always)]
+    fn extend(&mut self, sorted: &Sorted, span: Range<usize>) {
+        for c in 0..3 {
+            self.short[c].extend_from_slice(&sorted.short[c][span.clone()]);
+        }
+        self.offset.extend_from_slice(&sorted.offset[span.clone()]);
+        self.index.extend(span.start as u32..span.end as u32);
+    }
 }
 
 /// Counted pairs: [`Near::width`] numbers for each species of the first and of the second particle.
@@ -128,36 +162,75 @@ struct Sorted {
 struct Counts {
     numbers: Vec<u64>,
     kinds: usize,
-    /// The counter of each pair of one particle.
-    found: Vec<u32>,
 }
 
-impl Counts {
-    /// Counts the pairs between two planes, or within one plane.
-    fn add_planes(&mut self, near: &Near, sorted: &Sorted, [plane, other_plane]: [&Plane; 2]) {
-        let apart = near.apart(1, &plane.across, &other_plane.across);
-        let same = std::ptr::eq(plane, other_plane);
-        for (at, row) in plane.rows.iter().enumerate() {
-            for other in &other_plane.rows[if same { at } else { 0 }..] {
-                if let Some(chord) = near.chord(apart, near.apart(2, &row.across, &other.across)) {
-                    self.add(near, sorted, [row, other], chord);
-                }
+/// Counts the pairs of every `step`-th row with itself and with later rows.
+struct AddRows<'a> {
+    near: &'a Near<'a>,
+    sorted: &'a Sorted,
+    first: usize,
+    step: usize,
+    counts: &'a mut Counts,
+}
+
+impl Loop for AddRows<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let AddRows { near, sorted, first, step, counts } = self;
+        let (mut beside, mut candidates) = (Vec::new(), Candidates::default());
+        for row in (first..sorted.rows.len()).step_by(step) {
+            near.find_rows(&sorted.rows, row, &mut beside);
+            match near.is_orthogonal {
+                true => counts.add::<true>(near, sorted, row, &beside, &mut candidates),
+                false => counts.add::<false>(near, sorted, row, &beside, &mut candidates),
             }
         }
     }
+}
 
-    /// Counts the pairs between two rows, or within one row.
-    fn add(&mut self, near: &Near, sorted: &Sorted, [row, other]: [&Row; 2], chord: f64) {
-        let mut window = Window::new(near, chord, &sorted.s[0], other.particles.clone());
-        for i in row.particles.clone() {
-            let of_species = self.kinds * near.width;
-            let numbers = &mut self.numbers[of_species * sorted.species[i]..][..of_species];
-            // In its own row a particle is paired only with later ones, so that each pair is counted once.
-            let from = if std::ptr::eq(row, other) { i + 1 } else { 0 };
-            for span in window.around(sorted.s[0][i]) {
-                let span = from.max(span.start)..span.end;
-                vectors::run_best(Bins { near, sorted, i, span, found: &mut self.found });
-                self.found.iter().for_each(|bin| numbers[*bin as usize] += 1);
+impl Counts {
+    /// Counts the pairs of a row with itself and with the rows `beside`.
+    #[inline(always)]
+    fn add<const ORTHOGONAL: bool>(
+        &mut self,
+        near: &Near,
+        sorted: &Sorted,
+        row: usize,
+        beside: &[(usize, f64)],
+        candidates: &mut Candidates,
+    ) {
+        let Range { start, end } = sorted.rows[row].particles;
+        let of_species = self.kinds * near.width;
+        for first in (start..end).step_by(GROUP) {
+            let group = first..end.min(first + GROUP);
+            let ends = [sorted.s[0][first], sorted.s[0][group.end - 1]];
+            candidates.clear();
+            for (other, chord) in beside {
+                let of_row = sorted.rows[*other].particles.clone();
+                for span in near.spans(&sorted.s[0], of_row, *chord, ends) {
+                    candidates.extend(sorted, span);
+                }
+            }
+            // In their own row particles are paired only with later ones, so that each pair is counted once.
+            for span in near.spans(&sorted.s[0], group.end..end, near.range, ends) {
+                candidates.extend(sorted, span);
+            }
+            let nobody = sorted.species.len() - LANES;
+            let vectors = candidates.index.len().div_ceil(LANES);
+            candidates.extend(sorted, nobody..nobody + vectors * LANES - candidates.index.len());
+            for i in group.clone() {
+                let numbers = &mut self.numbers[of_species * sorted.species[i]..][..of_species];
+                for at in 0..vectors {
+                    for bin in bins::<ORTHOGONAL>(near, sorted, i, candidates, at * LANES) {
+                        numbers[bin as usize] += 1;
+                    }
+                }
+                for j in i + 1..group.end {
+                    let index = [j as u32; LANES];
+                    numbers[exact_bins::<ORTHOGONAL>(near, sorted, i, &index)[0] as usize] += 1;
+                }
             }
         }
     }
@@ -169,21 +242,64 @@ impl<'a> Near<'a> {
         let lengths = (0..dimensions).flat_map(|k| domain.edge(k)).map(f64::abs);
         // Distances of up to all ranges that are counted are rounded too.
         let longest = lengths.fold((1 + BEYOND) as f64 * shells.range, f64::max);
+        let edges = [0, 1, 2].map(|k| if k < dimensions { domain.edge(k) } else { [0.0; 3] });
+        let period = [0, 1, 2].map(|k| f64::from(u8::from(periodic[k] && k < dimensions)));
+        let (per_length, width) = (shells.bins as f64 / shells.range, (1 + BEYOND) * shells.bins);
         Near {
             domain,
             dimensions,
-            edges: [0, 1, 2].map(|k| if k < dimensions { domain.edge(k) } else { [0.0; 3] }),
-            period: [0, 1, 2].map(|k| f64::from(u8::from(periodic[k] && k < dimensions))),
+            edges,
+            period,
             range: shells.range,
             heights: [0, 1, 2].map(|k| if k < dimensions { domain.height(k) } else { f64::INFINITY }),
             is_orthogonal: (0..3).all(|k| (0..3).all(|c| c == k || domain.edge(k)[c] == 0.0)),
-            per_length: shells.bins as f64 / shells.range,
-            width: (1 + BEYOND) * shells.bins,
-            doubt: (ROUNDINGS * longest * shells.bins as f64 / shells.range / 16_777_216.0).min(1.0) as f32,
+            per_length,
+            width,
+            single: Single {
+                edges: edges.map(|edge| edge.map(|c| c as f32)),
+                period: period.map(|period| period as f32),
+                per_length: per_length as f32,
+                last: (width - 1) as f32,
+                beyond: (shells.bins + 1) as f32,
+                doubt: (ROUNDINGS * longest * per_length / 16_777_216.0).min(1.0) as f32,
+            },
+        }
+    }
+
+    /// Finds the rows after one that are in its range, with their extents of the range along the first edge.
+    fn find_rows(&self, rows: &[Row], row: usize, found: &mut Vec<(usize, f64)>) {
+        let own = &rows[row].across;
+        found.clear();
+        for (k, Row { across, .. }) in rows.iter().enumerate().skip(row + 1) {
+            let [second, third] = [0, 1].map(|c| self.apart(c + 1, &own[c], &across[c]));
+            if second >= self.range {
+                continue;
+            }
+            found.extend(self.chord(second, third).map(|chord| (k, chord)));
+        }
+    }
+
+    /// Disjoint spans of a row in which all particles lie that are closer than `chord` to one between two `ends` along the first edge.
+    #[inline(always)]
+    fn spans(&self, s: &[f64], row: Range<usize>, chord: f64, ends: [f64; 2]) -> [Range<usize>; 3] {
+        let reach = chord / self.heights[0];
+        let is_periodic = self.period[0] > 0.0;
+        let (low, high) = (ends[0] - reach, ends[1] + reach);
+        if is_periodic && high - low >= 1.0 {
+            return [row, 0..0, 0..0];
+        }
+        let (first, end) = (lower_bound(s, &row, low), lower_bound(s, &row, high));
+        match is_periodic {
+            true => {
+                let (below, above) = (lower_bound(s, &row, high - 1.0), lower_bound(s, &row, low + 1.0));
+                [row.start..below, first..end, above..row.end]
+            }
+            false => [first..end, 0..0, 0..0],
         }
     }
 
     /// The least distance of particles in two intervals of fraction `k`.
+    #[inline(always)]
     fn apart(&self, k: usize, a: &Interval, b: &Interval) -> f64 {
         let between = (b.low - a.high).max(a.low - b.high);
         let around = 1.0 + a.low.min(b.low) - a.high.max(b.high);
@@ -192,6 +308,7 @@ impl<'a> Near<'a> {
     }
 
     /// The extent of the range along the first edge, for given distances along the other edges.
+    #[inline(always)]
     fn chord(&self, second: f64, third: f64) -> Option<f64> {
         match self.is_orthogonal {
             true => Some(self.range * self.range - second * second - third * third)
@@ -202,75 +319,81 @@ impl<'a> Near<'a> {
     }
 }
 
-/// Finds the counters of the pairs of `i` with the particles of a span.
-struct Bins<'a> {
-    near: &'a Near<'a>,
-    sorted: &'a Sorted,
-    i: usize,
-    span: Range<usize>,
-    found: &'a mut Vec<u32>,
-}
-
-impl Loop for Bins<'_> {
-    type Out = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Bins { near, sorted, i, span, found } = self;
-        let own = [sorted.short[0][i], sorted.short[1][i], sorted.short[2][i]];
-        let [a, b, c] = near.edges.map(|edge| edge.map(|c| c as f32));
-        let period = near.period.map(|period| period as f32);
-        let per_length = near.per_length as f32;
-        let (last, beyond) = ((near.width - 1) as f32, (near.width / (1 + BEYOND) + 1) as f32);
-        found.clear();
-        for first in span.clone().step_by(LANES) {
-            let s = nearest(lanes(&sorted.short[0], first), own[0], period[0], 0.5);
-            let t = nearest(lanes(&sorted.short[1], first), own[1], period[1], 0.5);
-            let u = nearest(lanes(&sorted.short[2], first), own[2], period[2], 0.5);
-            let offset = lanes(&sorted.offset, first);
-            let (mut bins, mut doubt) = ([0; LANES], [false; LANES]);
-            for k in 0..LANES {
-                let x = s[k] * a[0] + t[k] * b[0] + u[k] * c[0];
-                let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
-                let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
-                let place = (x * x + y * y + z * z).sqrt() * per_length;
-                let place = if place < last { place } else { last };
-                // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
-                let bin: i32 = unsafe { place.to_int_unchecked() };
-                let part = place - bin as f32;
-                doubt[k] = (part < near.doubt || part > 1.0 - near.doubt) & (place < beyond);
-                bins[k] = offset[k] + bin as u32;
-            }
-            if near.doubt > 0.5 || doubt.iter().fold(false, |any, doubt| any | doubt) {
-                bins = exact_bins(near, sorted, i, first);
-            }
-            found.extend_from_slice(&bins);
-        }
-        found.truncate(span.len());
-    }
-}
-
-/// The counters of the pairs of `i` with the particles of a vector.
+/// The counters of the pairs of `i` with the candidates of a vector. (Closures would not be compiled for the instruction set.)
 #[inline(always)]
-fn exact_bins(near: &Near, sorted: &Sorted, i: usize, first: usize) -> [u32; LANES] {
-    let own = [sorted.s[0][i], sorted.s[1][i], sorted.s[2][i]];
-    let [a, b, c] = near.edges;
-    let last = (near.width - 1) as f64;
-    let s = nearest(lanes(&sorted.s[0], first), own[0], near.period[0], 0.5);
-    let t = nearest(lanes(&sorted.s[1], first), own[1], near.period[1], 0.5);
-    let u = nearest(lanes(&sorted.s[2], first), own[2], near.period[2], 0.5);
-    let offset = lanes(&sorted.offset, first);
-    let mut bins = [0; LANES];
+fn bins<const ORTHOGONAL: bool>(
+    near: &Near,
+    sorted: &Sorted,
+    i: usize,
+    candidates: &Candidates,
+    first: usize,
+) -> [u32; LANES] {
+    let Single { edges, period, per_length, last, beyond, doubt } = &near.single;
+    let [x, y, z] = &sorted.short;
+    let [of_x, of_y, of_z] = &candidates.short;
+    let s = nearest(lanes(of_x, first), x[i], period[0], 0.5);
+    let t = nearest(lanes(of_y, first), y[i], period[1], 0.5);
+    let u = nearest(lanes(of_z, first), z[i], period[2], 0.5);
+    let offset = lanes(&candidates.offset, first);
+    let (mut bins, mut unsure) = ([0; LANES], false);
     for k in 0..LANES {
-        let x = s[k] * a[0] + t[k] * b[0] + u[k] * c[0];
-        let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
-        let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
-        let bin = (x * x + y * y + z * z).sqrt() * near.per_length;
+        let place = distance_squared::<f32, ORTHOGONAL>([s[k], t[k], u[k]], edges).sqrt() * per_length;
+        let place = if place < *last { place } else { *last };
         // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
-        let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
+        let bin: i32 = unsafe { place.to_int_unchecked() };
+        let part = place - bin as f32;
+        unsure |= (part < *doubt || part > 1.0 - doubt) & (place < *beyond);
         bins[k] = offset[k] + bin as u32;
     }
+    match unsure || *doubt > 0.5 {
+        true => exact_bins::<ORTHOGONAL>(near, sorted, i, lanes(&candidates.index, first)),
+        false => bins,
+    }
+}
+
+/// [`bins`] in double precision.
+#[inline(always)]
+fn exact_bins<const ORTHOGONAL: bool>(
+    near: &Near,
+    sorted: &Sorted,
+    i: usize,
+    index: &[u32; LANES],
+) -> [u32; LANES] {
+    let last = (near.width - 1) as f64;
+    let mut s = [[0.0; LANES]; 3];
+    for c in 0..3 {
+        for k in 0..LANES {
+            s[c][k] = sorted.s[c][index[k] as usize];
+        }
+        s[c] = nearest(&s[c], sorted.s[c][i], near.period[c], 0.5);
+    }
+    let mut bins = [0; LANES];
+    for k in 0..LANES {
+        let square = distance_squared::<f64, ORTHOGONAL>([s[0][k], s[1][k], s[2][k]], &near.edges);
+        let bin = square.sqrt() * near.per_length;
+        // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
+        let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
+        bins[k] = sorted.offset[index[k] as usize] + bin as u32;
+    }
     bins
+}
+
+/// The square of the length of the vector with fractions `s` of the edges, in either precision.
+#[inline(always)]
+fn distance_squared<T, const ORTHOGONAL: bool>(s: [T; 3], edges: &[[T; 3]; 3]) -> T
+where
+    T: Copy + Add<Output = T> + Mul<Output = T>,
+{
+    let [a, b, c] = edges;
+    let d = match ORTHOGONAL {
+        true => [s[0] * a[0], s[1] * b[1], s[2] * c[2]],
+        false => [
+            s[0] * a[0] + s[1] * b[0] + s[2] * c[0],
+            s[0] * a[1] + s[1] * b[1] + s[2] * c[1],
+            s[0] * a[2] + s[1] * b[2] + s[2] * c[2],
+        ],
+    };
+    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
 }
 
 /// The [`LANES`] numbers that begin at `first`.
@@ -295,40 +418,15 @@ where
     apart
 }
 
-/// The particles of a row that may be in range of another particle, which moves along the first edge.
-struct Window<'a> {
-    s: &'a [f64],
-    row: Range<usize>,
-    reach: f64,
-    is_periodic: bool,
-    /// The ends of the spans: particles in range, and particles in range through either end of the periodic box.
-    at: [usize; 4],
-}
-
-impl<'a> Window<'a> {
-    fn new(near: &Near, chord: f64, s: &'a [f64], row: Range<usize>) -> Window<'a> {
-        let (reach, is_periodic) = (chord / near.heights[0], near.period[0] > 0.0);
-        Window { s, at: [row.start; 4], row, reach, is_periodic }
+/// The first particle of a row that is not below a limit.
+#[inline(always)]
+fn lower_bound(s: &[f64], row: &Range<usize>, limit: f64) -> usize {
+    let (mut low, mut high) = (row.start, row.end);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        (low, high) = if s[middle] < limit { (middle + 1, high) } else { (low, middle) };
     }
-
-    /// Disjoint spans of a row around `s`, which must not be less than in the call before.
-    fn around(&mut self, s: f64) -> [Range<usize>; 3] {
-        let Window { reach, is_periodic, .. } = *self;
-        if is_periodic && 2.0 * reach >= 1.0 {
-            return [self.row.clone(), 0..0, 0..0];
-        }
-        let limits = [s - reach, s + reach, s + reach - 1.0, s - reach + 1.0];
-        for (at, limit) in self.at.iter_mut().zip(limits) {
-            while *at < self.row.end && self.s[*at] < limit {
-                *at += 1;
-            }
-        }
-        let [first, end, first_end, last] = self.at;
-        match is_periodic {
-            true => [self.row.start..first_end, first..end, last..self.row.end],
-            false => [first..end, 0..0, 0..0],
-        }
-    }
+    low
 }
 
 impl Sorted {
@@ -347,31 +445,32 @@ impl Sorted {
             })
             .collect();
         particles.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1[0].total_cmp(&b.1[0])));
-        let mut first = 0;
-        let of_plane = |plane: &[([usize; 2], [f64; 3], usize)]| {
-            let rows = plane.chunk_by(|a, b| a.0 == b.0).map(|row| {
-                first += row.len();
-                Row {
-                    particles: first - row.len()..first,
-                    across: Interval::of(row.iter().map(|particle| particle.1[2])),
-                }
-            });
-            Plane { rows: rows.collect(), across: Interval::of(plane.iter().map(|particle| particle.1[1])) }
+        let mut sorted = Sorted {
+            s: Default::default(),
+            short: Default::default(),
+            species: Vec::new(),
+            offset: Vec::new(),
+            rows: Vec::new(),
         };
-        let planes = particles.chunk_by(|a, b| a.0[0] == b.0[0]).map(of_plane).collect();
-        // Vectors read beyond the last particle, so the arrays are padded.
-        let padding = LANES - 1;
-        let fractions = |k: usize| particles.iter().map(move |particle| particle.1[k]);
-        let offsets = particles.iter().map(|particle| (particle.2 * near.width) as u32);
-        let s =
-            [0, 1, 2].map(|k| fractions(k).chain(std::iter::repeat_n(0.0, padding)).collect::<Vec<f64>>());
-        Sorted {
-            short: s.each_ref().map(|s| s.iter().map(|s| *s as f32).collect()),
-            s,
-            offset: offsets.chain(std::iter::repeat_n(0, padding)).collect(),
-            species: particles.into_iter().map(|particle| particle.2).collect(),
-            planes,
+        for row in particles.chunk_by(|a, b| a.0 == b.0) {
+            let first = sorted.species.len();
+            row.iter().for_each(|(_, s, species)| sorted.push(*s, *species, near.width));
+            sorted.rows.push(Row {
+                particles: first..first + row.len(),
+                across: [1, 2].map(|c| Interval::of(row.iter().map(|particle| particle.1[c]))),
+            });
         }
+        (0..LANES).for_each(|_| sorted.push([f64::NAN; 3], 0, 0));
+        sorted
+    }
+
+    fn push(&mut self, s: [f64; 3], species: usize, width: usize) {
+        for c in 0..3 {
+            self.s[c].push(s[c]);
+            self.short[c].push(s[c] as f32);
+        }
+        self.species.push(species);
+        self.offset.push((species * width) as u32);
     }
 }
 

@@ -29,6 +29,11 @@ pub fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
     let domain = view.domain;
     // The other two edges span the faces normal to a direction, so edges are scaled and not directions.
     let scale = deformation(axis, view.dimensions, change);
+    let of_same_pairs =
+        frame.evaluator.energy_of_stretched(view.pool, frame.evaluation(), view.species, scale);
+    if let Some(energy) = of_same_pairs {
+        return energy;
+    }
     let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
     let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
     let x: Vec<[f64; 3]> = view.x.iter().map(|x| stretched.point(domain.fraction(*x))).collect();
