@@ -65,6 +65,18 @@ const USUAL: &[Usual] = &[
             row(1000.0, [17.04, 0.05], Some([0.0125, 0.0001])),
         ],
     },
+    Usual {
+        name: "Warren's liquid, A = −40, B = 25",
+        strength: -40.0,
+        many_body: 25.0,
+        density: 6.05,
+        rows: &[
+            row(4.5, [5.53, 0.13], Some([0.0505, 0.0005])),
+            row(18.0, [7.95, 0.08], Some([0.0359, 0.0007])),
+            row(50.0, [13.74, 0.14], Some([0.0206, 0.0003])),
+            row(100.0, [23.8, 0.4], Some([0.0121, 0.0003])),
+        ],
+    },
 ];
 
 /// Strengths and densities that differ by less are the same.
