@@ -1,5 +1,6 @@
 //! Walls as half-spaces of matter, in everything that evaluates a fluid.
 
+use psidpd_core::engine::noise::threefry2x32;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{
     Engine, LocalEnergy, Particles, PeriodicBox, Pool, Precision, Request, Settings, Want,
@@ -58,7 +59,7 @@ const MODELS: [&str; 5] = [
 ];
 
 fn uniform(k: u32) -> f64 {
-    f64::from(k.wrapping_add(1).wrapping_mul(2_654_435_761) ^ k.wrapping_mul(40_503).rotate_left(13)) / 2f64.powi(32)
+    f64::from(threefry2x32::<20>([k, 0], [5, 9])[0]) / 2f64.powi(32)
 }
 
 /// A fluid between two walls, of the first and of the last species, and particles between them.
@@ -227,7 +228,7 @@ fn a_wall_is_the_mean_of_random_matter() {
         let volume = 4.0 * range * range * range;
         let mut sum = 0.0;
         for k in 0..count {
-            let at = |c: u32| f64::from((k * 3 + c).wrapping_mul(2_246_822_519).rotate_left(11).wrapping_mul(3_266_489_917)) / 2f64.powi(32);
+            let at = |c: u32| f64::from(threefry2x32::<20>([k, c], [3, 4])[0]) / 2f64.powi(32);
             let d = [range * (2.0 * at(0) - 1.0), range * (2.0 * at(1) - 1.0), z + range * at(2)];
             sum += kernel.value(d.iter().map(|c| c * c).sum::<f64>().sqrt());
         }

@@ -6,7 +6,7 @@ use super::fault::Fault;
 use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
-use crate::model::wall::WallField;
+use crate::model::wall::{Wall, WallField};
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SPARSE;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
@@ -382,6 +382,26 @@ impl ThermostatPlan {
     }
 }
 
+/// Prints what a wall adds at its face.
+fn write_wall(f: &mut fmt::Formatter<'_>, wall: &WallField, species: &[String]) -> fmt::Result {
+    let Wall { axis, high, density, .. } = wall.wall;
+    let (face, matter) = (format!("{}{}", ["x", "y", "z"][axis], if high { "hi" } else { "lo" }), wall.wall.species);
+    writeln!(f, "wall          {face}: {} at a density of {density:.6}", species[matter])?;
+    for (name, field) in species.iter().zip(&wall.fields) {
+        let energy: f64 = field.energies.iter().map(|energy| energy.at(0.0)[0]).sum();
+        write!(f, "              {name} at the face: local density + {:.4}, ", 0.5 * density)?;
+        write!(f, "energy {energy:+.4} besides psi, range {}; ", field.range)?;
+        match &field.friction {
+            None => writeln!(f, "no friction")?,
+            Some(friction) => {
+                let [along, across] = friction.at(0.0);
+                writeln!(f, "friction {along:.4} along it, {across:.4} across, range {}", friction.range())?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Prints the plan for `psidpd check` and the LAMMPS log.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -456,6 +476,9 @@ impl fmt::Display for Plan {
                 }
                 ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
             }
+        }
+        for wall in &self.walls {
+            write_wall(f, wall, &self.species)?;
         }
         match &self.thermostat {
             None => write!(f, "thermostat    none: no noise is drawn"),

@@ -10,6 +10,14 @@ pub struct Friction {
     nodes: Vec<[f64; 2]>,
 }
 
+/// By how much a fluid slips further than Brinkman's equation says, in ranges R and divided by `kT R²/(m ν²)`, ν being the kinematic
+/// viscosity: this goes as the share of the momentum that moves with particles, which carry it past the friction.
+/// Measured, see `docs/walls.md`.
+pub const SURPLUS: f64 = 0.0145;
+
+/// The largest `kT R²/(m ν²)` for which that is taken.
+const MOST_CARRIED: f64 = 20.0;
+
 /// Number of intervals of the friction's table.
 const INTERVALS: usize = 256;
 
@@ -63,12 +71,15 @@ impl Friction {
         u / slope - self.range
     }
 
-    /// The factor of the friction at which a fluid of this viscosity and density does not slip.
-    pub fn factor_without_slip(&self, viscosity: f64, density: f64) -> f64 {
+    /// The factor of the friction at which a fluid of this viscosity and density, whose particles have this temperature and mass,
+    /// does not slip. By [`Friction::slip`] alone it would: that has [`SURPLUS`].
+    pub fn factor_without_slip(&self, viscosity: f64, density: f64, [kt, mass]: [f64; 2]) -> f64 {
+        let carried = kt / mass * (self.range * density * mass / viscosity).powi(2);
+        let surplus = SURPLUS * carried.min(MOST_CARRIED) * self.range;
         let (mut low, mut high) = (1e-9f64, 1e9f64);
         for _ in 0..80 {
             let middle = (low * high).sqrt();
-            match self.slip(viscosity, density, middle) > 0.0 {
+            match self.slip(viscosity, density, middle) > -surplus {
                 true => low = middle,
                 false => high = middle,
             }
@@ -109,8 +120,9 @@ mod tests {
     fn one_strength_has_no_slip() {
         let friction = Friction::of(3, 6.05, [18.0, 1.0, 1.0]);
         let (eta, rho) = (7.8, 6.05);
-        let factor = friction.factor_without_slip(eta, rho);
-        assert!(friction.slip(eta, rho, factor).abs() < 1e-9 && factor > 1.0, "{factor}");
+        let factor = friction.factor_without_slip(eta, rho, [1.0, 1.0]);
+        let surplus = SURPLUS * (rho / eta).powi(2);
+        assert!((friction.slip(eta, rho, factor) + surplus).abs() < 1e-9 && factor > 1.0, "{factor}");
         let (mut sum, mut place) = (0.0, 0.0);
         for k in 0..1000 {
             let z = (f64::from(k) + 0.5) / 1000.0;

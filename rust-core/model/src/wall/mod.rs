@@ -13,7 +13,7 @@
 mod friction;
 mod half_space;
 
-pub use friction::Friction;
+pub use friction::{Friction, SURPLUS};
 pub use half_space::HalfSpace;
 
 /// Matter behind a face of the box. Faces of directions that are periodic have no walls.

@@ -7,6 +7,7 @@ use psidpd_core::model::Model;
 use std::path::Path;
 
 mod device;
+mod continuum;
 mod faces;
 mod force_gradient;
 #[cfg(feature = "gpu")]

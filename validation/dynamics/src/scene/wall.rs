@@ -12,16 +12,17 @@ pub fn read(
     root: &Section,
     model: Model,
     (initial, domain): (&Initial, &PeriodicBox),
-    kt: f64,
+    (kt, masses): (f64, &[f64]),
 ) -> Result<Model, FileError> {
     let Some(value) = root.get("wall") else { return Ok(model) };
     let density = density_of_fluid(initial, domain, model.dimensions());
+    let mass = masses.iter().sum::<f64>() / masses.len() as f64;
     let mut walls: Vec<Wall> = Vec::new();
     for item in value.array()? {
         let section = item.section()?;
         for mut wall in read_one(&section, &model, domain, density)? {
             if let Some(value) = section.get("viscosity") {
-                wall.drag[0] = Some(drag_without_slip(&value, &wall, &model, kt, density)?);
+                wall.drag[0] = Some(drag_without_slip(&value, &wall, &model, density, [kt, mass])?);
             }
             if walls.iter().any(|other| (other.axis, other.high) == (wall.axis, wall.high)) {
                 return Err(section.require("faces")?.error("a face has two walls"));
@@ -92,12 +93,18 @@ fn read_one(
 }
 
 /// The drag coefficient at which a fluid of the stated viscosity does not slip at the wall.
-fn drag_without_slip(viscosity: &Value, wall: &Wall, model: &Model, kt: f64, density: f64) -> Result<f64, FileError> {
+fn drag_without_slip(
+    viscosity: &Value,
+    wall: &Wall,
+    model: &Model,
+    density: f64,
+    [kt, mass]: [f64; 2],
+) -> Result<f64, FileError> {
     let of_one = Wall { drag: [Some(1.0), wall.drag[1]], ..wall.clone() };
     let fluid = model.clone().with_walls(vec![of_one]).at(kt).map_err(|e| viscosity.error(e.kind.to_string()))?;
     let friction = fluid.walls.iter().flat_map(|wall| &wall.fields).find_map(|field| field.friction.as_ref());
     let Some(friction) = friction.filter(|_| density > 0.0) else {
         return Err(viscosity.error("the range of the drag is missing: the model has no forces, `drag_range`"));
     };
-    Ok(friction.factor_without_slip(viscosity.positive()?, density))
+    Ok(friction.factor_without_slip(viscosity.positive()?, density, [kt, mass]))
 }

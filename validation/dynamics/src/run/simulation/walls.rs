@@ -132,6 +132,11 @@ impl Simulation {
         Ok(())
     }
 
+    /// Whether a wall moves.
+    pub fn has_moving_walls(&self) -> bool {
+        self.engine().plan().walls().iter().any(|wall| wall.wall.velocity != [0.0; 3])
+    }
+
     /// Whether a wall of the box has friction.
     pub(super) fn rubs(&self) -> bool {
         let walls = self.engine().plan().walls();
