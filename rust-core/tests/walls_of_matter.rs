@@ -72,7 +72,7 @@ fn between_walls(text: &str) -> (Fluid, Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
         high,
         species,
         density,
-        local_density: high.then_some(2.0),
+        local_densities: if high { vec![2.0; 3] } else { Vec::new() },
         velocity: [0.0; 3],
         drag: [None; 2],
     };
@@ -112,7 +112,8 @@ fn every_evaluation_is_the_truth() {
         let mut on_walls = [0.0; 2];
         for (precision, tolerance) in [(Precision::Double, 1e-11), (Precision::Mixed, 3e-5)] {
             for sums in [false, true] {
-                let settings = Settings { precision, threads: NonZeroUsize::new(2).unwrap(), ..Settings::default() };
+                let settings =
+                    Settings { precision, threads: NonZeroUsize::new(2).unwrap(), ..Settings::default() };
                 let mut engine = Engine::new(&fluid, settings).unwrap();
                 engine.use_pair_sums_only(sums);
                 let particles = Particles { owned: x.len(), x: &x, tag: &tag, kind: &species };
@@ -137,7 +138,10 @@ fn every_evaluation_is_the_truth() {
         let evaluator = Evaluator::new(fluid).unwrap();
         let found = evaluator.evaluate(&pool(), &x, &species, &domain);
         assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
-        assert!((evaluator.energy(&pool(), &x, &species, &domain) - truth.energy).abs() < 1e-10 * truth.energy.abs().max(1.0));
+        assert!(
+            (evaluator.energy(&pool(), &x, &species, &domain) - truth.energy).abs()
+                < 1e-10 * truth.energy.abs().max(1.0)
+        );
         for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
             assert!((f - g).abs() < 1e-11 * scale, "{f} {g}");
         }
@@ -172,7 +176,11 @@ fn forces_are_gradients() {
             if !jumps {
                 let by = |c: usize| (moved(c, h).forces[k][c] - moved(c, -h).forces[k][c]) / (2.0 * h);
                 let divergence: f64 = (0..=axis).map(by).sum();
-                assert!((divergence + laplacians[k]).abs() < 1e-4 * (1.0 + divergence.abs()), "{divergence} {}", laplacians[k]);
+                assert!(
+                    (divergence + laplacians[k]).abs() < 1e-4 * (1.0 + divergence.abs()),
+                    "{divergence} {}",
+                    laplacians[k]
+                );
             }
         }
     }
@@ -216,7 +224,7 @@ fn a_wall_is_the_mean_of_random_matter() {
         high: false,
         species: 0,
         density: 6.05,
-        local_density: Some(2.3),
+        local_densities: vec![2.3],
         velocity: [0.0; 3],
         drag: [None; 2],
     };

@@ -318,8 +318,7 @@ impl Engine {
         let slopes = std::mem::take(self.last_mut().slopes_mut());
         let (plan, pool) = (self.plan(), self.pool());
         let faces = walls::faces(&plan.walls, domain, plan.dimensions);
-        let tally =
-            walls::add_forces(pool, plan, (&faces, particles), &slopes, *want, force, &mut on_walls);
+        let tally = walls::add_forces(pool, plan, (&faces, particles), &slopes, *want, force, &mut on_walls);
         *self.last_mut().slopes_mut() = slopes;
         self.on_walls = on_walls;
         tally

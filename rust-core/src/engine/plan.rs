@@ -385,7 +385,8 @@ impl ThermostatPlan {
 /// Prints what a wall adds at its face.
 fn write_wall(f: &mut fmt::Formatter<'_>, wall: &WallField, species: &[String]) -> fmt::Result {
     let Wall { axis, high, density, .. } = wall.wall;
-    let (face, matter) = (format!("{}{}", ["x", "y", "z"][axis], if high { "hi" } else { "lo" }), wall.wall.species);
+    let (face, matter) =
+        (format!("{}{}", ["x", "y", "z"][axis], if high { "hi" } else { "lo" }), wall.wall.species);
     writeln!(f, "wall          {face}: {} at a density of {density:.6}", species[matter])?;
     for (name, field) in species.iter().zip(&wall.fields) {
         let energy: f64 = field.energies.iter().map(|energy| energy.at(0.0)[0]).sum();

@@ -177,7 +177,12 @@ enum Part<'a> {
         displacements: &'a [[f64; 3]],
     },
     /// The forces of walls, along the lines from their faces to the particles at `x`.
-    Walls { acted: &'a Acted, evaluation: &'a Evaluation, x: &'a [[f64; 3]], displacements: &'a [[f64; 3]] },
+    Walls {
+        acted: &'a Acted,
+        evaluation: &'a Evaluation,
+        x: &'a [[f64; 3]],
+        displacements: &'a [[f64; 3]],
+    },
 }
 
 impl Part<'_> {

@@ -9,7 +9,9 @@ use crate::wall::{Field, Friction, HalfSpace, Wall, WallField};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoWall {
     /// There is no potential.
-    #[error("the model states forces that have no potential, and a wall's force is the gradient of an energy")]
+    #[error(
+        "the model states forces that have no potential, and a wall's force is the gradient of an energy"
+    )]
     NotConservative,
     /// An integral over the half-space is not finite.
     #[error("the potential between {0} and {1} has no finite integral over a half-space")]
@@ -45,7 +47,7 @@ fn response(wall: &Wall, fluid: &Fluid) -> Result<Vec<f64>, NoWall> {
         .map(|v| {
             let density = &fluid.densities[v / count];
             let self_weight = if density.includes_self { density.kernel.value(0.0) } else { 0.0 };
-            let local = wall.local_density.unwrap_or(wall.density + self_weight);
+            let local = wall.local_densities.get(v / count).copied().unwrap_or(wall.density + self_weight);
             let n = if v % count == own { local } else { 0.0 };
             let (value, slope) = density.correction[own * count + v % count].at(n);
             [density.bounds.map_or(value, |bounds| bounds.clamp(value)), slope]
@@ -69,7 +71,7 @@ fn response(wall: &Wall, fluid: &Fluid) -> Result<Vec<f64>, NoWall> {
         true => Ok(slopes),
         false => Err(NoWall::Response {
             species: fluid.species[own].clone(),
-            density: wall.local_density.unwrap_or(wall.density),
+            density: wall.local_densities.first().copied().unwrap_or(wall.density),
         }),
     }
 }
@@ -94,7 +96,8 @@ fn field(wall: &Wall, fluid: &Fluid, species: usize, response: &[f64]) -> Result
         let phi = &term.potential;
         energies.push(finite(HalfSpace::of(dimensions, phi.range(), wall.density, |r| phi.at(r)))?);
     }
-    let ranges = densities.iter().map(|(_, field)| field.range()).chain(energies.iter().map(HalfSpace::range));
+    let ranges =
+        densities.iter().map(|(_, field)| field.range()).chain(energies.iter().map(HalfSpace::range));
     let range = ranges.fold(0.0, f64::max);
     let drag = match (fluid.thermostats[species * count + wall.species], wall.drag) {
         (Some(own), [gamma, range]) => {
@@ -121,7 +124,7 @@ mod tests {
             high: false,
             species,
             density: 6.05,
-            local_density: None,
+            local_densities: Vec::new(),
             velocity: [0.0; 3],
             drag: [None; 2],
         }
@@ -133,10 +136,12 @@ mod tests {
     fn fields_are_those_of_the_model() {
         let fluid = Model::parse("m.toml", WARREN).unwrap().at(1.0).unwrap();
         let quadratic = |s: f64| {
-            15.0 * ((1.0 - s) / 12.0 - (1.0 - s.powi(3)) / 6.0 + (1.0 - s.powi(4)) / 6.0 - (1.0 - s.powi(5)) / 20.0)
+            15.0 * ((1.0 - s) / 12.0 - (1.0 - s.powi(3)) / 6.0 + (1.0 - s.powi(4)) / 6.0
+                - (1.0 - s.powi(5)) / 20.0)
         };
         for local in [None, Some(2.3)] {
-            let found = bind_wall(&Wall { local_density: local, ..wall(0) }, &fluid).unwrap();
+            let found =
+                bind_wall(&Wall { local_densities: local.into_iter().collect(), ..wall(0) }, &fluid).unwrap();
             let field = &found.fields[0];
             for z in [0.0f64, 0.2, 0.6, 0.9] {
                 let n = 6.05 * if z < 0.75 { quadratic(z / 0.75) } else { 0.0 };

@@ -10,10 +10,11 @@ pub struct Friction {
     nodes: Vec<[f64; 2]>,
 }
 
-/// By how much a fluid slips further than Brinkman's equation says, in ranges R and divided by `kT R²/(m ν²)`, ν being the kinematic
-/// viscosity: this goes as the share of the momentum that moves with particles, which carry it past the friction.
+/// By how much a fluid slips further than Brinkman's equation says, in ranges R: a constant, as next to a wall it has half of its
+/// neighbours, and less viscosity; and a part for each `kT R²/(m ν²)`, ν being the kinematic viscosity, which goes as the share of
+/// the momentum that moves with particles, past the friction.
 /// Measured, see `docs/walls.md`.
-pub const SURPLUS: f64 = 0.0145;
+pub const SURPLUS: [f64; 2] = [0.04, 0.0145];
 
 /// The largest `kT R²/(m ν²)` for which that is taken.
 const MOST_CARRIED: f64 = 20.0;
@@ -24,7 +25,10 @@ const INTERVALS: usize = 256;
 impl Friction {
     /// The friction of matter of a number density by drag with the coefficient γ, the range and the exponent of `w_R`.
     pub fn of(dimensions: usize, density: f64, [gamma, range, exponent]: [f64; 3]) -> Friction {
-        let weight = |r: f64| (1.0 - r / range).max(0.0).powf(2.0 * exponent);
+        let weight = |r: f64| {
+            let w = (1.0 - r / range).max(0.0);
+            if exponent == 1.0 { w * w } else { w.powf(2.0 * exponent) }
+        };
         let node = |k: usize| {
             let z = range * k as f64 / INTERVALS as f64;
             tensor(dimensions, range, z, weight).map(|sum| density * gamma * sum)
@@ -75,7 +79,7 @@ impl Friction {
     /// does not slip. By [`Friction::slip`] alone it would: that has [`SURPLUS`].
     pub fn factor_without_slip(&self, viscosity: f64, density: f64, [kt, mass]: [f64; 2]) -> f64 {
         let carried = kt / mass * (self.range * density * mass / viscosity).powi(2);
-        let surplus = SURPLUS * carried.min(MOST_CARRIED) * self.range;
+        let surplus = (SURPLUS[0] + SURPLUS[1] * carried.min(MOST_CARRIED)) * self.range;
         let (mut low, mut high) = (1e-9f64, 1e9f64);
         for _ in 0..80 {
             let middle = (low * high).sqrt();
@@ -105,11 +109,12 @@ mod tests {
                 let t = z + (f64::from(k) + 0.5) * h;
                 let two_pi = 2.0 * std::f64::consts::PI;
                 across += h * two_pi * t * t * (-t.ln() - 2.0 * (1.0 - t) + 0.5 * (1.0 - t * t));
-                trace +=
-                    h * two_pi * (1.0 / 12.0 - t * t / 2.0 + 2.0 * t.powi(3) / 3.0 - t.powi(4) / 4.0);
+                trace += h * two_pi * (1.0 / 12.0 - t * t / 2.0 + 2.0 * t.powi(3) / 3.0 - t.powi(4) / 4.0);
             }
             let [along, found] = friction.at(z);
-            assert!((found - 13.5 * across).abs() < 1e-4 && (2.0 * along + found - 13.5 * trace).abs() < 1e-4);
+            assert!(
+                (found - 13.5 * across).abs() < 1e-4 && (2.0 * along + found - 13.5 * trace).abs() < 1e-4
+            );
         }
         assert_eq!(friction.at(1.0), [0.0; 2]);
     }
@@ -121,7 +126,7 @@ mod tests {
         let friction = Friction::of(3, 6.05, [18.0, 1.0, 1.0]);
         let (eta, rho) = (7.8, 6.05);
         let factor = friction.factor_without_slip(eta, rho, [1.0, 1.0]);
-        let surplus = SURPLUS * (rho / eta).powi(2);
+        let surplus = SURPLUS[0] + SURPLUS[1] * (rho / eta).powi(2);
         assert!((friction.slip(eta, rho, factor) + surplus).abs() < 1e-9 && factor > 1.0, "{factor}");
         let (mut sum, mut place) = (0.0, 0.0);
         for k in 0..1000 {

@@ -59,9 +59,10 @@ impl HalfSpace {
         let at = z.max(0.0) * per_length;
         let k = (at as usize).min(PANELS - 1);
         let t = at - k as f64;
-        let [value, slope, curvature] = self.panels[k].iter().rev().fold([0.0; 3], |[v, s, c], a| {
-            [v * t + a, s * t + v, c * t + 2.0 * s]
-        });
+        let [value, slope, curvature] = self.panels[k]
+            .iter()
+            .rev()
+            .fold([0.0; 3], |[v, s, c], a| [v * t + a, s * t + v, c * t + 2.0 * s]);
         [value, slope * per_length, curvature * per_length * per_length]
     }
 }

@@ -27,8 +27,9 @@ pub struct Wall {
     pub species: usize,
     /// The number density of the matter.
     pub density: f64,
-    /// The local density of a particle of the matter, at which its ψ responds; the number density if it is `None`.
-    pub local_density: Option<f64>,
+    /// The local densities of a particle of the matter, at which its ψ responds, for each density of the model; the number density if
+    /// there are none.
+    pub local_densities: Vec<f64>,
     /// The velocity of the matter, along the face.
     pub velocity: [f64; 3],
     /// Drag coefficient and range between particle and matter, in place of those of the model.

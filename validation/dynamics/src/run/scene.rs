@@ -37,10 +37,6 @@ impl Scene {
         if self.device == Device::Cpu {
             return Ok(());
         }
-        if !self.model.walls().is_empty() {
-            let lacks = DeviceError::Lacks("walls of matter".into());
-            return Err(self.located(lacks, |root| root.get("wall")));
-        }
         if self.precision() == Precision::Double {
             let lacks = DeviceError::Lacks("double precision".into());
             return Err(self.located(lacks, |root| root.get("precision")));

@@ -6,8 +6,8 @@ use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
 use std::path::Path;
 
-mod device;
 mod continuum;
+mod device;
 mod faces;
 mod force_gradient;
 #[cfg(feature = "gpu")]

@@ -61,7 +61,11 @@ impl Meter for WallForce {
         let mut out = Observation::new("wall_force", "Force on walls per area", Kind::Scalar, &self.series);
         for (k, (face, _)) in self.faces.iter().enumerate() {
             for c in 0..self.dimensions {
-                out = out.column(&format!("{face}_{}", AXES[c]), "energy/volume", [self.series.mean(3 * k + c)]);
+                out = out.column(
+                    &format!("{face}_{}", AXES[c]),
+                    "energy/volume",
+                    [self.series.mean(3 * k + c)],
+                );
             }
         }
         vec![out]

@@ -182,7 +182,8 @@ fn reflect(part: &mut Part, around: Surroundings, bounces: &[Bounce]) {
             let mut legs = faces.legs(bounces, part.x[k], part.v[k], part.f[k].map(|f| f / mass));
             legs.iter_mut().for_each(|leg| leg.particle += part.first);
             part.legs.append(&mut legs);
-            part.hits.extend(bounces.iter().map(|b| Hit { direction: b.direction, momentum: mass * b.given }));
+            part.hits
+                .extend(bounces.iter().map(|b| Hit { direction: b.direction, momentum: mass * b.given }));
         }
     }
 }

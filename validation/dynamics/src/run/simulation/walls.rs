@@ -49,18 +49,19 @@ impl Bath {
         if z >= friction.range() {
             return None;
         }
-        let [along, across] = friction.at(z);
+        // What is lost along the face and across it, and the width of the noise.
+        let of_axes = friction.at(z).map(|zeta| {
+            let lost = -(-zeta * self.dt / mass).exp_m1();
+            [lost, (lost * (2.0 - lost) * self.kt / mass).sqrt()]
+        });
         let wall = &face.wall.wall;
         let (mut after, mut lost) = (v, [0.0; 3]);
         for c in 0..dimensions {
-            let zeta = if c == wall.axis { across } else { along };
-            let keeps = (-zeta * self.dt / mass).exp();
-            let relative = v[c] - wall.velocity[c];
+            let [part, width] = of_axes[usize::from(c == wall.axis)];
             let counter = [tag as u32, (3 * face.index + c) as u32];
             let xi = f64::from(normal(threefry2x32::<ROUNDS>(counter, self.key)));
-            let width = (-(-2.0 * zeta * self.dt / mass).exp_m1() * self.kt / mass).sqrt();
-            after[c] = wall.velocity[c] + keeps * relative + width * xi;
-            lost[c] = (1.0 - keeps) * relative;
+            lost[c] = part * (v[c] - wall.velocity[c]);
+            after[c] = v[c] - lost[c] + width * xi;
         }
         Some([after, lost])
     }

@@ -11,7 +11,8 @@ use psidpd_observe::frame::{Frame, View};
 use std::num::NonZeroUsize;
 use std::sync::atomic::AtomicUsize;
 
-const BOX: &str = "[box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
+const BOX: &str =
+    "[box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
 
 /// Set 6 between a wall at rest and one that moves.
 fn between(rest: &str) -> Scene {
@@ -72,7 +73,7 @@ fn noise_of_a_wall_has_the_covariance_of_its_friction() {
         high: true,
         species: 0,
         density: 3.0,
-        local_density: None,
+        local_densities: Vec::new(),
         velocity: [0.4, 0.0, 0.0],
         drag: [Some(20.0), Some(1.0)],
     };
@@ -98,7 +99,8 @@ fn noise_of_a_wall_has_the_covariance_of_its_friction() {
             assert!(off.abs() < 5.0, "{height}: mean {a} off by {off}");
             for b in 0..=a {
                 let expected = if a == b { variance[a] } else { 0.0 };
-                let error = if a == b { 2f64.sqrt() } else { 1.0 } * (variance[a] * variance[b] / 4000.0).sqrt();
+                let error =
+                    if a == b { 2f64.sqrt() } else { 1.0 } * (variance[a] * variance[b] / 4000.0).sqrt();
                 let found = mean(&|v| center(v, a) * center(v, b));
                 assert!((found - expected).abs() < 5.0 * error, "{height} {a}{b}: {found} {expected}");
             }
@@ -256,6 +258,14 @@ fn runs_between_walls_end_in_the_same_bytes() {
     assert_same(&whole, &out, "on three threads");
 }
 
+/// A GPU refuses walls, with the reason.
+#[test]
+fn walls_are_not_on_a_gpu() {
+    let mut run = settled(&between("steps = 1\n"));
+    let error = run.use_device(crate::device::Device::Gpu(0)).unwrap_err().to_string();
+    assert!(error.contains("not on a GPU: walls of matter"), "{error}");
+}
+
 /// Walls that a scene cannot have are refused, and what is read is what is asked for.
 #[test]
 fn walls_are_read_and_refused() {
@@ -265,14 +275,16 @@ fn walls_are_read_and_refused() {
         );
         support::scene(IDEAL_MIXTURE, &text)
     };
-    let read = scene("faces = [\"zlo\", \"zhi\"]\nspecies = \"B\"\nvelocity = [0.5, 0.0, 0.0]\nviscosity = 0.8").unwrap();
+    let read =
+        scene("faces = [\"zlo\", \"zhi\"]\nspecies = \"B\"\nvelocity = [0.5, 0.0, 0.0]\nviscosity = 0.8")
+            .unwrap();
     let walls = read.model.walls();
     assert_eq!(walls.len(), 2);
     assert!(walls[1].high && walls[1].species == 1 && (walls[1].density - 3.0).abs() < 1e-12);
     let drag = walls[0].drag[0].unwrap();
     let fluid = read.model.at(1.0).unwrap();
     let friction = fluid.walls[0].fields[0].friction.as_ref().unwrap();
-    let surplus = SURPLUS * (3.0f64 / 0.8).powi(2);
+    let surplus = SURPLUS[0] + SURPLUS[1] * (3.0f64 / 0.8).powi(2);
     assert!((friction.slip(0.8, 3.0, 1.0) + surplus).abs() < 1e-9 && drag > 1.0, "{drag}");
     assert_eq!(faces(&fluid.walls, &read.domain, 3).len(), 2);
     for (wall, message) in [

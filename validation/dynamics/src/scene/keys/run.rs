@@ -26,7 +26,8 @@ pub const WALL: Table = Table::array("wall",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\ndensity = 6.0"),
         key("local_density", Positive, OPTIONAL,
             "The local density of a particle of the matter, at which its ψ responds to the fluid: the mean that the observable \
-             `local_density` finds in a liquid. The number density if left out, as in mean field.",
+             `local_density` finds in a liquid. If left out that of theory with correlations to first order, which `check` prints for \
+             the fluid; for several species the number density, as in mean field.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\ndensity = 6.05\nlocal_density = 2.3"),
         key("velocity", Point, OPTIONAL,
             "The velocity of the matter, along its face; at rest if left out.",
