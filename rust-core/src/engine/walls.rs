@@ -98,7 +98,7 @@ pub fn force_and_energy(field: &Field, z: f64, slope: impl Fn(usize) -> Option<f
 }
 
 /// Adds the forces of walls after an evaluation with the `slopes` of ψ, [`Plan::slope_width`] for each particle, to `force`. Returns
-/// energy and virial if they are wanted, along the line from the particle to the face, and adds up the forces on the walls, away
+/// energy and virial if they are requested, along the line from the particle to the face, and adds up the forces on the walls, away
 /// from the fluid.
 pub fn add_forces(
     pool: &Pool,

@@ -14,6 +14,8 @@ use std::sync::atomic::AtomicUsize;
 const BOX: &str =
     "[box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
 
+const STAGE: &str = "[[stage]]\nname = \"run\"\nsteps = 1\n";
+
 /// Set 6 between a wall at rest and one that moves.
 fn between(rest: &str) -> Scene {
     let text = format!(
@@ -34,7 +36,7 @@ fn settled(scene: &Scene) -> Simulation {
 /// The deviations of the energy, with the forces of walls in it, fall with Δt² where drag and noise are off.
 #[test]
 fn energy_between_walls_is_conserved_to_second_order() {
-    let scene = between("steps = 1\n");
+    let scene = between(STAGE);
     let mut run = settled(&scene);
     let starts: Vec<State> = (0..4)
         .map(|_| {
@@ -113,7 +115,7 @@ fn noise_of_a_wall_has_the_covariance_of_its_friction() {
 #[test]
 fn a_gas_beside_walls_has_its_temperature() {
     let text = format!(
-        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 4.0\n{BOX}steps = 1\n\
+        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 4.0\nsteps = 1\n{BOX}\
          [[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\ndrag = 200.0\n"
     );
     let scene = support::scene(IDEAL, &text).unwrap();
@@ -152,7 +154,7 @@ fn a_gas_beside_walls_has_its_temperature() {
 /// rounding; where kicks are shared with the next step, but for the kicks at both ends.
 #[test]
 fn walls_take_the_momentum_that_the_fluid_loses() {
-    let scene = between("steps = 1\n");
+    let scene = between(STAGE);
     let start = settled(&scene).state().clone();
     for (name, integrator) in Integrator::ALL.iter().filter(|(_, integrator)| integrator.has_time()) {
         let mut run = scene.simulation(start.clone()).unwrap();
@@ -183,7 +185,7 @@ fn walls_take_the_momentum_that_the_fluid_loses() {
 /// The configurational temperature of a particle in front of a wall is that of Boltzmann's distribution, an integral over its height.
 #[test]
 fn the_configurational_temperature_knows_walls() {
-    let scene = between("steps = 1\n");
+    let scene = between(STAGE);
     let kt = 0.7;
     let evaluator = Evaluator::new(scene.model.at(kt).unwrap()).unwrap();
     let state = State::at_rest(scene.domain.clone(), vec![1.0], vec![[1.0, 1.0, 1.0]]);
@@ -261,7 +263,7 @@ fn runs_between_walls_end_in_the_same_bytes() {
 /// A GPU refuses walls, with the reason.
 #[test]
 fn walls_are_not_on_a_gpu() {
-    let mut run = settled(&between("steps = 1\n"));
+    let mut run = settled(&between(STAGE));
     let error = run.use_device(crate::device::Device::Gpu(0)).unwrap_err().to_string();
     assert!(error.contains("not on a GPU: walls of matter"), "{error}");
 }
