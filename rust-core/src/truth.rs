@@ -9,11 +9,13 @@
 //! F_i   = −Σ_j [(s_i,c(j) + s_j,c(i)) w′(r_ij) + φ′(r_ij)] ê_ij,    s = ∂ψ/∂ñ ρ̃′(n)
 //! F^D_i = −Σ_j γ w_R² (ê_ij·v_ij) ê_ij,    F^R_i = Σ_j σ w_R ξ_ij Δt^(−1/2) ê_ij,    σ² = 2γkT
 //! W     = ½ Σ_i Σ_j r_ij ⊗ F_ij,    r_ij = r_i − r_j
+//! n_w,i += ρ_w ∫ w    U += ρ_w [∫ φ + ψ′_w ∫ w]    W_zz += z F_z    of a wall, at the distance z from its face
 //! ```
 
 use crate::engine::{PeriodicBox, Step};
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::pair::PairForm;
+use crate::model::wall::WallField;
 use crate::model::{Bounds, ExcessFreeEnergy, Fluid};
 
 /// Energy, densities, forces and virial of one configuration.
@@ -67,6 +69,13 @@ pub fn conservative(
             pair_energy += 0.5 * term.potential.at(r).0;
         }
     });
+    let there = |wall: &&WallField| !domain.periodic()[wall.wall.axis];
+    let walls: Vec<&WallField> = fluid.walls.iter().filter(there).collect();
+    for (i, wall) in (0..x.len()).flat_map(|i| walls.iter().map(move |wall| (i, wall))) {
+        for (d, density) in &wall.fields[species[i]].densities {
+            n[i * variables + d * count + wall.wall.species] += density.at(distance(wall, domain, x[i]))[0];
+        }
+    }
     let (mut excess, mut slopes) = (Vec::new(), Vec::new());
     for i in 0..x.len() {
         let (psi, s) = free_energy(fluid, species[i], &n[i * variables..][..variables])?;
@@ -88,7 +97,32 @@ pub fn conservative(
         }
         add(&mut forces[i], &mut virial, d, r, force);
     });
-    Ok(Truth { energy: excess.iter().sum::<f64>() + pair_energy, excess, densities: n, forces, virial })
+    let mut wall_energy = 0.0;
+    for (i, wall) in (0..x.len()).flat_map(|i| walls.iter().map(move |wall| (i, wall))) {
+        let (field, z, axis) = (&wall.fields[species[i]], distance(wall, domain, x[i]), wall.wall.axis);
+        let energies = field.energies.iter().map(|energy| energy.at(z));
+        let of_densities = field
+            .densities
+            .iter()
+            .map(|(d, density)| -slopes[i * variables + d * count + wall.wall.species] * density.at(z)[1]);
+        let force = of_densities.sum::<f64>() - energies.clone().map(|[_, slope, _]| slope).sum::<f64>();
+        wall_energy += energies.map(|[energy, ..]| energy).sum::<f64>();
+        forces[i][axis] += if wall.wall.high { -force } else { force };
+        virial[axis] += z * force;
+    }
+    Ok(Truth {
+        energy: wall_energy + excess.iter().sum::<f64>() + pair_energy,
+        excess,
+        densities: n,
+        forces,
+        virial,
+    })
+}
+
+/// The distance of a place from the face of a wall.
+fn distance(wall: &WallField, domain: &PeriodicBox, x: [f64; 3]) -> f64 {
+    let (axis, low) = (wall.wall.axis, domain.origin()[wall.wall.axis]);
+    if wall.wall.high { low + domain.lengths()[axis] - x[axis] } else { x[axis] - low }
 }
 
 /// Drag and noise of one step, with their virial.

@@ -4,7 +4,7 @@
 use psidpd::observe;
 use psidpd::scene::Scene;
 use psidpd::scene::keys::{
-    BODY_FORCE, BOX, INITIAL, MASSES, OUTPUT, PART, REQUIRED, STAGE, TABLES, TOP, Table, ValueKind,
+    BODY_FORCE, BOX, INITIAL, MASSES, OUTPUT, PART, REQUIRED, STAGE, TABLES, TOP, Table, ValueKind, WALL,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -105,7 +105,7 @@ fn schema() -> String {
     root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
     root["title"] = json!("psidpd scene file");
     let properties = &mut root["properties"];
-    for table in [&MASSES, &INITIAL, &PART, &BODY_FORCE, &STAGE, &OUTPUT] {
+    for table in [&MASSES, &INITIAL, &PART, &WALL, &BODY_FORCE, &STAGE, &OUTPUT] {
         properties[table.path] = match table.array {
             true => json!({ "type": "array", "description": table.about, "items": forms(table) }),
             false => forms(table),
@@ -181,10 +181,13 @@ fn completed(example: &str) -> String {
             text += line;
         }
     }
-    if !has("box") && !has("[box]") && !has("file") {
+    if has("[[wall]]") {
+        text += "box = { lengths = 6.0, boundary = [\"periodic\", \"periodic\", \"reflecting\"] }\n";
+    } else if !has("box") && !has("[box]") && !has("file") {
         text += "box = 6.0\n";
     }
-    if !["density", "[initial]", "[[part]]"].iter().any(|k| has(k)) {
+    // A wall has a density of its own.
+    if has("[[wall]]") || !["density", "[initial]", "[[part]]"].iter().any(|k| has(k)) {
         text += "density = 3.0\n";
     }
     if !has("steps") {
@@ -290,6 +293,7 @@ fn the_schema_refuses_unknown_and_missing_keys() {
         "[[part]]\nshape = \"rest\"\nradius = 1",
         "[[body_force]]\nspecies = [\"A\"]",
         "[[stage]]\nsteps = 3",
+        "[[wall]]\nkind = \"continuum\"",
         "[[stage]]\nname = \"a\"\nsteps = 3\nkT = [1, 2, 3]",
         "[output]\nthermo = 1.5",
         "[observe]\nrfd = true",

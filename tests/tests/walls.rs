@@ -29,6 +29,8 @@ const CORE: &[&[&str]] = &[
     ],
     &["engine::evaluate", "engine::excess", "engine::plan"],
     &["engine::excess_pass"],
+    // What matter behind faces of the box adds.
+    &["engine::walls"],
     // The fast engine: one traversal of all cells, without a neighbour list.
     &["engine::sweep::terms", "engine::sweep::times"],
     &["engine::sweep::workspace"],

@@ -3,6 +3,7 @@ use super::curve::Curve;
 use super::expression::Formula;
 use super::kernel::Kernel;
 use super::pair::{PairForm, PairPotential};
+use super::wall::WallField;
 
 /// A model at one temperature: numbers and compiled formulas only.
 #[derive(Debug, Clone)]
@@ -25,6 +26,8 @@ pub struct Fluid {
     pub pairs: Vec<PairTerm>,
     /// The thermostat of each pair of species, row-major and symmetric.
     pub thermostats: Vec<Option<Thermostat>>,
+    /// Walls behind faces of the box.
+    pub walls: Vec<WallField>,
 }
 
 impl Fluid {

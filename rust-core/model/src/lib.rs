@@ -17,6 +17,7 @@ pub mod expression;
 pub mod kernel;
 pub mod keys;
 pub mod pair;
+pub mod wall;
 
 mod continuation;
 mod file;

@@ -12,6 +12,7 @@ use super::request::{Evaluated, Request, Results};
 use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
 use super::sweep::{Pool, Sweep, Times, UNFIT};
 use super::sweep_path::SweepPath;
+use super::walls;
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use psidpd_passes::cells::excluded::Mark;
@@ -37,6 +38,8 @@ pub struct Engine {
     path: Option<Path>,
     /// Number of the last evaluation, different for all engines.
     number: u64,
+    /// The force on each wall in the last evaluation of totals, away from the fluid.
+    on_walls: Vec<f64>,
 }
 
 /// The first half of an evaluation, whose second half needs the slopes of ghosts.
@@ -101,6 +104,7 @@ impl Engine {
 
     fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
         Engine {
+            on_walls: vec![0.0; plan.walls.len()],
             pair_sums: PairSums::of_plan(plan.clone()),
             sweep: SweepPath::new(Sweep::of_plan(plan, settings, pool)),
             device: None,
@@ -294,12 +298,35 @@ impl Engine {
         add: bool,
     ) -> Result<Tally, EngineError> {
         let path = self.begin(Surroundings::Box(domain), request.want)?;
-        match path.whole(domain, request, force, add) {
+        let mut tally = match path.whole(domain, request, force, add) {
             Err(UNFIT) if self.path == Some(Path::Sweep) => {
-                self.take_pair_sums().whole(domain, request, force, add)
+                self.take_pair_sums().whole(domain, request, force, add)?
             }
-            done => done,
+            done => done?,
+        };
+        if !self.plan().walls.is_empty() {
+            tally += self.add_walls(domain, request, force);
         }
+        Ok(tally)
+    }
+
+    /// Adds the forces of walls, whose densities are among those of the evaluation before.
+    fn add_walls(&mut self, domain: &PeriodicBox, request: &Request, force: &mut [[f64; 3]]) -> Tally {
+        let Request { particles, want, .. } = request;
+        self.fetch_slopes(particles.owned);
+        let mut on_walls = std::mem::take(&mut self.on_walls);
+        let slopes = std::mem::take(self.last_mut().slopes_mut());
+        let (plan, pool) = (self.plan(), self.pool());
+        let faces = walls::faces(&plan.walls, domain, plan.dimensions);
+        let tally = walls::add_forces(pool, plan, (&faces, particles), &slopes, *want, force, &mut on_walls);
+        *self.last_mut().slopes_mut() = slopes;
+        self.on_walls = on_walls;
+        tally
+    }
+
+    /// The force on each wall in the last evaluation that computed a virial, across it and away from the fluid.
+    pub fn forces_on_walls(&self) -> &[f64] {
+        &self.on_walls
     }
 
     /// Sums over pairs, for particles that are too far apart for a sweep, which has not begun then.
@@ -344,6 +371,13 @@ impl Engine {
         static NUMBER: AtomicU64 = AtomicU64::new(1);
         self.number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = self.path_for(surroundings, want);
+        let has_walls = !self.plan().walls.is_empty();
+        if has_walls && !matches!(surroundings, Surroundings::Box(_)) {
+            return Err(EngineError::Host("walls need a box without ghosts and listed pairs"));
+        }
+        if has_walls && path == Path::Device {
+            return Err(EngineError::Device("a GPU computes no walls".to_owned()));
+        }
         if path == Path::Device && self.sweep.leaves_out() {
             return Err(EngineError::Device("a GPU leaves no pairs out and scales none".to_owned()));
         }

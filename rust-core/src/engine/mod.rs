@@ -8,6 +8,7 @@
 //! plan           which passes a fluid needs, worked out once from the model
 //! excess         ψ and its slopes for blocks of particles; excess_pass for all of them
 //! noise          the random number of a pair
+//! walls          what matter behind faces of the box adds to densities, energies and forces
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
@@ -41,6 +42,7 @@ mod sweep;
 mod sweep_path;
 pub mod thermostat;
 pub mod vectors;
+mod walls;
 
 pub use counts::PassCounts;
 pub use error::EngineError;
@@ -64,6 +66,7 @@ pub use request::{Evaluated, Request, Results};
 pub use step::Step;
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, ThreadCount, Times, part};
+pub use walls::{Face, faces};
 
 #[cfg(test)]
 mod tests;

@@ -6,6 +6,7 @@ use super::fault::Fault;
 use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
+use crate::model::wall::{Wall, WallField};
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SPARSE;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
@@ -36,6 +37,8 @@ pub struct Plan {
     pub(super) excess: Vec<ExcessPlan>,
     pub(super) pairs: Vec<PairTerm>,
     pub(super) thermostat: Option<ThermostatPlan>,
+    /// Walls; densities that act as pair potentials act as energies of the walls too.
+    pub(super) walls: Vec<WallField>,
     /// Deliberate fault of the sweep, for tests.
     pub(super) fault: Option<Fault>,
     title: String,
@@ -121,6 +124,7 @@ impl Plan {
         assert!(fluid.pairs.iter().flat_map(|p| p.between).all(|s| s < count), "a pair of species");
         let psi = |alpha| plan_excess(fluid, alpha, &passes);
         let excess = (0..fluid.species.len()).map(psi).collect::<Result<Vec<_>, _>>()?;
+        let walls = fluid.walls.iter().map(|wall| with_linear(wall, count, &linear)).collect();
         Ok(Plan {
             species: fluid.species.clone(),
             dimensions: fluid.dimensions,
@@ -132,6 +136,7 @@ impl Plan {
             excess,
             pairs: fluid.pairs.clone(),
             thermostat: ThermostatPlan::new(fluid),
+            walls,
             title: fluid.title.clone(),
             kt: fluid.kt,
             species_of_type: (0..fluid.species.len() as i32).collect(),
@@ -182,6 +187,11 @@ impl Plan {
     /// The names of the local densities.
     pub fn densities(&self) -> impl Iterator<Item = &str> {
         self.densities.iter().map(|d| d.name.as_str())
+    }
+
+    /// The walls.
+    pub fn walls(&self) -> &[WallField] {
+        &self.walls
     }
 
     /// Number of slopes that a host copies from each owned particle to its ghosts.
@@ -252,6 +262,19 @@ impl Plan {
     pub(super) fn evaluated_species(&self) -> u64 {
         self.excess.iter().filter(|e| !matches!(e, ExcessPlan::Constant(_))).count() as u64
     }
+}
+
+/// A wall with the energies of densities that ψ is linear in.
+fn with_linear(wall: &WallField, count: usize, linear: &[LinearTerm]) -> WallField {
+    let mut wall = wall.clone();
+    for (alpha, field) in wall.fields.iter_mut().enumerate() {
+        for term in linear {
+            let coefficient = term.coefficients[alpha * count + wall.wall.species];
+            let densities = field.densities.iter().filter(|(d, _)| *d == term.density && coefficient != 0.0);
+            field.energies.extend(densities.map(|(_, density)| density.times(coefficient)));
+        }
+    }
+    wall
 }
 
 /// `∂ψ_α/∂ñ_v` for every species and variable; `None` for curves and for stated slopes, which
@@ -361,6 +384,27 @@ impl ThermostatPlan {
     }
 }
 
+/// Prints what a wall adds at its face.
+fn write_wall(f: &mut fmt::Formatter<'_>, wall: &WallField, species: &[String]) -> fmt::Result {
+    let Wall { axis, high, density, .. } = wall.wall;
+    let (face, matter) =
+        (format!("{}{}", ["x", "y", "z"][axis], if high { "hi" } else { "lo" }), wall.wall.species);
+    writeln!(f, "wall          {face}: {} at a density of {density:.6}", species[matter])?;
+    for (name, field) in species.iter().zip(&wall.fields) {
+        let energy: f64 = field.energies.iter().map(|energy| energy.at(0.0)[0]).sum();
+        write!(f, "              {name} at the face: local density + {:.4}, ", 0.5 * density)?;
+        write!(f, "energy {energy:+.4} besides psi, range {}; ", field.range)?;
+        match &field.friction {
+            None => writeln!(f, "no friction")?,
+            Some(friction) => {
+                let [along, across] = friction.at(0.0);
+                writeln!(f, "friction {along:.4} along it, {across:.4} across, range {}", friction.range())?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Prints the plan for `psidpd check` and the LAMMPS log.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -435,6 +479,9 @@ impl fmt::Display for Plan {
                 }
                 ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
             }
+        }
+        for wall in &self.walls {
+            write_wall(f, wall, &self.species)?;
         }
         match &self.thermostat {
             None => write!(f, "thermostat    none: no noise is drawn"),

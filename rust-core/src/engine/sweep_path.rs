@@ -4,9 +4,11 @@ use super::error::EngineError;
 use super::evaluate::Evaluate;
 use super::fault::Fault;
 use super::pair_sums::Corrections;
+use super::particles::Particles;
 use super::request::Request;
 use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::Sweep;
+use super::walls;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
 
@@ -83,6 +85,15 @@ impl SweepPath {
         let Sweep { plan, exclusions, added_densities, .. } = sweep;
         exclusions.check(request.particles.x.len())?;
         corrections.find(plan, (special, exclusions), around, &request.particles, added_densities)?;
+        let faces = walls::faces(&plan.walls, around.domain, plan.dimensions);
+        if !faces.is_empty() && plan.slope_width() > 0 {
+            let Particles { x, kind, owned, .. } = request.particles;
+            let (count, width) = (plan.species.len(), plan.slope_width());
+            added_densities.resize(width * owned, 0.0);
+            let species = |k: usize| plan.species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
+            let column = |d: usize| plan.passes.iter().position(|p| *p == d).map(|pass| pass * count);
+            walls::add_densities(&faces, &x[..owned], species, column, width, added_densities);
+        }
         if !*excludes_special {
             exclusions.set(special);
             *excludes_special = true;

@@ -67,7 +67,7 @@ pub struct AboutStage {
     pub kt: f64,
     /// True if dissipative and random forces act.
     pub thermostat: bool,
-    /// True if body forces act; false in files that do not say it.
+    /// True if body forces or moving walls drive a flow; false in files that do not say it.
     #[serde(default)]
     pub body_forces: bool,
     pub integrator: String,

@@ -120,6 +120,8 @@ pub enum LammpsError {
     Seed(u64),
     #[error("stage \"{stage}\": {steps} steps are more than one run of LAMMPS takes, {most}")]
     Steps { stage: String, steps: u64, most: u64 },
+    #[error("LAMMPS has no walls of matter, [[wall]]: freeze layers of particles instead")]
+    Walls,
     #[error("reversed_along has no counterpart in a deck for a box with tilt")]
     Tilt,
     #[error("{found} body forces need more groups than LAMMPS has: at most {most} can be written")]

@@ -97,6 +97,8 @@ pub struct Flux {
     pub drag: Vec<Arc<Drag>>,
     /// The positions at which conservative forces acted.
     pub forces: Vec<Acted>,
+    /// What friction and reflection give to each wall of matter.
+    pub on_walls: Vec<[f64; 3]>,
 }
 
 /// The drag of the pairs in one action of a thermostat, averaged over the step.
@@ -114,6 +116,8 @@ pub struct Acted {
     /// The fraction of the step for which these forces acted.
     pub share: f64,
     pub virial: [f64; 6],
+    /// The forces on walls of matter.
+    pub on_walls: Vec<[f64; 3]>,
     /// The positions of the particles, if they differ from those at the end of the step and lines are recorded.
     pub at: Option<Place>,
 }
@@ -128,6 +132,19 @@ pub struct Place {
 }
 
 impl Flux {
+    /// The force on each of so many walls, averaged over the step.
+    pub fn on_walls(&self, count: usize) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; count];
+        let mut add = |share: f64, forces: &[[f64; 3]]| {
+            for (sum, force) in sums.iter_mut().zip(forces) {
+                (0..3).for_each(|c| sum[c] += share * force[c]);
+            }
+        };
+        self.forces.iter().for_each(|acted| add(acted.share, &acted.on_walls));
+        add(1.0, &self.on_walls);
+        sums
+    }
+
     /// The symmetric part of `Σ d ⊗ f` over all lines.
     pub fn sum(&self) -> [f64; 6] {
         let mut sum = [0.0; 6];

@@ -98,6 +98,13 @@ impl<'a> Frame<'a> {
                 displacements,
             })
         });
+        let of_walls = flux.forces.iter().zip(earlier).map(|(acted, earlier)| Part::Walls {
+            acted,
+            evaluation: earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation),
+            x: acted.at.as_ref().map_or(self.view.x, |at| &at.x),
+            displacements: earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements),
+        });
+        let forces = forces.chain(of_walls);
         let mut work: Vec<(Part, Vec<f64>)> = recorded.chain(forces).map(|part| (part, Vec::new())).collect();
         self.view.pool.each(&mut work, |(part, sums)| {
             sums.resize(width, 0.0);
@@ -169,6 +176,13 @@ enum Part<'a> {
         x: &'a [[f64; 3]],
         displacements: &'a [[f64; 3]],
     },
+    /// The forces of walls, along the lines from their faces to the particles at `x`.
+    Walls {
+        acted: &'a Acted,
+        evaluation: &'a Evaluation,
+        x: &'a [[f64; 3]],
+        displacements: &'a [[f64; 3]],
+    },
 }
 
 impl Part<'_> {
@@ -189,6 +203,16 @@ impl Part<'_> {
                         d: std::array::from_fn(|c| pair.d[c] - (from_i[c] - from_j[c])),
                         f: pair.d.map(|d| acted.share * force / pair.r * d),
                     }
+                });
+                Lines::in_blocks(Carrier::Pair, displacements.is_empty(), lines, visit);
+            }
+            Part::Walls { acted, evaluation, x, displacements } => {
+                let lines = evaluation.near_walls.iter().map(|near| {
+                    let mut d = displacements.get(near.particle).map_or([0.0; 3], |by| by.map(|by| -by));
+                    d[near.axis] += near.height;
+                    let mut f = [0.0; 3];
+                    f[near.axis] = acted.share * near.force;
+                    Line { from: x[near.particle], d, f }
                 });
                 Lines::in_blocks(Carrier::Pair, displacements.is_empty(), lines, visit);
             }

@@ -4,6 +4,7 @@ use super::Model;
 use super::density::DensityEntry;
 use super::excess::ExcessEntry;
 use super::interaction::{PairTable, ThermostatEntry};
+use super::wall::{NoWall, bind_wall};
 use crate::continuation::Bounds;
 use crate::curve::pressure_table;
 use crate::curve::{Curve, CurveForm, Pressure};
@@ -43,7 +44,7 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
     let bind_pair =
         |table: &PairTable| Ok(PairTerm { between: table.between, potential: table.form.bind(&constants)? });
     let pairs = model.pairs.iter().map(bind_pair).collect::<Result<Vec<_>, _>>()?;
-    Ok(Fluid {
+    let mut fluid = Fluid {
         title: model.title.clone(),
         reference: model.reference.clone(),
         dimensions: model.dimensions,
@@ -53,7 +54,12 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
         excess,
         pairs,
         thermostats: bind_thermostats(&model.thermostats, &constants, model.species.len())?,
-    })
+        walls: Vec::new(),
+    };
+    let no_wall = |reason: NoWall| FileError::new(source, 0..0, "wall", reason.to_string());
+    let walls = model.walls.iter().map(|wall| bind_wall(wall, &fluid).map_err(no_wall));
+    fluid.walls = walls.collect::<Result<_, _>>()?;
+    Ok(fluid)
 }
 
 fn bind_excess(

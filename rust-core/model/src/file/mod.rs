@@ -8,8 +8,10 @@ mod literature;
 mod names;
 mod parameters;
 mod units;
+mod wall;
 
 use super::fluid::Fluid;
+use super::wall::Wall;
 use crate::document::keys::{of_another_kind, read_known};
 use crate::document::{Document, FileError, Section, Source};
 use density::DensityEntry;
@@ -40,6 +42,7 @@ pub struct Model {
     excess: Vec<ExcessEntry>,
     pairs: Vec<PairTable>,
     thermostats: Vec<ThermostatEntry>,
+    walls: Vec<Wall>,
 }
 
 /// A temperature for checking formulas at load time; a formula is unlikely to be singular exactly here.
@@ -101,11 +104,22 @@ impl Model {
             excess,
             pairs,
             thermostats,
+            walls: Vec::new(),
         };
         // Every name and number is checked at load time, before the host supplies its temperature.
         let fluid = model.at(CHECK_KT)?;
         interaction::check_coverage(&model.source, &fluid)?;
         Ok(model)
+    }
+
+    /// The same model between walls, which belong to a scene and not to the file.
+    pub fn with_walls(self, walls: Vec<Wall>) -> Model {
+        Model { walls, ..self }
+    }
+
+    /// The walls.
+    pub fn walls(&self) -> &[Wall] {
+        &self.walls
     }
 
     /// The number of dimensions, 2 or 3.

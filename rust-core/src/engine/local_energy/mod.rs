@@ -14,6 +14,7 @@ use super::excess::ExcessWork;
 use super::particles::Particles;
 use super::plan::Plan;
 use super::vectors::{self, Loop};
+use super::walls;
 use crate::model::expression::TooLarge;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
@@ -193,7 +194,7 @@ impl LocalEnergy {
             return Ok(0.0);
         }
         self.find([self.x[particle], to], particle);
-        let pairs = self.pair_change(particle);
+        let pairs = self.pair_change(particle) + self.wall_change(particle);
         if self.plan.passes.is_empty() {
             return Ok(if pairs.is_nan() { f64::NEG_INFINITY } else { pairs });
         }
@@ -304,9 +305,23 @@ impl LocalEnergy {
         sum
     }
 
+    /// The energy at walls at the new position less that at the old one, without ψ.
+    fn wall_change(&self, particle: usize) -> f64 {
+        let Some(cells) = self.cells.as_ref().filter(|_| !self.plan.walls.is_empty()) else { return 0.0 };
+        let faces = walls::faces(&self.plan.walls, &cells.domain, self.plan.dimensions);
+        let at = |x: &[f64; 3]| {
+            let mut sum = 0.0;
+            walls::for_each_near(&faces, x, self.species[particle], |_, field, z| {
+                sum += field.energies.iter().map(|part| part.at(z)[0]).sum::<f64>();
+            });
+            sum
+        };
+        at(&self.moved.to) - at(&self.x[particle])
+    }
+
     /// The densities of a particle at the second point of the last search, as row `row` of the new densities.
     fn densities_there(&mut self, particle: usize, row: usize) {
-        let LocalEnergy { plan, near, work, species, set, moved, own, .. } = self;
+        let LocalEnergy { plan, near, work, species, set, moved, own, x, cells, .. } = self;
         let (count, width) = (plan.species.len(), plan.slope_width());
         let n = &mut moved.n[row * width..(row + 1) * width];
         for (p, d) in plan.passes.iter().enumerate() {
@@ -314,11 +329,12 @@ impl LocalEnergy {
             add_weights(after, near, species, &mut n[p * count..(p + 1) * count]);
             n[p * count + species[particle] as usize] += own[p];
         }
+        add_walls(plan, cells.as_ref(), &x[particle], species[particle], n);
     }
 
     /// The densities that change, the particles that they belong to, and the densities of the moved particle.
     fn new_densities(&mut self, particle: usize) {
-        let LocalEnergy { plan, near, work, species, set, moved, own, n, .. } = self;
+        let LocalEnergy { plan, near, work, species, set, moved, own, n, cells, .. } = self;
         let (count, width, found) = (plan.species.len(), plan.slope_width(), near.count);
         let kind = species[particle] as usize;
         let passes = plan.passes.len();
@@ -338,6 +354,8 @@ impl LocalEnergy {
             }
             work.after[p * found..(p + 1) * found].copy_from_slice(after);
         }
+        let to = moved.to;
+        add_walls(plan, cells.as_ref(), &to, species[particle], &mut moved.n);
         for k in 0..found {
             let changes = |p: usize| work.change[p * found + k];
             if (0..passes).all(|p| changes(p) == 0.0) {
@@ -391,7 +409,10 @@ impl LocalEnergy {
             after.iter().zip(&near.id).filter(|(_, k)| **k as usize == id).map(|w| w.0).sum();
         let least = if species[id] == kind { own[pass] } else { 0.0 };
         let (count, width) = (plan.species.len(), plan.slope_width());
-        moved.n[row * width + pass * count + kind as usize] = others + moved_one + least;
+        let mut of_walls = vec![0.0; if plan.walls.is_empty() { 0 } else { width }];
+        add_walls(plan, Some(cells), &x[id], species[id], &mut of_walls);
+        let of_walls = of_walls.get(pass * count + kind as usize).copied().unwrap_or(0.0);
+        moved.n[row * width + pass * count + kind as usize] = others + moved_one + least + of_walls;
     }
 
     /// Evaluates ψ of the particles of `moved` at their new densities.
@@ -432,6 +453,14 @@ impl LocalEnergy {
             work.members.iter().zip(&work.lanes).for_each(|(row, psi)| moved.psi[*row as usize] = *psi);
         }
     }
+}
+
+/// Adds what walls add to the densities of a particle at `x`.
+fn add_walls(plan: &Plan, cells: Option<&Cells>, x: &[f64; 3], species: i32, n: &mut [f64]) {
+    let Some(cells) = cells.filter(|_| !plan.walls.is_empty()) else { return };
+    let faces = walls::faces(&plan.walls, &cells.domain, plan.dimensions);
+    let column = |d: usize| plan.passes.iter().position(|p| *p == d).map(|p| p * plan.species.len());
+    walls::add_densities(&faces, std::slice::from_ref(x), |_| species, column, plan.slope_width(), n);
 }
 
 /// Adds weights to the densities of the species that they are of.

@@ -7,6 +7,7 @@ use super::plane_list::{PlaneList, merge};
 use super::sweep_pairs::SweepPairs;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::Pool;
+use crate::engine::walls;
 use crate::free_energy::FreeEnergy;
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -49,6 +50,8 @@ pub struct Evaluation {
     /// Sum `Σ ψ` over the particles of each species.
     pub excess: Vec<f64>,
     pub(super) planes: Vec<PlaneList>,
+    /// The particles in the range of walls.
+    pub near_walls: Vec<NearWall>,
     /// Range of the conservative interactions.
     range: f64,
     /// The distance up to which all pairs are there.
@@ -57,6 +60,23 @@ pub struct Evaluation {
 
 /// How much farther than their range pairs are kept, in ranges, for [`Evaluator::energy_of_stretched`].
 const SLACK: f64 = 3e-4;
+
+/// A particle in the range of a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearWall {
+    /// Index of the particle.
+    pub particle: usize,
+    /// Index of the wall.
+    pub wall: usize,
+    /// The species of the particle.
+    pub species: usize,
+    /// The direction across the face.
+    pub axis: usize,
+    /// The distance from the face; negative below an upper face.
+    pub height: f64,
+    /// The force on the particle, along the axis.
+    pub force: f64,
+}
 
 impl Evaluator {
     /// Computes the derivatives of the fluid's formulas.
@@ -75,9 +95,10 @@ impl Evaluator {
         let range = self.fluid.conservative_range();
         let reach = range * (1.0 + SLACK);
         let mut planes = self.planes(pool, x, species, domain, reach);
-        let (densities, psi) = self.excess(pool, &mut planes, species);
+        let faces = walls::faces(&self.fluid.walls, domain, self.fluid.dimensions);
+        let (densities, psi) = self.excess(pool, &mut planes, (x, species), &faces);
         pool.each(&mut planes, |plane| plane.add_forces(&self.plan, &psi.slopes));
-        let forces = merge(planes.iter().map(PlaneList::sums), x.len(), 3).as_chunks().0.to_vec();
+        let mut forces = merge(planes.iter().map(PlaneList::sums), x.len(), 3).as_chunks().0.to_vec();
         let mut excess = vec![0.0; self.fluid.species.len()];
         psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
         let (mut energy, mut virial) = (excess.iter().sum::<f64>(), [0.0; 6]);
@@ -85,17 +106,25 @@ impl Evaluator {
             energy += tally.pair;
             (0..6).for_each(|c| virial[c] += tally.virial[c]);
         }
-        Evaluation { energy, densities, forces, virial, psi, excess, planes, range, reach }
+        let mut near_walls = Vec::new();
+        self.for_each_near_wall(&faces, x, species, &psi, |near, of_wall| {
+            energy += of_wall;
+            virial[near.axis] += near.height * near.force;
+            forces[near.particle][near.axis] += near.force;
+            near_walls.push(near);
+        });
+        Evaluation { energy, densities, forces, virial, psi, excess, planes, near_walls, range, reach }
     }
 
     /// Computes the energy `U` only.
     pub fn energy(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
         let planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
-        self.energy_of_pairs(pool, planes, species)
+        let faces = walls::faces(&self.fluid.walls, domain, self.fluid.dimensions);
+        self.energy_of_pairs(pool, planes, (x, species), &faces)
     }
 
     /// Computes the energy `U` of an evaluated configuration after it is stretched, with its box, by a factor along each axis; `None` if
-    /// pairs may come into range that are not among those of the evaluation.
+    /// pairs may come into range that are not among those of the evaluation, or if the fluid has walls.
     pub fn energy_of_stretched(
         &self,
         pool: &Pool,
@@ -104,22 +133,53 @@ impl Evaluator {
         factors: [f64; 3],
     ) -> Option<f64> {
         let least = factors.into_iter().fold(f64::INFINITY, f64::min);
-        if evaluation.reach * least < evaluation.range {
+        if evaluation.reach * least < evaluation.range || !self.fluid.walls.is_empty() {
             return None;
         }
         let mut planes = self.work().spare.pop().unwrap_or_default();
         planes.resize_with(evaluation.planes.len(), PlaneList::default);
         let mut work: Vec<_> = planes.iter_mut().zip(&evaluation.planes).collect();
         pool.each(&mut work, |(plane, of)| plane.stretch(of, factors));
-        Some(self.energy_of_pairs(pool, planes, species))
+        Some(self.energy_of_pairs(pool, planes, (&[], species), &[]))
     }
 
-    fn energy_of_pairs(&self, pool: &Pool, mut planes: Vec<PlaneList>, species: &[i32]) -> f64 {
-        let (_, psi) = self.excess(pool, &mut planes, species);
-        let energy =
+    /// The energy of listed pairs, and of particles near faces.
+    fn energy_of_pairs(
+        &self,
+        pool: &Pool,
+        mut planes: Vec<PlaneList>,
+        (x, species): (&[[f64; 3]], &[i32]),
+        faces: &[walls::Face],
+    ) -> f64 {
+        let (_, psi) = self.excess(pool, &mut planes, (x, species), faces);
+        let mut energy =
             psi.value.iter().sum::<f64>() + pair_energies(pool, &planes, &self.fluid).iter().sum::<f64>();
+        self.for_each_near_wall(faces, x, species, &psi, |_, of_wall| energy += of_wall);
         self.work().spare.push(planes);
         energy
+    }
+
+    /// Visits every particle in the range of a wall, with the energy that it has there besides ψ.
+    fn for_each_near_wall(
+        &self,
+        faces: &[walls::Face],
+        x: &[[f64; 3]],
+        species: &[i32],
+        psi: &Psi,
+        mut visit: impl FnMut(NearWall, f64),
+    ) {
+        let (variables, count) = (self.fluid.variables(), self.fluid.species.len());
+        for (particle, (x, kind)) in x.iter().zip(species).enumerate() {
+            walls::for_each_near(faces, x, *kind, |face, field, z| {
+                let slope = |d: usize| {
+                    psi.slopes.get(particle * variables + d * count + face.wall.wall.species).copied()
+                };
+                let [force, energy] = walls::force_and_energy(field, z, slope);
+                let (axis, wall, species) = (face.wall.wall.axis, face.index, *kind as usize);
+                let (height, force) = (face.inwards * z, face.inwards * force);
+                visit(NearWall { particle, wall, species, axis, height, force }, energy);
+            });
+        }
     }
 
     /// Calls `visit` with every pair of particles with finite positions closer than `range`, each once, in an order that depends on
@@ -169,7 +229,13 @@ impl Evaluator {
     }
 
     /// Computes densities and ψ of all particles.
-    fn excess(&self, pool: &Pool, planes: &mut [PlaneList], species: &[i32]) -> (Vec<f64>, Psi) {
+    fn excess(
+        &self,
+        pool: &Pool,
+        planes: &mut [PlaneList],
+        (x, species): (&[[f64; 3]], &[i32]),
+        faces: &[walls::Face],
+    ) -> (Vec<f64>, Psi) {
         let Evaluator { fluid, plan, free_energy, .. } = self;
         let variables = fluid.variables();
         pool.each(planes, |plane| plane.add_densities(plan));
@@ -180,6 +246,8 @@ impl Evaluator {
                 densities[k * variables + d * fluid.species.len() + *s as usize] += own;
             }
         }
+        let column = |d: usize| Some(d * fluid.species.len());
+        walls::add_densities(faces, x, |k| species[k], column, variables, &mut densities);
         let psi = psi(pool, free_energy, fluid, species, &densities);
         (densities, psi)
     }

@@ -25,7 +25,8 @@ impl Evaluation {
             self.planes.iter().map(|plane| (plane, Vec::new())).collect();
         pool.each(&mut work, |(plane, sums)| *sums = second_derivatives(plane, fluid, &self.psi));
         let parts = work.iter().map(|(plane, sums)| (&plane.hosts[..], &sums[..]));
-        let sums = merge(parts, count, width);
+        let mut sums = merge(parts, count, width);
+        self.add_walls(fluid, &mut sums);
         let of_particle = |k: usize| {
             let (sum, gradients) =
                 (sums[k * width], sums[k * width + 1..][..3 * variables].as_chunks::<3>().0);
@@ -37,6 +38,25 @@ impl Evaluation {
             sum + own.sum::<f64>()
         };
         (0..count).map(of_particle).collect()
+    }
+}
+
+impl Evaluation {
+    /// Adds the second derivatives by walls, and the gradients of their densities.
+    fn add_walls(&self, fluid: &Fluid, sums: &mut [f64]) {
+        let (variables, kinds) = (fluid.variables(), fluid.species.len());
+        for near in &self.near_walls {
+            let wall = &fluid.walls[near.wall];
+            let (row, z) = (near.particle * (1 + 3 * variables), near.height.abs());
+            let field = &wall.fields[near.species];
+            for (d, density) in &field.densities {
+                let [_, slope, curvature] = density.at(z);
+                let v = d * kinds + wall.wall.species;
+                sums[row] += times(self.psi.slopes[near.particle * variables + v], curvature);
+                sums[row + 1 + 3 * v + near.axis] += slope * near.height.signum();
+            }
+            sums[row] += field.energies.iter().map(|energy| energy.at(z)[2]).sum::<f64>();
+        }
     }
 }
 

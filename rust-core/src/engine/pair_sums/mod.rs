@@ -31,7 +31,7 @@ mod sweep_pairs;
 
 pub(super) use special::Corrections;
 
-pub use evaluation::{COMPONENTS, Evaluation, Evaluator};
+pub use evaluation::{COMPONENTS, Evaluation, Evaluator, NearWall};
 pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
 
@@ -45,6 +45,7 @@ use super::plan::Plan;
 use super::reach::check_reach;
 use super::request::{Request, Results};
 use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
+use super::walls;
 use densities::sum_densities;
 use forces::{ForceInput, ForceOutput, add_forces};
 use in_box::BoxSearch;
@@ -66,6 +67,8 @@ pub struct PairSums {
     special: Vec<SpecialPair>,
     exclusions: Exclusions,
     species: Vec<i32>,
+    /// What walls add to the densities, in the same order; empty without walls.
+    of_walls: Vec<f64>,
     /// Local densities of owned particles, density-major, [`Fluid::variables`] each.
     densities: Vec<f64>,
     /// Whether all densities are summed, or only those that forces need.
@@ -166,8 +169,24 @@ impl PairSums {
             };
             scale(&mut self.pairs, &self.special, &self.exclusions, domain, dimensions, cutoff)?;
         }
+        self.find_walls(surroundings, particles);
         self.counts.search += 1;
         Ok(())
+    }
+
+    /// Finds the densities of walls.
+    fn find_walls(&mut self, surroundings: Surroundings, particles: &Particles) {
+        let PairSums { plan, of_walls, species, .. } = self;
+        of_walls.clear();
+        let Surroundings::Box(domain) = surroundings else { return };
+        let faces = walls::faces(&plan.walls, domain, plan.dimensions);
+        if !faces.is_empty() {
+            let count = plan.species.len();
+            let width = plan.densities.len() * count;
+            of_walls.resize(width * particles.owned, 0.0);
+            let column = |d: usize| Some(d * count);
+            walls::add_densities(&faces, particles.x, |k| species[k], column, width, of_walls);
+        }
     }
 
     fn take_species(&mut self, particles: &Particles) -> Result<(), EngineError> {
@@ -189,11 +208,12 @@ impl PairSums {
 
     /// Sums the densities over the pairs that have been found.
     fn sum_densities(&mut self, all: bool) {
-        let PairSums { plan, pairs, species, densities, counts, .. } = self;
+        let PairSums { plan, pairs, species, densities, of_walls, counts, .. } = self;
         densities.clear();
         densities.resize(self.owned * plan.densities.len() * plan.species.len(), 0.0);
         let which = (0..plan.densities.len()).filter(|d| all || plan.passes.contains(d));
         counts.density += sum_densities(pairs, plan, which, species, densities);
+        densities.iter_mut().zip(of_walls).for_each(|(n, of_walls)| *n += *of_walls);
         self.has_all_densities = all || plan.passes.len() == plan.densities.len();
     }
 

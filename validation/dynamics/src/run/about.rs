@@ -7,6 +7,7 @@ use psidpd_formats::{About, AboutDensity, AboutStage};
 
 pub fn about(scene: &Scene) -> About {
     let mut begin = 0;
+    let moving = scene.model.walls().iter().any(|wall| wall.velocity != [0.0; 3]);
     let stages = scene.stages.iter().map(|s| {
         let stage = AboutStage {
             name: s.name.clone(),
@@ -15,7 +16,7 @@ pub fn about(scene: &Scene) -> About {
             dt: s.dt,
             kt: s.kt,
             thermostat: s.thermostat,
-            body_forces: s.body_forces && !scene.body_forces.is_empty(),
+            body_forces: s.body_forces && !scene.body_forces.is_empty() || moving,
             integrator: s.integrator.to_string(),
         };
         begin = stage.end;

@@ -6,6 +6,7 @@ use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
 use std::path::Path;
 
+mod continuum;
 mod device;
 mod faces;
 mod force_gradient;

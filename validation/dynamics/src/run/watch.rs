@@ -223,8 +223,8 @@ impl Watch {
         if due && let Some(sums) = configurational(simulation) {
             self.configurational.push(sums);
         }
-        // A body force may drive a flow that is hot by itself.
-        let driven = stage.body_forces && simulation.has_body_forces();
+        // A body force or a wall may drive a flow that is hot by itself.
+        let driven = stage.body_forces && simulation.has_body_forces() || simulation.has_moving_walls();
         if ratio <= FAR_OFF || driven {
             self.hot = None;
             return Ok(());

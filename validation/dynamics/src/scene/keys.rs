@@ -10,14 +10,14 @@ mod run;
 mod scene;
 
 pub use particles::{INITIAL, PART};
-pub use run::{BODY_FORCE, OUTPUT, STAGE};
+pub use run::{BODY_FORCE, OUTPUT, STAGE, WALL};
 pub use scene::{BOX, MASSES, TOP};
 
 pub use psidpd_core::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
 use psidpd_core::document::keys::{form_key, key};
 
 /// All tables in the order of the documentation, except those of `[observe]`.
-pub const TABLES: &[Table] = &[TOP, BOX, MASSES, INITIAL, PART, BODY_FORCE, STAGE, OUTPUT];
+pub const TABLES: &[Table] = &[TOP, BOX, MASSES, INITIAL, PART, WALL, BODY_FORCE, STAGE, OUTPUT];
 
 /// The names in a list of pairs.
 fn names<T>(all: &[(&'static str, T)]) -> Vec<&'static str> {

@@ -26,6 +26,7 @@ mod shape;
 mod stage;
 mod template;
 mod velocities;
+mod wall;
 
 pub use arrangement::{Arrangement, Lattice};
 pub use composition::Composition;
@@ -133,6 +134,8 @@ impl Scene {
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
         let device = root.get("device").map_or(Ok(Device::Cpu), |value| read_device(&value))?;
         let (initial, domain) = initial::read(&root, &model, base)?;
+        let mass = masses::read(&root, model.species(), &initial)?;
+        let model = wall::read(&root, model, (&initial, &domain), (kt, &mass))?;
         let stages = stage::read(&root, kt)?;
         let body_forces = body_force::read(&root, &model, &initial)?;
         let drive = body_forces.iter().find_map(BodyForce::drive);
@@ -148,7 +151,7 @@ impl Scene {
             seed,
             precision: precision.transpose()?,
             device,
-            mass: masses::read(&root, model.species(), &initial)?,
+            mass,
             frozen: initial.frozen(),
             body_forces,
             output: output::read(&root)?,

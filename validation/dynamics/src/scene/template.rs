@@ -35,7 +35,7 @@ pub const TEMPLATES: &[Template] = &[
     template!("pendant-drop", "warren2003-set6", "a drop that hangs from a frozen support"),
     template!("demixing", "binary-2d", "two liquids, quenched until they separate"),
     template!("collision", "drop-collision", "two drops that meet in another liquid"),
-    template!("channel", "standard-dpd", "a flow between walls of frozen particles"),
+    template!("channel", "standard-dpd", "a flow between walls"),
 ];
 
 #[derive(Debug, thiserror::Error)]

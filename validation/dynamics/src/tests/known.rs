@@ -102,7 +102,7 @@ fn the_tangential_pressure_is_the_mean_of_the_other_directions() {
     let flux = Flux {
         ways: vec![Line { from: [1.0, 1.0, 0.0], d: [0.3, 0.0, 0.0], f: [0.6, 0.0, 0.0] }],
         drag: drag(Line { from: [1.0, 2.0, 0.0], d: [0.0, 0.4, 0.0], f: [0.0, 1.2, 0.0] }),
-        forces: Vec::new(),
+        ..Flux::default()
     };
     let cases: [(&str, &[f64], f64); 2] = [(FLAT, &[4.0, 5.0], 1.0), (IDEAL, &[4.0, 5.0, 6.0], 2.0)];
     for (model, lengths, others) in cases {

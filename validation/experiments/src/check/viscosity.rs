@@ -117,7 +117,9 @@ pub fn flow(fluid: &Fluid, mass: f64, density: Option<f64>) -> Option<Flow> {
     }
     let near = |x: f64, y: f64| (x - y).abs() <= SAME * y.abs();
     let same = |usual: &&Usual| {
-        near(strength, usual.strength) && near(many_body, usual.many_body) && density.is_none_or(|rho| near(rho * range.powi(3), usual.density))
+        near(strength, usual.strength)
+            && near(many_body, usual.many_body)
+            && density.is_none_or(|rho| near(rho * range.powi(3), usual.density))
     };
     let usual = USUAL.iter().find(same)?;
     let speed = (fluid.kt / mass).sqrt();

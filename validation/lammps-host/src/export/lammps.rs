@@ -120,6 +120,9 @@ fn check(scene: &Scene) -> Result<(), LammpsError> {
     if scene.seed == 0 {
         return Err(LammpsError::Seed(scene.seed));
     }
+    if !scene.model.walls().is_empty() {
+        return Err(LammpsError::Walls);
+    }
     let reversed = scene.body_forces.iter().any(|b| b.reversed_along.is_some());
     let orthogonal = (0..3).all(|k| (0..3).all(|c| c == k || scene.domain.edge(k)[c] == 0.0));
     if reversed && !orthogonal {

@@ -27,6 +27,7 @@ mod structure_factor;
 pub mod surface_tension;
 mod temperature;
 mod viscosity;
+mod wall_force;
 mod waves;
 
 // Every observable uses these.
@@ -163,4 +164,5 @@ meters!(
     ContactAngle(contact_angle::ContactAngle),
     Clusters(clusters::Clusters),
     LocalDensity(local_density::LocalDensity),
+    WallForce(wall_force::WallForce),
 );

@@ -178,9 +178,9 @@ pub fn gather(
         && let Some(error) = t.error
         && (t.value - s.kt).abs() > (4.0 * error).max(0.01 * s.kt)
     {
-        // A flow that body forces drive counts as heat, at any time step.
+        // A flow that body forces or walls drive counts as heat, at any time step.
         let because = match has_flow {
-            true => "it includes the flow that the body forces drive; `temperature_profile` in [observe] leaves the flow out".into(),
+            true => "it includes the flow that body forces or moving walls drive; `temperature_profile` in [observe] leaves the flow out".into(),
             false => format!("a smaller time step than {} brings it nearer", s.dt),
         };
         let off = 100.0 * (t.value / s.kt - 1.0);

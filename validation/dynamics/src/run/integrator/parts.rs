@@ -1,7 +1,7 @@
 //! Loops over particles, each thread its part of them: a particle's coordinates depend on nothing but its own
 //! arrays, so that the results are the same for any number of parts.
 
-use super::reflection::{Before, Beyond, Bounce, Faces, Leg};
+use super::reflection::{Before, Beyond, Bounce, Faces, Hit, Leg};
 use crate::run::bounds::Bounds;
 use psidpd_core::engine::vectors::{self, Loop};
 use psidpd_core::engine::{PeriodicBox, Pool, part};
@@ -69,6 +69,7 @@ pub struct Part<'a> {
     faults: Faults,
     /// The ways of particles that met faces, if ways are recorded.
     legs: Vec<Leg>,
+    hits: Vec<Hit>,
     beyond: Vec<Beyond>,
 }
 
@@ -78,6 +79,8 @@ pub struct Moved {
     pub faults: Faults,
     /// The ways of particles that met faces, in the order of particles.
     pub legs: Vec<Leg>,
+    /// What faces gave to them, if ways are recorded.
+    pub hits: Vec<Hit>,
     pub beyond: Vec<Beyond>,
 }
 
@@ -121,21 +124,23 @@ pub fn share<'a>(
             ],
             faults: Faults::default(),
             legs: Vec::new(),
+            hits: Vec::new(),
             beyond: Vec::new(),
         });
     }
     let over_mass = &kept.over_mass[..];
     pool.each(&mut shares, |share| work(share, over_mass));
     // Parts are in the order of particles: the first fault is that of the first part which has one.
-    let Moved { mut faults, mut legs, mut beyond } = Moved::default();
+    let Moved { mut faults, mut legs, mut hits, mut beyond } = Moved::default();
     for share in &mut shares {
         legs.append(&mut share.legs);
+        hits.append(&mut share.hits);
         beyond.append(&mut share.beyond);
         faults.fast = faults.fast.or(share.faults.fast);
         faults.escaped = faults.escaped.or(share.faults.escaped);
         faults.uncounted = faults.uncounted.or(share.faults.uncounted);
     }
-    Moved { faults, legs, beyond }
+    Moved { faults, legs, hits, beyond }
 }
 
 /// Moves particles by `rule`, which makes position and velocity of position, velocity, force, and a number of
@@ -177,6 +182,8 @@ fn reflect(part: &mut Part, around: Surroundings, bounces: &[Bounce]) {
             let mut legs = faces.legs(bounces, part.x[k], part.v[k], part.f[k].map(|f| f / mass));
             legs.iter_mut().for_each(|leg| leg.particle += part.first);
             part.legs.append(&mut legs);
+            part.hits
+                .extend(bounces.iter().map(|b| Hit { direction: b.direction, momentum: mass * b.given }));
         }
     }
 }

@@ -81,6 +81,8 @@ pub struct Bounce {
     pub direction: usize,
     /// Place and velocity of the step at the end, and the velocity of the path; `None` if it moved further than across the box.
     pub end: Option<[f64; 3]>,
+    /// The velocity that the faces have given.
+    pub given: f64,
     /// How far the place of the step would lie beyond the face.
     beyond: f64,
     /// Place of the step at the start.
@@ -96,6 +98,13 @@ pub struct Leg {
     pub to: [f64; 3],
     pub d: [f64; 3],
     pub u: [f64; 3],
+}
+
+/// The momentum that faces have given to a particle in a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    pub direction: usize,
+    pub momentum: f64,
 }
 
 impl Faces<'_> {
@@ -143,7 +152,8 @@ impl Faces<'_> {
                 for arc in &mut arcs {
                     arc.given += v + ahead * a;
                 }
-                bounces.push(Bounce { particle: k, direction: c, end, beyond, start: x[c], arcs });
+                let given = flown.map_or(0.0, |end| end.given);
+                bounces.push(Bounce { particle: k, direction: c, end, given, beyond, start: x[c], arcs });
             }
         }
         bounces.sort_by_key(|bounce| bounce.particle);

@@ -1,17 +1,20 @@
 //! The processor that makes the steps.
 
 use super::{RunError, Simulation};
-use crate::device::Device;
+use crate::device::{Device, DeviceError};
 
 impl Simulation {
     /// Sets the processor of later steps; a new simulation is on the CPU.
     pub fn use_device(&mut self, device: Device) -> Result<(), RunError> {
         match device {
             Device::Cpu => Ok(()),
+            Device::Gpu(_) if !self.engine().plan().walls().is_empty() => {
+                Err(DeviceError::Lacks("walls of matter".into()).into())
+            }
             #[cfg(feature = "gpu")]
             Device::Gpu(number) => self.use_gpu(number),
             #[cfg(not(feature = "gpu"))]
-            Device::Gpu(_) => Err(crate::device::DeviceError::NotBuilt.into()),
+            Device::Gpu(_) => Err(DeviceError::NotBuilt.into()),
         }
     }
 

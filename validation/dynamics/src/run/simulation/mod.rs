@@ -16,6 +16,7 @@ mod particles;
 mod record;
 mod thermodynamics;
 mod thermostat;
+mod walls;
 
 pub(super) use thermostat::Heat;
 
@@ -196,8 +197,11 @@ impl Simulation {
         self.monte_carlo.at_work = !integrator.has_time();
         self.open_record(dt);
         integrator.step(self, dt, want)?;
+        if integrator.has_time() {
+            self.rub(dt, want)?;
+        }
         self.close_record(integrator);
-        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
+        self.add_impulse_virials();
         self.stale = !integrator.properties().forces_at_end;
         // The order of trials must not depend on positions.
         if reorder::is_due(self.number) && integrator.has_time() {
@@ -246,8 +250,14 @@ impl Simulation {
             }
         }
         self.stale = false;
-        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
+        self.add_impulse_virials();
         Ok(())
+    }
+
+    /// Adds the virials of thermostats that are not part of the forces.
+    fn add_impulse_virials(&mut self) {
+        self.forces.add_thermostat_virial(self.thermostat.impulse_virial);
+        self.forces.add_thermostat_virial(self.motion.wall_virial);
     }
 
     /// The time in which one thread did the work of all.

@@ -124,7 +124,7 @@ impl Simulation {
     /// that [`Simulation::degrees_of_freedom`] counts.
     pub(in crate::run) fn draw_velocities(&mut self, random: &mut ChaCha8Rng) {
         let (kt, dimensions) = (self.kt(), self.dimensions());
-        let conserved = self.frozen().is_empty();
+        let conserved = self.frozen().is_empty() && !self.rubs();
         let conserved = self.particles.now().domain.periodic().map(|periodic| conserved && periodic);
         let Simulation { particles, external, .. } = self;
         let frozen = &external.frozen;

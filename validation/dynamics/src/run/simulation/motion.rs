@@ -20,6 +20,8 @@ pub(super) struct Motion {
     pub held: Option<Vec<[f64; 3]>>,
     /// What the last drift has left beyond faces.
     beyond: Vec<Beyond>,
+    /// Virial of the mean friction and noise of walls in the last step, if it was asked for.
+    pub wall_virial: [f64; 6],
 }
 
 impl Motion {
@@ -30,6 +32,7 @@ impl Motion {
             deferred: None,
             held: None,
             beyond: Vec::new(),
+            wall_virial: [0.0; 6],
         }
     }
 }
@@ -40,7 +43,7 @@ impl Simulation {
         let dt = path.time;
         let deferred = self.motion.deferred.take_if(|deferred| *deferred == h).is_some();
         self.make_deferred_kick()?;
-        let Moved { faults, legs, .. } = self.moving(path, h, false, |part, over_mass, around| {
+        let Moved { faults, legs, hits, .. } = self.moving(path, h, false, |part, over_mass, around| {
             if deferred {
                 drift(part, over_mass, around, |x, v, f, over_mass| {
                     let kick = over_mass * f;
@@ -54,7 +57,7 @@ impl Simulation {
                 });
             }
         });
-        self.record_ways(path, &legs);
+        self.record_ways(path, &legs, &hits);
         self.refuse(faults, Some(dt), deferred)
     }
 
@@ -62,10 +65,10 @@ impl Simulation {
     pub(in crate::run) fn drift(&mut self, path: Path) -> Result<(), RunError> {
         let dt = path.time;
         self.make_deferred_kick()?;
-        let Moved { faults, legs, .. } = self.moving(path, 0.0, false, |part, over_mass, around| {
+        let Moved { faults, legs, hits, .. } = self.moving(path, 0.0, false, |part, over_mass, around| {
             drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
         });
-        self.record_ways(path, &legs);
+        self.record_ways(path, &legs, &hits);
         self.refuse(faults, Some(dt), false)
     }
 
@@ -119,14 +122,14 @@ impl Simulation {
     pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let path = Path::whole(dt, lambda * dt);
-        let Moved { faults, legs, .. } = self.moving(path, dt, true, |part, over_mass, around| {
+        let Moved { faults, legs, hits, .. } = self.moving(path, dt, true, |part, over_mass, around| {
             part.kept[0].copy_from_slice(part.v);
             part.kept[1].copy_from_slice(part.f);
             drift(part, over_mass, around, |x, v, f, over_mass| {
                 (x + dt * (v + 0.5 * over_mass * f), v + lambda * over_mass * f)
             });
         });
-        self.record_ways(path, &legs);
+        self.record_ways(path, &legs, &hits);
         self.refuse(faults, Some(dt), false)
     }
 

@@ -62,6 +62,16 @@ impl Particles {
         (&self.state, &mut self.force)
     }
 
+    /// Takes the velocities away, for work that reads all else; [`Particles::put_velocities`] follows.
+    pub fn take_velocities(&mut self) -> Vec<[f64; 3]> {
+        self.flux.take();
+        std::mem::take(&mut self.state.v)
+    }
+
+    pub fn put_velocities(&mut self, v: Vec<[f64; 3]>) {
+        self.state.v = v;
+    }
+
     pub fn velocities_mut(&mut self) -> &mut [[f64; 3]] {
         self.flux.take();
         &mut self.state.v

@@ -2,7 +2,7 @@
 
 use super::{Simulation, State};
 use crate::integrator::Integrator;
-use crate::run::integrator::reflection::{Leg, Path};
+use crate::run::integrator::reflection::{Hit, Leg, Path};
 use psidpd_core::engine::thermostat::{Pull, Pulls};
 use psidpd_observe::flux::{Acted, Drag, Flux, Line, Place, Recorded};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ impl Simulation {
         self.record.as_ref().is_some_and(|record| record.open)
     }
 
-    fn records_lines(&self) -> bool {
+    pub(super) fn records_lines(&self) -> bool {
         self.record.as_ref().is_some_and(|record| record.what == Recorded::Lines)
     }
 
@@ -69,10 +69,11 @@ impl Simulation {
 
     /// Records the ways of all particles to their present positions on a `path`; those that met faces went along `legs`, in the
     /// order of particles.
-    pub(super) fn record_ways(&mut self, path: Path, legs: &[Leg]) {
+    pub(super) fn record_ways(&mut self, path: Path, legs: &[Leg], hits: &[Hit]) {
         if !self.is_recording() {
             return;
         }
+        self.record_hits(hits);
         let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
         let mut ways = Vec::with_capacity(self.len() + legs.len());
         let mut legs = legs.iter().peekable();
@@ -119,9 +120,45 @@ impl Simulation {
         }
         let State { x, species, .. } = self.particles.now();
         let place = || Place { x: x.clone(), species: species.clone(), displaced };
-        let acted = Acted { share: 1.0, virial, at: self.records_lines().then(place) };
+        let on_walls = self.forces_of_fluid_on_walls();
+        let acted = Acted { share: 1.0, virial, on_walls, at: self.records_lines().then(place) };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);
+        }
+    }
+
+    /// The conservative forces on the walls in the last evaluation.
+    fn forces_of_fluid_on_walls(&self) -> Vec<[f64; 3]> {
+        let engine = self.engine();
+        let walls = engine.plan().walls().iter().zip(engine.forces_on_walls());
+        walls
+            .map(|(wall, force)| {
+                let mut on_wall = [0.0; 3];
+                on_wall[wall.wall.axis] = if wall.wall.high { *force } else { -force };
+                on_wall
+            })
+            .collect()
+    }
+
+    /// Records the friction of walls, and what they are `given` by it.
+    pub(super) fn record_friction(&mut self, drag: Arc<Drag>, given: &[[f64; 3]]) {
+        if let Some(record) = &mut self.record {
+            record.flux.drag.push(drag);
+            add_to_walls(&mut record.flux.on_walls, given);
+        }
+    }
+
+    /// Records the momentum that `hits` give to walls: the direction of each, and the momentum of the particle.
+    pub(super) fn record_hits(&mut self, hits: &[Hit]) {
+        let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
+        let mut given = vec![[0.0; 3]; self.engine().plan().walls().len()];
+        for (wall, given) in self.engine().plan().walls().iter().zip(&mut given) {
+            let wall = &wall.wall;
+            let here = |hit: &&Hit| hit.direction == wall.axis && (hit.momentum < 0.0) == wall.high;
+            given[wall.axis] -= over_dt * hits.iter().filter(here).map(|hit| hit.momentum).sum::<f64>();
+        }
+        if let Some(record) = &mut self.record {
+            add_to_walls(&mut record.flux.on_walls, &given);
         }
     }
 
@@ -141,6 +178,13 @@ impl Simulation {
             let drag = Drag { sum: virial.map(|w| share * w), lines: of_planes };
             record.flux.drag.push(Arc::new(drag));
         }
+    }
+}
+
+fn add_to_walls(sums: &mut Vec<[f64; 3]>, given: &[[f64; 3]]) {
+    sums.resize(given.len(), [0.0; 3]);
+    for (sum, given) in sums.iter_mut().zip(given) {
+        (0..3).for_each(|c| sum[c] += given[c]);
     }
 }
 

@@ -6,6 +6,43 @@ use super::scene::{
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
+use crate::scene::wall::KINDS;
+
+pub const WALL: Table = Table::array("wall",
+    "Walls as a continuum: a half-space of matter behind a reflecting face, which costs no particles and has no layers or pits. A \
+     particle in front of it has the local densities and the energy that integrals over the matter say, the matter's own ψ responds to \
+     first order, and drag and noise against it are a friction by the distance from the face. See `docs/walls.md`.",
+    &[
+        key("kind", Choice(|| names(KINDS)), REQUIRED, "`continuum`: matter of one density that fills the half-space.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\nspecies = \"A\"\ndensity = 3.0"),
+        key("faces", Names, REQUIRED,
+            "The faces of the box behind which the matter lies: `xlo`, `xhi`, `ylo` … Their directions must be reflecting.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndensity = 3.0"),
+        key("species", Text, OPTIONAL,
+            "The species of the matter, with the interactions that the model gives it; required if the model has several.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\""),
+        key("density", Positive, OPTIONAL,
+            "Number density of the matter; that of the fluid, in its largest part, if left out.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndensity = 6.0"),
+        key("local_density", Positive, OPTIONAL,
+            "The local density of a particle of the matter, at which its ψ responds to the fluid: the mean that the observable \
+             `local_density` finds in a liquid. If left out that of theory with correlations to first order, which `check` prints for \
+             the fluid; for several species the number density, as in mean field.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndensity = 6.05\nlocal_density = 2.3"),
+        key("velocity", Point, OPTIONAL,
+            "The velocity of the matter, along its face; at rest if left out.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zhi\"]\nspecies = \"A\"\nvelocity = [0.5, 0.0, 0.0]"),
+        key("viscosity", Positive, OPTIONAL,
+            "The shear viscosity of the fluid: the drag gets the strength at which a flow extrapolates to the wall's velocity at \
+             the face.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\nspecies = \"A\"\nviscosity = 0.85"),
+        key("drag", Positive, OPTIONAL,
+            "Coefficient γ of the drag between fluid and matter, instead of `viscosity`; that of the model if both are left out.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndrag = 20.0"),
+        key("drag_range", Positive, OPTIONAL,
+            "Range of the drag between fluid and matter; that of the model if left out.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndrag = 20.0\ndrag_range = 0.8"),
+    ]);
 
 pub const BODY_FORCE: Table = Table::array("body_force",
     "An external acceleration. A scene may have several, which add up. Potential energies and virials do \

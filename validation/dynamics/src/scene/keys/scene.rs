@@ -108,7 +108,7 @@ pub const BOX: Table = Table::new("box",
             "The boundary at its faces; if left out, `periodic`, or the boundary of the checkpoint or \
              `final.data` that the scene starts from. A particle that meets a reflecting face bounces on its exact path \
              under the force of the step, in which the velocity across the face is reversed; no force acts through the \
-             face. For a wall of particles freeze a `layer` in front of it.",
+             face. For matter behind it use `[[wall]]`, for a wall of particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
     ]);
 

@@ -1,0 +1,306 @@
+//! Walls as a half-space of matter.
+
+use super::*;
+use crate::run::runner::{Begin, Runner};
+use crate::run::tests::resume::{assert_same, finished, until};
+use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::engine::{PeriodicBox, faces};
+use psidpd_core::model::wall::{SURPLUS, Wall};
+use psidpd_observe::Recorded;
+use psidpd_observe::frame::{Frame, View};
+use std::num::NonZeroUsize;
+use std::sync::atomic::AtomicUsize;
+
+const BOX: &str =
+    "[box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
+
+const STAGE: &str = "[[stage]]\nname = \"run\"\nsteps = 1\n";
+
+/// Set 6 between a wall at rest and one that moves.
+fn between(rest: &str) -> Scene {
+    let text = format!(
+        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 6.05\n{BOX}\
+         [[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nlocal_density = 2.3\nviscosity = 7.8\n\
+         [[wall]]\nkind = \"continuum\"\nfaces = [\"zhi\"]\ndensity = 5.0\nlocal_density = 2.3\nvelocity = [0.5, -0.2, 0.0]\n{rest}"
+    );
+    support::scene(SET6, &text).unwrap()
+}
+
+/// A simulation of it that has settled.
+fn settled(scene: &Scene) -> Simulation {
+    let mut run = scene.simulation(scene.initial_state()).unwrap();
+    advance(&mut run, 400, 0.01, Integrator::VelocityVerlet);
+    run
+}
+
+/// The deviations of the energy, with the forces of walls in it, fall with Δt² where drag and noise are off.
+#[test]
+fn energy_between_walls_is_conserved_to_second_order() {
+    let scene = between(STAGE);
+    let mut run = settled(&scene);
+    let starts: Vec<State> = (0..4)
+        .map(|_| {
+            advance(&mut run, 50, 0.01, Integrator::VelocityVerlet);
+            run.state().clone()
+        })
+        .collect();
+    let deviation = |dt: f64| {
+        let (mut squares, mut count) = (0.0, 0.0);
+        for start in &starts {
+            let mut run = scene.simulation(start.clone()).unwrap();
+            run.set_thermostat(false);
+            run.prepare(dt, Want::TOTALS).unwrap();
+            let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
+            let first = energy(&run);
+            for _ in 0..(0.4 / dt).round() as usize {
+                run.step(dt, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
+                squares += (energy(&run) - first).powi(2);
+                count += 1.0;
+            }
+        }
+        (squares / count).sqrt() / starts[0].len() as f64
+    };
+    let [coarse, fine] = [0.01, 0.00125].map(deviation);
+    assert!(coarse < 3e-3 && fine < coarse / 25.0, "{coarse} {fine}");
+}
+
+/// In a gas whose only drag is that of a wall, one action takes velocities of zero to the covariance `kT/m (1 − exp(−2ζΔt/m))`, along the
+/// face and across it, around the velocity of the wall's part in it. Variances of 4000 particles at one height are known to 2.2 %,
+/// covariances to 1.6 %: five standard errors are exceeded by one of 45 numbers less than once in 30 000 seeds.
+#[test]
+fn noise_of_a_wall_has_the_covariance_of_its_friction() {
+    let (kt, dt, mass) = (0.7, 0.3, 1.7);
+    let wall = Wall {
+        axis: 2,
+        high: true,
+        species: 0,
+        density: 3.0,
+        local_densities: Vec::new(),
+        velocity: [0.4, 0.0, 0.0],
+        drag: [Some(20.0), Some(1.0)],
+    };
+    let text = "title = \"g\"\nspecies = [\"A\"]\n";
+    let model = Model::parse("m.toml", text).unwrap().with_walls(vec![wall]);
+    let domain = PeriodicBox::orthogonal([0.0; 3], [4.0, 4.0, 6.0], [true, true, false]).unwrap();
+    for height in [0.0, 0.3, 0.7] {
+        let x = (0..4000).map(|k| [f64::from(k) * 0.001, 1.0, 6.0 - height]).collect();
+        let state = State::at_rest(domain.clone(), vec![mass], x);
+        let mut run = Simulation::new(&model, kt, state, 3).unwrap();
+        run.prepare_for(Integrator::VelocityVerlet, dt, Want::FORCES).unwrap();
+        run.step(dt, Integrator::VelocityVerlet, Want::FORCES).unwrap();
+        let walls = run.engine().plan().walls();
+        let [along, across] = walls[0].fields[0].friction.as_ref().unwrap().at(height);
+        let v = &run.state().v;
+        let mean = |f: &dyn Fn(&[f64; 3]) -> f64| v.iter().map(f).sum::<f64>() / v.len() as f64;
+        let zeta = [along, along, across];
+        let variance = zeta.map(|zeta| kt / mass * (1.0 - (-2.0 * zeta * dt / mass).exp()));
+        let drift = 0.4 * (1.0 - (-along * dt / mass).exp());
+        for a in 0..3 {
+            let center = |v: &[f64; 3], c: usize| v[c] - if c == 0 { drift } else { 0.0 };
+            let off = mean(&|v| center(v, a)) / (variance[a] / 4000.0).sqrt();
+            assert!(off.abs() < 5.0, "{height}: mean {a} off by {off}");
+            for b in 0..=a {
+                let expected = if a == b { variance[a] } else { 0.0 };
+                let error =
+                    if a == b { 2f64.sqrt() } else { 1.0 } * (variance[a] * variance[b] / 4000.0).sqrt();
+                let found = mean(&|v| center(v, a) * center(v, b));
+                assert!((found - expected).abs() < 5.0 * error, "{height} {a}{b}: {found} {expected}");
+            }
+        }
+    }
+}
+
+/// Beside walls an ideal gas has the temperature of its stage, however strong the drag, with every integrator whose thermostat is
+/// exact: the mean of 20 blocks, of which Student's t exceeds 6 less than once in 10^5 seeds.
+#[test]
+fn a_gas_beside_walls_has_its_temperature() {
+    let text = format!(
+        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 4.0\nsteps = 1\n{BOX}\
+         [[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\ndrag = 200.0\n"
+    );
+    let scene = support::scene(IDEAL, &text).unwrap();
+    for name in ["peters", "shardlow-s1", "aboba", "baoab", "two-stage", "force-gradient"] {
+        let integrator = Integrator::ALL.iter().find(|(other, _)| *other == name).unwrap().1;
+        let mut run = scene.simulation(scene.initial_state()).unwrap();
+        let dt = 0.1;
+        run.prepare_for(integrator, dt, Want::FORCES).unwrap();
+        run.advance(30, dt, integrator).unwrap();
+        let blocks: Vec<[f64; 2]> = (0..20)
+            .map(|_| {
+                let (mut near, mut all) = ([0.0; 2], 0.0);
+                for _ in 0..12 {
+                    run.step(dt, integrator, Want::FORCES).unwrap();
+                    all += run.temperature() / 12.0;
+                    let state = run.state();
+                    for (_, v) in state.x.iter().zip(&state.v).filter(|(x, _)| x[2] < 0.5 || x[2] > 4.5) {
+                        near[0] += v.iter().map(|v| v * v).sum::<f64>();
+                        near[1] += 3.0;
+                    }
+                }
+                [all, near[0] / near[1]]
+            })
+            .collect();
+        for k in 0..2 {
+            let n = blocks.len() as f64;
+            let mean = blocks.iter().map(|b| b[k]).sum::<f64>() / n;
+            let variance = blocks.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            let error = (variance / n).sqrt();
+            assert!((mean - 1.0).abs() < 6.0 * error && error < 0.02, "{name} {k}: {mean} +- {error}");
+        }
+    }
+}
+
+/// What walls take is what the fluid loses, by forces, drag, noise and reflection. Where a step has one kick, step by step to
+/// rounding; where kicks are shared with the next step, but for the kicks at both ends.
+#[test]
+fn walls_take_the_momentum_that_the_fluid_loses() {
+    let scene = between(STAGE);
+    let start = settled(&scene).state().clone();
+    for (name, integrator) in Integrator::ALL.iter().filter(|(_, integrator)| integrator.has_time()) {
+        let mut run = scene.simulation(start.clone()).unwrap();
+        let dt = 0.01;
+        run.prepare_for(*integrator, dt, Want::TOTALS).unwrap();
+        run.record_flux(Recorded::Sum);
+        let first = momentum(&run);
+        let (mut given, mut before, mut worst) = ([0.0; 3], first, 0.0f64);
+        for _ in 0..200 {
+            run.step(dt, *integrator, Want::TOTALS).unwrap();
+            let on_walls = run.flux().unwrap().on_walls(2);
+            let taken: [f64; 3] = std::array::from_fn(|c| dt * (on_walls[0][c] + on_walls[1][c]));
+            let now = momentum(&run);
+            for c in 0..3 {
+                given[c] += taken[c];
+                worst = worst.max((now[c] - before[c] + taken[c]).abs());
+            }
+            before = now;
+        }
+        // The force on all particles together is below 300 in this run.
+        let off = (0..3).map(|c| (before[c] - first[c] + given[c]).abs()).fold(0.0, f64::max);
+        let [limit, step_limit] = if *name == "aboba" { [1e-9; 2] } else { [300.0 * dt; 2] };
+        assert!(off < limit && worst < step_limit, "{name}: {off} {worst}");
+        assert!(given.iter().any(|p| p.abs() > 1.0), "{name}: {given:?}");
+    }
+}
+
+/// The configurational temperature of a particle in front of a wall is that of Boltzmann's distribution, an integral over its height.
+#[test]
+fn the_configurational_temperature_knows_walls() {
+    let scene = between(STAGE);
+    let kt = 0.7;
+    let evaluator = Evaluator::new(scene.model.at(kt).unwrap()).unwrap();
+    let state = State::at_rest(scene.domain.clone(), vec![1.0], vec![[1.0, 1.0, 1.0]]);
+    let run = Simulation::new(&scene.model, kt, state, 1).unwrap();
+    let (mut sums, mut forces) = ([0.0; 2], 0.0);
+    let cells = 20_000;
+    for k in 0..cells {
+        let x = [[1.0, 1.0, 5.0 * (f64::from(k) + 0.5) / f64::from(cells)]];
+        let frame = Frame::new(View { x: &x, ..run.view(0.0) }, &evaluator);
+        let probability = (-frame.evaluation().energy / kt).exp();
+        let terms = psidpd_observe::configurational::sums(&frame);
+        forces += frame.evaluation().forces[0][2].abs();
+        (0..2).for_each(|c| sums[c] += probability * terms[c]);
+    }
+    assert!((sums[0] / sums[1] / kt - 1.0).abs() < 2e-3 && forces > 1.0, "{}", sums[0] / sums[1]);
+}
+
+/// Slices of stress add up to the momentum flux of the step, walls included, with every integrator.
+#[test]
+fn slices_between_walls_add_up_to_the_momentum_flux() {
+    for (name, integrator) in Integrator::ALL {
+        for (axis, column) in [("x", "carried_xx"), ("z", "carried_zz")] {
+            let steps = format!("[[stage]]\nname = \"run\"\nsteps = 8\nintegrator = \"{name}\"\n");
+            let dt = if integrator.has_time() { "dt = 0.02\n" } else { "" };
+            let scene = between(&format!(
+                "{steps}{dt}[observe]\nevery = 1\npressure = true\nstress_profile = {{ axis = \"{axis}\", bins = 7 }}\n"
+            ));
+            let stage = &scene.stages[0];
+            let mut run = scene.simulation(scene.initial_state()).unwrap();
+            scene.enter(stage, &mut run).unwrap();
+            run.prepare_for(stage.integrator, stage.dt, Want::FORCES).unwrap();
+            run.record_flux(Recorded::Lines);
+            let mut observers = psidpd_observe::Observers::new(&scene.observe, [stage.name.as_str()]);
+            for _ in 0..8 {
+                run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+                observers.sample(run.view(0.0), &stage.name);
+            }
+            let out = observers.finish();
+            let of = |name: &str| out.iter().find(|o| o.name == name).unwrap();
+            let normal = &of("stress_profile").get("normal").unwrap().values;
+            let mean = normal.iter().sum::<f64>() / normal.len() as f64;
+            let carried = of("pressure").get(column).unwrap().values[0];
+            assert!((mean / carried - 1.0).abs() < 1e-10, "{name} {axis}: {mean} {carried}");
+        }
+    }
+}
+
+/// Runs with walls that are stopped and go on end in the same bytes, and so do runs on any number of threads.
+#[test]
+fn runs_between_walls_end_in_the_same_bytes() {
+    let scene = between(
+        "[[stage]]\nname = \"a\"\nsteps = 6\ndt = 0.01\n\
+         [[stage]]\nname = \"b\"\nsteps = 5\nintegrator = \"aboba\"\nthermostat_every = 2\ndt = 0.02\n\
+         [[stage]]\nname = \"c\"\nsteps = 4\nintegrator = \"force-gradient\"\ndt = 0.02\n\
+         [[stage]]\nname = \"d\"\nsteps = 3\nintegrator = \"monte-carlo\"\n\
+         [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n\
+         [observe]\nevery = 2\nstages = [\"a\", \"b\", \"c\"]\npressure = true\nstress_profile = true\nwall_force = true\n",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    finished(&scene, &whole, Begin::New);
+    for at in [3, 7, 10, 13, 16] {
+        let out = folder.path().join(at.to_string());
+        until(&scene, &out, Begin::New, at).unwrap();
+        finished(&scene, &out, Begin::Resume);
+        assert_same(&whole, &out, &format!("after step {at}"));
+    }
+    let out = folder.path().join("threads");
+    let mut runner = Runner::begin(&scene, &out, Begin::New).unwrap();
+    runner.set_threads(NonZeroUsize::new(3).unwrap()).unwrap();
+    runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
+    assert_same(&whole, &out, "on three threads");
+}
+
+/// A GPU refuses walls, with the reason.
+#[test]
+fn walls_are_not_on_a_gpu() {
+    let mut run = settled(&between(STAGE));
+    let error = run.use_device(crate::device::Device::Gpu(0)).unwrap_err().to_string();
+    assert!(error.contains("not on a GPU: walls of matter"), "{error}");
+}
+
+/// Walls that a scene cannot have are refused, and what is read is what is asked for.
+#[test]
+fn walls_are_read_and_refused() {
+    let scene = |wall: &str| {
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\ndensity = 3.0\nsteps = 3\n{BOX}[[wall]]\nkind = \"continuum\"\n{wall}\n"
+        );
+        support::scene(IDEAL_MIXTURE, &text)
+    };
+    let read =
+        scene("faces = [\"zlo\", \"zhi\"]\nspecies = \"B\"\nvelocity = [0.5, 0.0, 0.0]\nviscosity = 0.8")
+            .unwrap();
+    let walls = read.model.walls();
+    assert_eq!(walls.len(), 2);
+    assert!(walls[1].high && walls[1].species == 1 && (walls[1].density - 3.0).abs() < 1e-12);
+    let drag = walls[0].drag[0].unwrap();
+    let fluid = read.model.at(1.0).unwrap();
+    let friction = fluid.walls[0].fields[0].friction.as_ref().unwrap();
+    let surplus = SURPLUS[0] + SURPLUS[1] * (3.0f64 / 0.8).powi(2);
+    assert!((friction.slip(0.8, 3.0, 1.0) + surplus).abs() < 1e-9 && drag > 1.0, "{drag}");
+    assert_eq!(faces(&fluid.walls, &read.domain, 3).len(), 2);
+    for (wall, message) in [
+        ("faces = [\"xlo\"]\nspecies = \"A\"", "periodic across this face"),
+        ("faces = [\"zlo\"]", "several species"),
+        ("faces = [\"top\"]\nspecies = \"A\"", "unknown face \"top\""),
+        ("faces = []\nspecies = \"A\"", "names no face"),
+        ("faces = [\"zlo\", \"zlo\"]\nspecies = \"A\"", "a face has two walls"),
+        ("faces = [\"zlo\"]\nspecies = \"C\"", "unknown species \"C\""),
+        ("faces = [\"zlo\"]\nspecies = \"A\"\nvelocity = [0.0, 0.0, 1.0]", "along its face only"),
+        ("faces = [\"zlo\"]\nspecies = \"A\"\nviscosity = 1.0\ndrag = 2.0", "give one of them"),
+        ("faces = [\"zlo\"]\nspecies = \"A\"\ndensity = -1.0", "must be positive"),
+    ] {
+        let error = scene(wall).unwrap_err().to_string();
+        assert!(error.contains(message), "{wall}: {error}");
+    }
+}

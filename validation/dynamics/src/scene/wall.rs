@@ -1,0 +1,141 @@
+//! `[[wall]]`: matter behind reflecting faces of the box.
+
+use super::number::vector;
+use super::{FileError, Initial, Model, PeriodicBox, Section, Value};
+use psidpd_core::model::wall::Wall;
+use psidpd_core::theory::MeanField;
+use psidpd_observe::options::FACES;
+
+pub const KINDS: &[(&str, ())] = &[("continuum", ())];
+
+/// Reads the walls of a scene, and returns the model between them.
+pub fn read(
+    root: &Section,
+    model: Model,
+    (initial, domain): (&Initial, &PeriodicBox),
+    (kt, masses): (f64, &[f64]),
+) -> Result<Model, FileError> {
+    let Some(value) = root.get("wall") else { return Ok(model) };
+    let density = density_of_fluid(initial, domain, model.dimensions());
+    let mass = masses.iter().sum::<f64>() / masses.len() as f64;
+    let mut walls: Vec<Wall> = Vec::new();
+    for item in value.array()? {
+        let section = item.section()?;
+        for mut wall in read_one(&section, &model, domain, (kt, density))? {
+            if let Some(value) = section.get("viscosity") {
+                wall.drag[0] = Some(drag_without_slip(&value, &wall, &model, density, [kt, mass])?);
+            }
+            if walls.iter().any(|other| (other.axis, other.high) == (wall.axis, wall.high)) {
+                return Err(section.require("faces")?.error("a face has two walls"));
+            }
+            let tried = model.clone().with_walls(vec![wall.clone()]);
+            tried.at(kt).map_err(|error| item.error(error.kind.to_string()))?;
+            walls.push(wall);
+        }
+    }
+    Ok(model.with_walls(walls))
+}
+
+/// The number density of the largest part that moves, or of all particles of a file.
+fn density_of_fluid(initial: &Initial, domain: &PeriodicBox, dimensions: usize) -> f64 {
+    let largest = initial.parts().iter().filter(|part| !part.frozen).max_by_key(|part| part.count);
+    let (count, volume) = match largest {
+        Some(part) => (part.count, part.shape.volume(dimensions)),
+        None => (initial.count(), domain.volume(dimensions)),
+    };
+    count as f64 / volume
+}
+
+fn read_one(
+    section: &Section,
+    model: &Model,
+    domain: &PeriodicBox,
+    (kt, density): (f64, f64),
+) -> Result<Vec<Wall>, FileError> {
+    section.require("kind")?.one_of("kind", KINDS)?;
+    let dimensions = model.dimensions();
+    let species = match section.get("species") {
+        Some(value) => value.string()?.among("species", model.species().iter().zip(0..))?,
+        None if model.species().len() == 1 => 0,
+        None => {
+            return Err(
+                section.error("the model has several species: name that of the wall's matter, `species`")
+            );
+        }
+    };
+    let number = |key: &str| section.get(key).map(|value| value.positive()).transpose();
+    let matter = number("density")?.unwrap_or(density);
+    if !(matter > 0.0 && matter.is_finite()) {
+        return Err(section.error("the density of the wall's matter is missing, `density`"));
+    }
+    let drag = [number("drag")?, number("drag_range")?];
+    if let Some(value) = section.get("viscosity")
+        && drag[0].is_some()
+    {
+        return Err(value.error("the drag is given too, and the viscosity determines it: give one of them"));
+    }
+    let local_densities = match number("local_density")? {
+        Some(n) => vec![n; model.at(kt)?.densities.len()],
+        None => correlated(model, kt, matter).unwrap_or_default(),
+    };
+    let velocity = section.get("velocity");
+    let moves = velocity.as_ref().map(|value| vector(value, dimensions)).transpose()?;
+    let faces = section.require("faces")?;
+    let names = faces.array()?;
+    if names.is_empty() {
+        return Err(faces.error("names no face"));
+    }
+    let wall = |name: &Value| {
+        let (axis, high) =
+            name.string()?.among("face", FACES.iter().copied().filter(|(_, face)| face.0 < dimensions))?;
+        if domain.periodic()[axis] {
+            let message = "the box is periodic across this face: a wall needs a reflecting one";
+            return Err(name
+                .error(message)
+                .with_help("boundary = [\"periodic\", \"periodic\", \"reflecting\"] in [box]"));
+        }
+        let velocity_of = moves.unwrap_or([0.0; 3]);
+        if let Some(value) = velocity.as_ref().filter(|_| velocity_of[axis] != 0.0) {
+            return Err(value.error("a wall moves along its face only"));
+        }
+        Ok(Wall {
+            axis,
+            high,
+            species,
+            density: matter,
+            local_densities: local_densities.clone(),
+            velocity: velocity_of,
+            drag,
+        })
+    };
+    names.iter().map(wall).collect()
+}
+
+/// The mean local densities in matter of this density with correlations to first order, where theory has them: for one species.
+fn correlated(model: &Model, kt: f64, density: f64) -> Option<Vec<f64>> {
+    let fluid = model.at(kt).ok()?;
+    let theory = MeanField::new(&fluid).ok()?;
+    let found = theory.correlations().ok()??.at(density)?;
+    let own = fluid.densities.iter().map(|d| if d.includes_self { d.kernel.value(0.0) } else { 0.0 });
+    Some(found.mean_density.iter().zip(own).map(|(n, own)| n + own).collect())
+}
+
+/// The drag coefficient at which a fluid of the stated viscosity does not slip at the wall.
+fn drag_without_slip(
+    viscosity: &Value,
+    wall: &Wall,
+    model: &Model,
+    density: f64,
+    [kt, mass]: [f64; 2],
+) -> Result<f64, FileError> {
+    let of_one = Wall { drag: [Some(1.0), wall.drag[1]], ..wall.clone() };
+    let fluid =
+        model.clone().with_walls(vec![of_one]).at(kt).map_err(|e| viscosity.error(e.kind.to_string()))?;
+    let friction = fluid.walls.iter().flat_map(|wall| &wall.fields).find_map(|field| field.friction.as_ref());
+    let Some(friction) = friction.filter(|_| density > 0.0) else {
+        return Err(
+            viscosity.error("the range of the drag is missing: the model has no forces, `drag_range`")
+        );
+    };
+    Ok(friction.factor_without_slip(viscosity.positive()?, density, [kt, mass]))
+}
