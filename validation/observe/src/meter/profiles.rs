@@ -284,8 +284,8 @@ impl Quantity for Velocity {
     const TABLE: Table = Table {
         path: "velocity_profile",
         title: "flow velocity along an axis",
-        about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on. `velocity_profile_mean` is that of all \
-                particles that move: `x` and so on.",
+        about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on. Between walls `velocity_profile_mean` is that of \
+                all particles that move: `x` and so on.",
         keys: KEYS,
         ..PLAIN
     };
@@ -306,6 +306,11 @@ impl Quantity for Velocity {
 
     fn scalars(Profile(bins, _): &Profile<Self>) -> Vec<Observation> {
         let (width, count) = (bins.width(), bins.species.len());
+        let is_held = |at: &[f64]| at[..count].iter().sum::<f64>() > at[count + 2 + bins.dimensions];
+        // Without walls the momentum of all particles is conserved.
+        if bins.across.is_periodic() && !bins.series.means().chunks_exact(width).any(is_held) {
+            return Vec::new();
+        }
         let sum = |row: &[f64], k: usize| row.chunks_exact(width).map(|at| at[k]).sum::<f64>();
         let mut out =
             Observation::new("velocity_profile_mean", "Mean flow velocity", Kind::Scalar, &bins.series);
