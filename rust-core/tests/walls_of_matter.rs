@@ -145,6 +145,8 @@ fn every_evaluation_is_the_truth() {
         for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
             assert!((f - g).abs() < 1e-11 * scale, "{f} {g}");
         }
+        // Stretched, it is evaluated anew: what walls add is not among the pairs that are known.
+        assert_eq!(evaluator.energy_of_stretched(&pool(), &found, &species, [1.0001, 1.0, 1.0]), None);
         // What the walls give to the fluid is what they get, with the other sign.
         let given: f64 = truth.forces.iter().map(|f| f[evaluator.fluid.dimensions - 1]).sum();
         assert!((given - (on_walls[0] - on_walls[1])).abs() < 1e-4 * scale, "{given} {on_walls:?}");

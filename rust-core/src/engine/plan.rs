@@ -392,7 +392,10 @@ fn write_wall(f: &mut fmt::Formatter<'_>, wall: &WallField, species: &[String]) 
     writeln!(f, "wall          {face}: {} at a density of {density:.6}", species[matter])?;
     for (name, field) in species.iter().zip(&wall.fields) {
         let energy: f64 = field.energies.iter().map(|energy| energy.at(0.0)[0]).sum();
-        write!(f, "              {name} at the face: local density + {:.4}, ", 0.5 * density)?;
+        write!(f, "              {name} at the face: ")?;
+        if !field.densities.is_empty() {
+            write!(f, "local density + {:.4}, ", 0.5 * density)?;
+        }
         write!(f, "energy {energy:+.4} besides psi, range {}; ", field.range)?;
         match &field.friction {
             None => writeln!(f, "no friction")?,

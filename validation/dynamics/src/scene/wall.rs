@@ -68,7 +68,11 @@ fn read_one(
     if !(matter > 0.0 && matter.is_finite()) {
         return Err(section.error("the density of the wall's matter is missing, `density`"));
     }
-    let drag = [number("drag")?, number("drag_range")?];
+    let drag = section.get("drag").map(|value| match value.number()? {
+        gamma if gamma >= 0.0 => Ok(gamma),
+        gamma => Err(value.error(format!("must not be negative, is {gamma}"))),
+    });
+    let drag = [drag.transpose()?, number("drag_range")?];
     if let Some(value) = section.get("viscosity")
         && drag[0].is_some()
     {

@@ -284,10 +284,39 @@ fn profiles_of_a_known_flow() {
     // Relative to the flow the temperature is m (1/2)² in one of three directions.
     let t = &find(&all, "temperature_profile").get("temperature").unwrap().values;
     assert!(t.iter().all(|t| t.is_nan() || (t - 0.25 / 3.0).abs() < 2e-3), "{t:?}");
+    let mean = find(&all, "temperature_profile_mean").scalar("mean").unwrap().value;
+    assert!((mean - 0.25 / 3.0).abs() < 2e-3, "{mean}");
+    // In a periodic box the momentum of all is conserved, and its mean no result.
+    assert!(all.iter().all(|o| o.name != "velocity_profile_mean"));
     let density = find(&all, "density_profile");
     assert_eq!(density.x.as_ref().unwrap().values, [0.5, 1.5, 2.5, 3.5]);
     let sum: f64 = density.get("density").unwrap().values.iter().sum();
     assert!((sum / 4.0 - n as f64 / 80.0).abs() < 1e-12);
+}
+
+/// Between walls the mean flow is the momentum of all particles over their mass: here half of the mass moves at 0.4 along x.
+#[test]
+fn the_mean_flow_between_walls_is_momentum_over_mass() {
+    let observe = "[observe]\nevery = 1\nstages = [\"settle\"]\nvelocity_profile = { bins = 7 }\n";
+    let lengths = "[4.0, 4.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]";
+    let scene = scene(IDEAL_MIXTURE, lengths, 20.0, 10, observe).unwrap();
+    let mut state = scene.initial_state();
+    state.mass = vec![1.0, 3.0];
+    for k in 0..state.len() {
+        // Three light particles for each heavy one.
+        let is_heavy = k % 4 == 0;
+        state.species[k] = i32::from(is_heavy);
+        state.v[k] = [if is_heavy { 0.4 } else { 0.0 }, 0.0, -0.1];
+    }
+    let mut simulation = Simulation::new(&scene.model, 1.0, state, 1).unwrap();
+    simulation.number = 1;
+    let mut observers = observers(&scene);
+    observers.sample(simulation.view(0.01), "settle");
+    let all = observers.finish();
+    let mean = find(&all, "velocity_profile_mean");
+    for (axis, expected) in [("x", 0.2), ("y", 0.0), ("z", -0.1)] {
+        assert!((mean.scalar(axis).unwrap().value - expected).abs() < 1e-12, "{mean:?}");
+    }
 }
 
 /// Two layers that fill the box drift through it; a profile centred on one of them is that of a single frame.

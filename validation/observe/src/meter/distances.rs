@@ -118,6 +118,15 @@ struct Row {
     across: [Interval; 2],
 }
 
+/// The plane and the row in it, the fractions, and the species of a particle.
+type Particle = ([usize; 2], [f64; 3], usize);
+
+/// Neighbouring rows, with nearly equal fractions along the second edge.
+struct Plane {
+    rows: Range<usize>,
+    across: Interval,
+}
+
 /// Particles sorted into rows, and by the first fraction within a row. A vector of places without particles follows the last one.
 struct Sorted {
     /// Fractions of the box in double and in single precision; NaN in places without particles.
@@ -127,6 +136,7 @@ struct Sorted {
     /// For each particle, the offset of its species in the counts of another species.
     offset: Vec<u32>,
     rows: Vec<Row>,
+    planes: Vec<Plane>,
 }
 
 /// The particles that may be in range of a group, in whole vectors.
@@ -181,7 +191,7 @@ impl Loop for AddRows<'_> {
         let AddRows { near, sorted, first, step, counts } = self;
         let (mut beside, mut candidates) = (Vec::new(), Candidates::default());
         for row in (first..sorted.rows.len()).step_by(step) {
-            near.find_rows(&sorted.rows, row, &mut beside);
+            near.find_rows(sorted, row, &mut beside);
             match near.is_orthogonal {
                 true => counts.add::<true>(near, sorted, row, &beside, &mut candidates),
                 false => counts.add::<false>(near, sorted, row, &beside, &mut candidates),
@@ -267,15 +277,17 @@ impl<'a> Near<'a> {
     }
 
     /// Finds the rows after one that are in its range, with their extents of the range along the first edge.
-    fn find_rows(&self, rows: &[Row], row: usize, found: &mut Vec<(usize, f64)>) {
-        let own = &rows[row].across;
+    fn find_rows(&self, sorted: &Sorted, row: usize, found: &mut Vec<(usize, f64)>) {
+        let own = &sorted.rows[row].across;
         found.clear();
-        for (k, Row { across, .. }) in rows.iter().enumerate().skip(row + 1) {
-            let [second, third] = [0, 1].map(|c| self.apart(c + 1, &own[c], &across[c]));
-            if second >= self.range {
-                continue;
+        let later = sorted.planes.iter().filter(|plane| plane.rows.end > row + 1);
+        // Large boxes have many rows, and few planes.
+        for plane in later.filter(|plane| self.apart(1, &own[0], &plane.across) < self.range) {
+            for k in plane.rows.start.max(row + 1)..plane.rows.end {
+                let across = &sorted.rows[k].across;
+                let [second, third] = [0, 1].map(|c| self.apart(c + 1, &own[c], &across[c]));
+                found.extend(self.chord(second, third).map(|chord| (k, chord)));
             }
-            found.extend(self.chord(second, third).map(|chord| (k, chord)));
         }
     }
 
@@ -436,7 +448,7 @@ impl Sorted {
             if k < near.dimensions { rows.clamp(1.0, x.len() as f64 + 1.0) as usize } else { 1 }
         });
         let finite = (0..x.len()).filter(|k| x[*k].iter().all(|c| c.is_finite()));
-        let mut particles: Vec<([usize; 2], [f64; 3], usize)> = finite
+        let mut particles: Vec<Particle> = finite
             .map(|k| {
                 let s = near.domain.fraction(x[k]);
                 let s = [0, 1, 2].map(|c| if c < near.dimensions { s[c] } else { 0.0 });
@@ -451,14 +463,18 @@ impl Sorted {
             species: Vec::new(),
             offset: Vec::new(),
             rows: Vec::new(),
+            planes: Vec::new(),
         };
-        for row in particles.chunk_by(|a, b| a.0 == b.0) {
-            let first = sorted.species.len();
-            row.iter().for_each(|(_, s, species)| sorted.push(*s, *species, near.width));
-            sorted.rows.push(Row {
-                particles: first..first + row.len(),
-                across: [1, 2].map(|c| Interval::of(row.iter().map(|particle| particle.1[c]))),
-            });
+        let interval = |part: &[Particle], c: usize| Interval::of(part.iter().map(|particle| particle.1[c]));
+        for plane in particles.chunk_by(|a, b| a.0[0] == b.0[0]) {
+            let first_row = sorted.rows.len();
+            for row in plane.chunk_by(|a, b| a.0 == b.0) {
+                let first = sorted.species.len();
+                row.iter().for_each(|(_, s, species)| sorted.push(*s, *species, near.width));
+                let across = [1, 2].map(|c| interval(row, c));
+                sorted.rows.push(Row { particles: first..first + row.len(), across });
+            }
+            sorted.planes.push(Plane { rows: first_row..sorted.rows.len(), across: interval(plane, 1) });
         }
         (0..LANES).for_each(|_| sorted.push([f64::NAN; 3], 0, 0));
         sorted

@@ -289,7 +289,12 @@ fn walls_are_read_and_refused() {
     let surplus = SURPLUS[0] + SURPLUS[1] * (3.0f64 / 0.8).powi(2);
     assert!((friction.slip(0.8, 3.0, 1.0) + surplus).abs() < 1e-9 && drag > 1.0, "{drag}");
     assert_eq!(faces(&fluid.walls, &read.domain, 3).len(), 2);
+    // A wall without drag is smooth.
+    let smooth = scene("faces = [\"zlo\"]\nspecies = \"B\"\ndrag = 0.0").unwrap();
+    let fields = smooth.model.at(1.0).unwrap().walls[0].fields.clone();
+    assert!(fields.len() == 2 && fields.iter().all(|field| field.friction.is_none()));
     for (wall, message) in [
+        ("faces = [\"zlo\"]\nspecies = \"A\"\ndrag = -1.0", "must not be negative"),
         ("faces = [\"xlo\"]\nspecies = \"A\"", "periodic across this face"),
         ("faces = [\"zlo\"]", "several species"),
         ("faces = [\"top\"]\nspecies = \"A\"", "unknown face \"top\""),

@@ -36,8 +36,9 @@ pub const WALL: Table = Table::array("wall",
             "The shear viscosity of the fluid: the drag gets the strength at which a flow extrapolates to the wall's velocity at \
              the face.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\nspecies = \"A\"\nviscosity = 0.85"),
-        key("drag", Positive, OPTIONAL,
-            "Coefficient γ of the drag between fluid and matter, instead of `viscosity`; that of the model if both are left out.",
+        key("drag", Number, OPTIONAL,
+            "Coefficient γ of the drag between fluid and matter, instead of `viscosity`; that of the model if both are left out. With 0 \
+             the fluid slips freely.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndrag = 20.0"),
         key("drag_range", Positive, OPTIONAL,
             "Range of the drag between fluid and matter; that of the model if left out.",
