@@ -73,6 +73,7 @@ fn between_walls(text: &str) -> (Fluid, Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
         species,
         density,
         local_densities: if high { vec![2.0; 3] } else { Vec::new() },
+        strength: if high { 0.6 } else { 1.0 },
         velocity: [0.0; 3],
         drag: [None; 2],
     };
@@ -227,6 +228,7 @@ fn a_wall_is_the_mean_of_random_matter() {
         species: 0,
         density: 6.05,
         local_densities: vec![2.3],
+        strength: 1.0,
         velocity: [0.0; 3],
         drag: [None; 2],
     };

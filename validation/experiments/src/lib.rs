@@ -24,8 +24,10 @@ mod models;
 pub mod papers;
 pub mod pareto;
 pub mod start;
+mod steps;
 pub mod sweep;
 pub mod theory_page;
+pub mod wall;
 
 pub use error::ExperimentError;
 

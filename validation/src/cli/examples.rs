@@ -24,6 +24,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "psidpd model liquid oil --data oil.toml --rc 1e-9 --out oil-model.toml",
         ],
     ),
+    ("model wall", &["psidpd model wall water.toml --contact-angle 110 --out teflon.toml"]),
     ("reproduce", &["psidpd reproduce --list"]),
     ("new", &["psidpd new hanging --template pendant-drop"]),
     (

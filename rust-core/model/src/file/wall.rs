@@ -94,7 +94,8 @@ fn field(wall: &Wall, fluid: &Fluid, species: usize, response: &[f64]) -> Result
     }
     for term in fluid.pairs.iter().filter(|term| term.acts(species, wall.species, 0.0)) {
         let phi = &term.potential;
-        energies.push(finite(HalfSpace::of(dimensions, phi.range(), wall.density, |r| phi.at(r)))?);
+        let amount = wall.density * wall.strength;
+        energies.push(finite(HalfSpace::of(dimensions, phi.range(), amount, |r| phi.at(r)))?);
     }
     let ranges =
         densities.iter().map(|(_, field)| field.range()).chain(energies.iter().map(HalfSpace::range));
@@ -125,6 +126,7 @@ mod tests {
             species,
             density: 6.05,
             local_densities: Vec::new(),
+            strength: 1.0,
             velocity: [0.0; 3],
             drag: [None; 2],
         }
@@ -139,15 +141,15 @@ mod tests {
             15.0 * ((1.0 - s) / 12.0 - (1.0 - s.powi(3)) / 6.0 + (1.0 - s.powi(4)) / 6.0
                 - (1.0 - s.powi(5)) / 20.0)
         };
-        for local in [None, Some(2.3)] {
-            let found =
-                bind_wall(&Wall { local_densities: local.into_iter().collect(), ..wall(0) }, &fluid).unwrap();
+        for (local, strength) in [(None, 1.0), (Some(2.3), 1.0), (Some(2.3), 0.4)] {
+            let wall = Wall { local_densities: local.into_iter().collect(), strength, ..wall(0) };
+            let found = bind_wall(&wall, &fluid).unwrap();
             let field = &found.fields[0];
             for z in [0.0f64, 0.2, 0.6, 0.9] {
                 let n = 6.05 * if z < 0.75 { quadratic(z / 0.75) } else { 0.0 };
                 assert!((field.densities[0].1.at(z)[0] - n).abs() < 1e-8);
                 let slope = std::f64::consts::PI / 15.0 * 0.75f64.powi(4) * 25.0 * local.unwrap_or(6.05);
-                let pair = -40.0 * std::f64::consts::PI / 15.0 * 6.05 * quadratic(z);
+                let pair = strength * -40.0 * std::f64::consts::PI / 15.0 * 6.05 * quadratic(z);
                 let energy: f64 = field.energies.iter().map(|e| e.at(z)[0]).sum();
                 assert!((energy - pair - slope * n).abs() < 1e-6, "{z}: {energy} {}", pair + slope * n);
             }

@@ -3,10 +3,10 @@
 //! Matter of density ρ_w adds to the local densities of a particle, and to its energy, what integrals over the half-space say:
 //!
 //! ```text
-//! n_w,i += ρ_w ∫ w        U_i = ρ_w [∫ φ + Σ_d ∂ψ_w/∂n_d ∫ w_d]
+//! n_w,i += ρ_w ∫ w        U_i = ρ_w [s ∫ φ + Σ_d ∂ψ_w/∂n_d ∫ w_d]
 //! ```
 //!
-//! The second term of the energy is the response of the matter, whose ψ changes to first order with the densities that the
+//! The factor s is 1, or chosen for a contact angle. The second term of the energy is the response of the matter, whose ψ changes to first order with the densities that the
 //! particle adds to it. Forces are the gradient of both. Drag between particle and matter adds up to a tensor of friction,
 //! `ζ = ρ_w γ ∫ w_R² r̂ r̂`: Revenga, Zúñiga, Español and Pagonabarraga, Int. J. Mod. Phys. C 9, 1319 (1998).
 
@@ -30,6 +30,8 @@ pub struct Wall {
     /// The local densities of a particle of the matter, at which its ψ responds, for each density of the model; the number density if
     /// there are none.
     pub local_densities: Vec<f64>,
+    /// Factor of the pair potentials between particle and matter.
+    pub strength: f64,
     /// The velocity of the matter, along the face.
     pub velocity: [f64; 3],
     /// Drag coefficient and range between particle and matter, in place of those of the model.

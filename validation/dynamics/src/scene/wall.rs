@@ -68,11 +68,8 @@ fn read_one(
     if !(matter > 0.0 && matter.is_finite()) {
         return Err(section.error("the density of the wall's matter is missing, `density`"));
     }
-    let drag = section.get("drag").map(|value| match value.number()? {
-        gamma if gamma >= 0.0 => Ok(gamma),
-        gamma => Err(value.error(format!("must not be negative, is {gamma}"))),
-    });
-    let drag = [drag.transpose()?, number("drag_range")?];
+    let drag = section.get("drag").map(|value| not_negative(&value)).transpose()?;
+    let drag = [drag, number("drag_range")?];
     if let Some(value) = section.get("viscosity")
         && drag[0].is_some()
     {
@@ -82,6 +79,7 @@ fn read_one(
         Some(n) => vec![n; model.at(kt)?.densities.len()],
         None => correlated(model, kt, matter).unwrap_or_default(),
     };
+    let strength = section.get("strength").map(|value| not_negative(&value)).transpose()?.unwrap_or(1.0);
     let velocity = section.get("velocity");
     let moves = velocity.as_ref().map(|value| vector(value, dimensions)).transpose()?;
     let faces = section.require("faces")?;
@@ -108,11 +106,19 @@ fn read_one(
             species,
             density: matter,
             local_densities: local_densities.clone(),
+            strength,
             velocity: velocity_of,
             drag,
         })
     };
     names.iter().map(wall).collect()
+}
+
+fn not_negative(value: &Value) -> Result<f64, FileError> {
+    match value.number()? {
+        number if number >= 0.0 => Ok(number),
+        number => Err(value.error(format!("must not be negative, is {number}"))),
+    }
 }
 
 /// The mean local densities in matter of this density with correlations to first order, where theory has them: for one species.

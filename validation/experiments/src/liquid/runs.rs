@@ -4,27 +4,16 @@ use super::fluid::{Drag, Strengths, USUAL, text};
 use super::instrument::{Care, Equilibrium, Flow, Instrument, Trouble};
 use super::sheet::Liquid;
 use crate::bulk::Observed;
+use crate::steps::{self, ADVISED, FIRST, STEP};
 use crate::{ExperimentError, jobs};
 use psidpd_core::model::Model;
-use psidpd_dynamics::integrator::{Coupling, Integrator};
 use psidpd_dynamics::run::{RunError, run_scene};
 use psidpd_dynamics::scene::Scene;
-use psidpd_dynamics::trial::{Composition, Piece, two_digits};
+use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_formats::files::{Existing, write_bytes};
 use psidpd_observe::Measured;
 use std::fmt::Write;
 use std::path::Path;
-
-/// The step of all runs after the start, as runs advise it: forces three times, drag at every second step.
-const STEP: &str = "integrator = \"force-gradient\"\nlambda = 0.17\nthermostat_every = 2\n";
-const ADVISED: Integrator = Integrator::ForceGradient {
-    lambda: 0.17,
-    gradient: 1.0 / 24.0,
-    coupling: Coupling { every: 2, ..Coupling::DEFAULT },
-};
-
-/// ωΔt of the runs: half the cost of certainty, and errors below a percent in nearly all fluids.
-const STRIDE: f64 = 0.9;
 
 /// Times that runs last, in r_c √(m/kT): the homogeneous liquid, the slab, the flow.
 const TIMES: [f64; 3] = [25.0, 100.0, 60.0];
@@ -85,8 +74,7 @@ impl Setting<'_> {
         let mut stage = |name: &str, steps: f64, dt: f64| {
             let _ = write!(text, "[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
         };
-        // A start that is no liquid yet needs short steps.
-        stage("begin", 400.0, 0.15 * self.dt);
+        stage("begin", 400.0, FIRST * self.dt);
         stage("settle", steps(self.settle), self.dt);
         stage("measure", steps(self.time), self.dt);
         text + "[output]\nthermo = 0\ncheckpoint = 0\n[observe]\n" + self.observe
@@ -111,7 +99,7 @@ impl Runs<'_> {
     }
 
     fn dt(&self, model: &Model) -> Result<f64, Trouble> {
-        Ok(two_digits(STRIDE / self.piece(model)?.frequency))
+        Ok(steps::dt(&self.piece(model)?))
     }
 
     /// The longest step with errors of about a percent.

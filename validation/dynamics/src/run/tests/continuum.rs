@@ -76,6 +76,7 @@ fn noise_of_a_wall_has_the_covariance_of_its_friction() {
         species: 0,
         density: 3.0,
         local_densities: Vec::new(),
+        strength: 1.0,
         velocity: [0.4, 0.0, 0.0],
         drag: [Some(20.0), Some(1.0)],
     };

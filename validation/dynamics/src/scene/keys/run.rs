@@ -29,6 +29,10 @@ pub const WALL: Table = Table::array("wall",
              `local_density` finds in a liquid. If left out that of theory with correlations to first order, which `check` prints for \
              the fluid; for several species the number density, as in mean field.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndensity = 6.05\nlocal_density = 2.3"),
+        key("strength", Number, OPTIONAL,
+            "Factor of the pair potentials between fluid and matter, 1 if left out: how strongly the wall attracts the fluid. \
+             `psidpd model wall` finds that of a contact angle.",
+            "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\nstrength = 0.8"),
         key("velocity", Point, OPTIONAL,
             "The velocity of the matter, along its face; at rest if left out.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zhi\"]\nspecies = \"A\"\nvelocity = [0.5, 0.0, 0.0]"),

@@ -2,17 +2,6 @@ use super::*;
 use psidpd_experiments::liquid::{ENTRIES, Entries, Found, Liquid, LiquidError, Row, model};
 use psidpd_report::quantity::with_error;
 
-/// Make a model file.
-#[derive(Debug, clap::Subcommand)]
-pub enum Verb {
-    /// Make a model of a liquid from its data sheet.
-    ///
-    /// Numbers are in SI units. Density and the size of a particle are needed; what else is left out is free, and is reported.
-    /// Compressibility, tension and viscosity are met by short runs, and measured again by longer ones. Exits with 1, and
-    /// writes nothing, if a number is not met; says then which two numbers conflict, and what is nearest.
-    Liquid(Box<OfLiquid>),
-}
-
 #[derive(Debug, clap::Args)]
 pub struct OfLiquid {
     /// What it is called.
@@ -106,15 +95,13 @@ impl Numbers {
     }
 }
 
-impl Verb {
+impl OfLiquid {
     pub fn files(&self) -> Files {
-        let Verb::Liquid(a) = self;
-        Files::reads(&a.data).writes([a.out.clone()])
+        Files::reads(&self.data).writes([self.out.clone()])
     }
 }
 
-pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
-    let Verb::Liquid(a) = verb;
+pub fn run(a: &OfLiquid, told: Told) -> Result<Verdict, Failure> {
     let liquid = Liquid::new(&a.name, &entries(a)?).map_err(ExperimentError::from)?;
     say_wanted(&liquid);
     let found = model(&liquid, a.seed, &command(a), &mut |line| say!("{line}"))?;
@@ -197,7 +184,6 @@ fn print(found: &Found) {
 
 /// The command line that repeats the search.
 fn command(a: &OfLiquid) -> String {
-    let name = |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
     let mut text = format!("psidpd model liquid {:?}", a.name);
     for (entry, value) in ENTRIES.iter().zip(a.numbers.all()) {
         if let Some(value) = value {
@@ -205,7 +191,7 @@ fn command(a: &OfLiquid) -> String {
         }
     }
     if let Some(data) = &a.data {
-        text += &format!(" --data {}", name(data));
+        text += &format!(" --data {}", file_name(data));
     }
-    text + &format!(" --seed {} --out {}", a.seed, name(&a.out))
+    text + &format!(" --seed {} --out {}", a.seed, file_name(&a.out))
 }

@@ -1,0 +1,183 @@
+//! Measures by runs: a slab of the liquid, films on a wall, and a ridge.
+
+use super::scene::{FILM, HEIGHT, Setting, Units, wall};
+use super::search::{Knob, rounded};
+use super::{Film, Instrument, Slab, Sought, conditions};
+use crate::bulk::Observed;
+use crate::liquid::Trouble;
+use crate::{ExperimentError, jobs, steps};
+use psidpd_core::model::Fluid;
+use psidpd_core::theory::MeanField;
+use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::scene::Scene;
+use psidpd_dynamics::trial::{Composition, Piece};
+use psidpd_observe::Measured;
+use std::path::Path;
+
+/// Thermal times that films of the search and of the result last.
+const SEARCH: f64 = 250.0;
+const RESULT: f64 = 500.0;
+
+/// Nothing is kept but what is observed.
+const OUTPUT: &str = "[output]\nthermo = 0\ncheckpoint = 0\n";
+
+pub struct Runs<'a> {
+    sought: &'a Sought,
+    folder: &'a Path,
+    knob: Knob,
+    /// With a guess of the liquid's density, then what the slab has.
+    units: Units,
+}
+
+impl<'a> Runs<'a> {
+    pub fn new(sought: &'a Sought, knob: Knob, folder: &'a Path) -> Result<Runs<'a>, ExperimentError> {
+        let Sought { model, kt, .. } = sought;
+        if model.species().len() != 1 || model.dimensions() != 3 {
+            return Err(conditions("a wall is sought for a model of one species in three dimensions".into()));
+        }
+        let fluid = model.at(*kt)?;
+        let none = || {
+            conditions(
+                "theory knows no liquid of this model beside its vapour: give its density, --density".into(),
+            )
+        };
+        let density =
+            sought.density.map_or_else(|| guess(&fluid), |density| Ok(Some(density)))?.ok_or_else(none)?;
+        let of = Composition { model, masses: &[1.0], kt: *kt, densities: &[density], seed: sought.seed };
+        let piece = Piece::settled(&of)?.map_err(|why| conditions(format!("the liquid: {why}")))?;
+        let units = Units { kt: *kt, range: fluid.cutoff(), density, dt: steps::dt(&piece) };
+        Ok(Runs { sought, folder, knob, units })
+    }
+
+    /// Runs scenes side by side, each from its seed; the last is the longest.
+    fn run(&self, settings: &[(Setting, u64)]) -> Result<Vec<Observed>, Trouble> {
+        let file = &self.sought.model_file;
+        let model = std::path::absolute(file).unwrap_or_else(|_| file.clone()).display().to_string();
+        let run = |(number, (setting, seed)): (usize, &(Setting, u64))| -> Result<Observed, RunError> {
+            let text = setting.text(&model, &self.units, *seed) + OUTPUT;
+            let scene = Scene::parse(&setting.title, &text, Path::new(""))?;
+            let folder = self.folder.join(format!("run-{number}"));
+            run_scene(&scene, &folder, &mut |_| ())?;
+            Observed::read(&folder)
+        };
+        let all = jobs::each(settings.iter().enumerate().collect(), run);
+        all.into_iter().collect::<Result<_, _>>().map_err(|error| {
+            if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
+        })
+    }
+
+    /// The free number of a share of what the liquid has.
+    fn value(&self, share: f64) -> f64 {
+        rounded(self.knob.value(share, self.units.density))
+    }
+
+    fn film(&self, share: f64, time: f64) -> Setting {
+        Setting::film(self.knob, self.value(share), time, &self.units)
+    }
+
+    fn tensions(&self, observed: &Observed) -> Film {
+        let integral = observed.profile("stress_profile", "integral");
+        let ideal = observed.profile("stress_profile", "ideal");
+        let whole = observed.scalar("stress_profile_integral", "integral");
+        let [height, film] = [HEIGHT, FILM].map(|length| length * self.units.range);
+        split((&integral, whole), &ideal, [height, film], self.units.density * self.units.kt)
+    }
+}
+
+/// The density at which theory with correlations has no pressure.
+fn guess(fluid: &Fluid) -> Result<Option<f64>, ExperimentError> {
+    let theory = MeanField::new(fluid)?;
+    let volume = fluid.cutoff().powi(3);
+    Ok(theory.correlations()?.and_then(|c| c.zero_pressure_density([0.5 / volume, 200.0 / volume])))
+}
+
+/// Tensions of the wall from the integral of `P_N − P_T` up to each height, and the whole of it: below the middle of the film, and beside
+/// the vapour. Where the film is tells the share of the particles in the pressure, which is `of_liquid` in the liquid: it may have gone
+/// over to the upper wall.
+pub fn split(
+    (integral, whole): (&[(f64, Measured)], Measured),
+    ideal: &[(f64, Measured)],
+    [height, film]: [f64; 2],
+    of_liquid: f64,
+) -> Film {
+    let below = |z: f64| {
+        let nearest = integral.iter().min_by(|a, b| (a.0 - z).abs().total_cmp(&(b.0 - z).abs()));
+        nearest.map_or(Measured::NONE, |(_, value)| *value)
+    };
+    // The variance of the whole is that of both parts.
+    let above = |z: f64| {
+        let error = (whole.error.powi(2) - below(z).error.powi(2)).abs().sqrt();
+        Measured { value: whole.value - below(z).value, error }
+    };
+    let mean = |low: f64, high: f64| {
+        let slices = ideal.iter().filter(|(z, _)| (low..high).contains(z)).map(|(_, p)| p.value);
+        let (count, sum) = slices.fold((0, 0.0), |(count, sum), p| (count + 1, sum + p));
+        sum / f64::from(count.max(1))
+    };
+    // Behind the gap that a wall leaves; a film that went away in the run has less there.
+    let [near, far] = [0.06 * film, 0.26 * film];
+    let (low, high) = (mean(near, far), mean(height - far, height - near));
+    let gap = 0.5 * (height - film);
+    let (liquid, vapour) = if low >= high {
+        (below(0.5 * film), above(height - gap))
+    } else {
+        (above(height - 0.5 * film), below(gap))
+    };
+    let touches = low.max(high) > 0.75 * of_liquid;
+    // From the wall with the film to its middle, beside the density there.
+    let up = |z: f64| if low >= high { z } else { height - z };
+    let bulk: Vec<f64> =
+        ideal.iter().filter(|(z, _)| (0.4..0.6).contains(&(up(*z) / film))).map(|(_, p)| p.value).collect();
+    let bulk = bulk.iter().sum::<f64>() / bulk.len().max(1) as f64;
+    let missing =
+        ideal.iter().filter(|(z, _)| up(*z) < 0.5 * film).map(|(_, p)| 1.0 - p.value / bulk).sum::<f64>();
+    let surface = missing * height / ideal.len().max(1) as f64;
+    Film { liquid: touches.then_some(liquid), vapour, surface: if touches { surface } else { 0.0 } }
+}
+
+impl Instrument for Runs<'_> {
+    fn units(&self) -> Units {
+        self.units
+    }
+
+    fn slab(&mut self) -> Result<Slab, Trouble> {
+        let seed = self.sought.seed;
+        let found = self.run(&[seed, seed.wrapping_add(1)].map(|seed| (Setting::slab(&self.units), seed)))?;
+        let mean = |name: &str, column: &str| mean([0, 1].map(|k| found[k].scalar(name, column)));
+        let slab = Slab {
+            tension: mean("surface_tension", "free_energy"),
+            density: mean("interface_width", "liquid"),
+        };
+        if slab.density.value > 0.0 {
+            self.units.density = slab.density.value;
+        }
+        Ok(slab)
+    }
+
+    fn films(&mut self, shares: [f64; 2]) -> Result<[Film; 2], Trouble> {
+        let found = self.run(&shares.map(|share| (self.film(share, SEARCH), self.sought.seed)))?;
+        Ok([0, 1].map(|k| self.tensions(&found[k])))
+    }
+
+    fn result(&mut self, share: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble> {
+        let seed = |number: u64| self.sought.seed.wrapping_add(1000 + 10 * round + number);
+        let lines = wall(self.knob, self.value(share), &self.units, "\"zlo\"");
+        let found = self.run(&[
+            (self.film(share, RESULT), seed(0)),
+            (self.film(share, RESULT), seed(1)),
+            (Setting::ridge(self.sought.angle, surface, lines, &self.units), seed(2)),
+        ])?;
+        let films = [0, 1].map(|k| self.tensions(&found[k]));
+        let liquid = match films.map(|film| film.liquid) {
+            [Some(a), Some(b)] => Some(mean([a, b])),
+            _ => None,
+        };
+        let surface = 0.5 * (films[0].surface + films[1].surface);
+        let film = Film { liquid, vapour: mean(films.map(|film| film.vapour)), surface };
+        Ok((film, found[2].scalar("contact_angle", "angle")))
+    }
+}
+
+fn mean([a, b]: [Measured; 2]) -> Measured {
+    a.plus(b).times(0.5)
+}

@@ -1,0 +1,230 @@
+//! The number of the wall at which cos θ is as wanted: by two films at a time, until a straight line through those near the goal has it.
+
+use super::{Film, Instrument, Slab, conditions};
+use crate::ExperimentError;
+use crate::liquid::Trouble;
+use psidpd_core::document::FileError;
+use psidpd_core::model::Model;
+use psidpd_observe::Measured;
+use serde::Serialize;
+
+/// What of a wall is free: with more of it liquids wet better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Knob {
+    /// The factor of pair potentials between fluid and matter.
+    Strength,
+    /// The density of the matter, of models without pair potentials.
+    Density,
+}
+
+impl Knob {
+    /// That of a model: its densities attract if no pair potential does.
+    pub fn of(model: &Model, kt: f64) -> Result<Knob, FileError> {
+        Ok(if model.at(kt)?.pairs.is_empty() { Knob::Density } else { Knob::Strength })
+    }
+
+    /// The key of a `[[wall]]`.
+    pub fn key(self) -> &'static str {
+        match self {
+            Knob::Strength => "strength",
+            Knob::Density => "density",
+        }
+    }
+
+    /// The number for a share of what the liquid, of this density, has itself.
+    pub fn value(self, share: f64, density: f64) -> f64 {
+        match self {
+            Knob::Strength => share,
+            Knob::Density => share * density,
+        }
+    }
+
+    /// The least and the largest share that are tried.
+    fn ends(self) -> [f64; 2] {
+        match self {
+            Knob::Strength => [0.02, 4.0],
+            Knob::Density => [0.02, 1.5],
+        }
+    }
+}
+
+/// A wall that was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trial {
+    /// Over what the liquid itself has.
+    pub share: f64,
+    /// `cos θ`; `None` if the film left the wall.
+    pub cosine: Option<Measured>,
+    /// See [`Film::surface`].
+    pub surface: f64,
+}
+
+impl Trial {
+    pub fn of(share: f64, film: &Film, slab: &Slab) -> Trial {
+        Trial { share, cosine: film.cosine(slab), surface: film.surface }
+    }
+
+    fn is_below(&self, goal: f64) -> bool {
+        self.cosine.is_none_or(|cosine| cosine.value < goal)
+    }
+}
+
+#[derive(Debug, PartialEq)]
+pub enum End {
+    Found(f64),
+    /// No wall has the angle, and why.
+    None(String),
+}
+
+/// The first shares, and how far those of a pair lie from the guess between them, as a share of it, at least and at most.
+const FIRST: [f64; 2] = [0.6, 1.2];
+const ASIDE: [f64; 2] = [0.015, 0.06];
+
+/// The straight line goes through films whose cosines are within this of the goal, and counts them for less by the square of the
+/// distance, for the curvature.
+const NEAR: f64 = 0.45;
+const CURVED: f64 = 0.2;
+
+const PAIRS: usize = 7;
+
+/// The standard error of the angle, in degrees, with which the search is content.
+const CONTENT: f64 = 1.0;
+
+/// θ in degrees of its cosine: 180 if the film left the wall, and where the cosine is beyond 1, the end.
+pub fn angle(cosine: Option<Measured>) -> Measured {
+    let Some(Measured { value, error }) = cosine else { return Measured::from(180.0) };
+    let at = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    // Next to 0 and 180 degrees the slope of the arc cosine says nothing.
+    Measured { value: at(value), error: 0.5 * (at(value - error) - at(value + error)) }
+}
+
+/// The surface of the wall that is nearest to this one and held its film.
+pub fn surface(trials: &[Trial], share: f64) -> f64 {
+    let held = trials.iter().filter(|t| t.cosine.is_some());
+    let off = |t: &&Trial| (t.share - share).abs();
+    held.min_by(|a, b| off(a).total_cmp(&off(b))).map_or(0.0, |t| t.surface)
+}
+
+/// Three digits, as a scene has it.
+pub fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+/// Seeks the share; `trials` has what is known already, and what is measured comes to it.
+pub fn search(
+    wanted: f64,
+    knob: Knob,
+    slab: &Slab,
+    instrument: &mut dyn Instrument,
+    trials: &mut Vec<Trial>,
+    told: &mut dyn FnMut(&str),
+) -> Result<End, ExperimentError> {
+    let goal = wanted.to_radians().cos();
+    let tolerance = CONTENT.to_radians() * wanted.to_radians().sin();
+    for _ in 0..PAIRS {
+        let shares = match next(trials, goal, tolerance, knob.ends()) {
+            Next::Found(share) => return Ok(End::Found(share)),
+            Next::Beyond => return Ok(End::None(beyond(trials, goal, knob, slab))),
+            Next::Try(shares) => shares,
+        };
+        let films = match instrument.films(shares) {
+            Ok(films) => films,
+            Err(Trouble::Failed(error)) => return Err(error),
+            Err(trouble) => return Err(conditions(format!("a film on a wall: {trouble}"))),
+        };
+        for (share, film) in shares.into_iter().zip(films) {
+            let trial = Trial::of(share, &film, slab);
+            told(&said(&trial, knob, slab));
+            trials.push(trial);
+        }
+    }
+    // The best line that there is.
+    Ok(match line(trials, goal) {
+        Some((share, _)) => End::Found(share),
+        None => End::None(beyond(trials, goal, knob, slab)),
+    })
+}
+
+fn said(trial: &Trial, knob: Knob, slab: &Slab) -> String {
+    let of = format!("{} = {:.3}", knob.key(), knob.value(trial.share, slab.density.value));
+    match trial.cosine {
+        None => format!("{of}: the film leaves the wall"),
+        Some(cosine) => {
+            let angle = angle(trial.cosine);
+            let (c, e) = (cosine.value, cosine.error);
+            format!("{of}: cos θ = {c:.3}({e:.3}), θ = {:.1}({:.1})", angle.value, angle.error)
+        }
+    }
+}
+
+/// The nearest wall that was tried, in words.
+fn beyond(trials: &[Trial], goal: f64, knob: Knob, slab: &Slab) -> String {
+    let off = |t: &&Trial| t.cosine.map_or(goal + 1.0, |c| (c.value - goal).abs());
+    match trials.iter().min_by(|a, b| off(a).total_cmp(&off(b))) {
+        Some(nearest) => {
+            format!("no wall that was tried has this angle; the nearest: {}", said(nearest, knob, slab))
+        }
+        None => "no film was measured".into(),
+    }
+}
+
+enum Next {
+    Found(f64),
+    Try([f64; 2]),
+    /// The goal is beyond the ends of what is tried.
+    Beyond,
+}
+
+fn next(trials: &[Trial], goal: f64, tolerance: f64, [least, most]: [f64; 2]) -> Next {
+    let below = trials.iter().filter(|t| t.is_below(goal)).map(|t| t.share).reduce(f64::max);
+    let above = trials.iter().filter(|t| !t.is_below(goal)).map(|t| t.share).reduce(f64::min);
+    let guess = match (below, above) {
+        (None, None) => return Next::Try(FIRST),
+        (Some(below), None) if below >= most => return Next::Beyond,
+        (Some(below), None) => return Next::Try([1.3 * below, 1.7 * below].map(|s| s.min(most))),
+        (None, Some(above)) if above <= least => return Next::Beyond,
+        (None, Some(above)) => return Next::Try([0.5 * above, 0.8 * above].map(|s| s.max(least))),
+        // Without a line: between them.
+        (Some(below), Some(above)) => match line(trials, goal) {
+            Some((share, error)) if error <= tolerance => return Next::Found(share),
+            // Noise can put a film on the wrong side of another.
+            Some((share, _)) => share.clamp(0.8 * below.min(above), 1.25 * below.max(above)),
+            None => 0.5 * (below + above),
+        },
+    };
+    let between = below.zip(above).map_or(0.0, |(below, above)| (above - below).abs());
+    let aside = (0.25 * between / guess).clamp(ASIDE[0], ASIDE[1]);
+    Next::Try([1.0 - aside, 1.0 + aside].map(|aside| (aside * guess).clamp(least, most)))
+}
+
+/// The share at which the straight line through the films near the goal has it, and the standard error of the line there; `None` unless
+/// there are films on both sides.
+fn line(trials: &[Trial], goal: f64) -> Option<(f64, f64)> {
+    let near: Vec<(f64, Measured)> = trials
+        .iter()
+        .filter_map(|t| {
+            let cosine = t.cosine.filter(|c| (c.value - goal).abs() <= NEAR)?;
+            let error = cosine.error.hypot(CURVED * (cosine.value - goal).powi(2));
+            Some((t.share, Measured { error, ..cosine }))
+        })
+        .collect();
+    let (weight, mean) = near.iter().fold((0.0, [0.0; 2]), |(sum, [x, y]), (share, cosine)| {
+        let w = 1.0 / (cosine.error * cosine.error).max(1e-12);
+        (sum + w, [x + w * share, y + w * cosine.value])
+    });
+    let [x0, y0] = mean.map(|sum| sum / weight);
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for (share, cosine) in &near {
+        let w = 1.0 / (cosine.error * cosine.error).max(1e-12);
+        xx += w * (share - x0) * (share - x0);
+        xy += w * (share - x0) * (cosine.value - y0);
+    }
+    let slope = xy / xx;
+    let both = [true, false].iter().all(|side| near.iter().any(|(_, c)| (c.value < goal) == *side));
+    if !(both && slope > 0.0 && slope.is_finite()) {
+        return None;
+    }
+    let share = x0 + (goal - y0) / slope;
+    Some((share, (1.0 / weight + (share - x0) * (share - x0) / xx).sqrt()))
+}

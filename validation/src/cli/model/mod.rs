@@ -1,0 +1,46 @@
+//! `psidpd model`: liquids by their data sheets, and walls by their contact angles.
+
+mod liquid;
+mod wall;
+
+use super::*;
+use liquid::OfLiquid;
+use wall::OfWall;
+
+/// Make a model of a liquid, or a wall for it.
+#[derive(Debug, clap::Subcommand)]
+pub enum Verb {
+    /// Make a model of a liquid from its data sheet.
+    ///
+    /// Numbers are in SI units. Density and the size of a particle are needed; what else is left out is free, and is reported.
+    /// Compressibility, tension and viscosity are met by short runs, and measured again by longer ones. Exits with 1, and
+    /// writes nothing, if a number is not met; says then which two numbers conflict, and what is nearest.
+    Liquid(Box<OfLiquid>),
+    /// Find the wall on which a liquid has a contact angle.
+    ///
+    /// The wall is matter behind a reflecting face, `[[wall]]` of a scene; found is the strength of its attraction, or its density if
+    /// the model has no pair potentials. Three tensions and Young's law say the angle; a ridge of the liquid on the wall, which is
+    /// written as a scene, is the check. Exits with 1, and writes nothing, if the two are not within 3 degrees of what is wanted.
+    Wall(OfWall),
+}
+
+impl Verb {
+    pub fn files(&self) -> Files {
+        match self {
+            Verb::Liquid(a) => a.files(),
+            Verb::Wall(a) => a.files(),
+        }
+    }
+}
+
+pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
+    match verb {
+        Verb::Liquid(a) => liquid::run(a, told),
+        Verb::Wall(a) => wall::run(a, told),
+    }
+}
+
+/// The last part of a path, for the command in the head of a file.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+}

@@ -1,0 +1,127 @@
+use super::*;
+use psidpd_experiments::wall::{Found, Sought, TOLERANCE, wall};
+use psidpd_observe::Measured;
+use psidpd_report::quantity::with_error;
+
+#[derive(Debug, clap::Args)]
+pub struct OfWall {
+    /// The model file of the liquid, of one species.
+    model: PathBuf,
+    /// The contact angle, through the liquid.
+    #[arg(long, value_name = "DEGREES", value_parser = angle)]
+    contact_angle: f64,
+    /// kT.
+    #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true, value_parser = temperature)]
+    kt: f64,
+    /// About the number density of the liquid beside its vapour; that of theory if left out.
+    #[arg(long, value_name = "RHO", value_parser = positive)]
+    density: Option<f64>,
+    /// The viscosity of the liquid, so that it does not slip on the wall of the scene that is written.
+    #[arg(long, value_name = "ETA", value_parser = positive)]
+    viscosity: Option<f64>,
+    /// Write the scene even if the angle is not met.
+    #[arg(long)]
+    anyway: bool,
+    /// Seed of the runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where the scene of a ridge on this wall goes.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+impl OfWall {
+    pub fn files(&self) -> Files {
+        Files::reads([&self.model]).writes([self.out.clone()])
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| *x > 0.0 && x.is_finite())
+        .ok_or_else(|| "expected a number above 0".into())
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    let [least, most] = psidpd_experiments::wall::ANGLES;
+    let known = text.parse().ok().filter(|x: &f64| (least..=most).contains(x));
+    known.ok_or_else(|| format!("expected an angle from {least} to {most} degrees"))
+}
+
+pub fn run(a: &OfWall, told: Told) -> Result<Verdict, Failure> {
+    let sought = Sought {
+        model_file: a.model.clone(),
+        model: Model::open(&a.model)?,
+        kt: a.kt,
+        density: a.density,
+        angle: a.contact_angle,
+        seed: a.seed,
+    };
+    let found = wall(&sought, &mut |line| say!("{line}"))?;
+    print(&found);
+    let written = found.scene(&sought, (&reference(a), a.viscosity), &command(a));
+    match &written {
+        Some(text) if found.good || a.anyway => {
+            write_bytes(&a.out, told.existing, text.as_bytes())?;
+            say!("written to {}", a.out.display());
+        }
+        Some(_) => say!("nothing is written, as the angle is not met: --anyway writes this wall"),
+        None => say!("nothing is written: there is no wall"),
+    }
+    conclude(told, &found, found.good)
+}
+
+fn print(found: &Found) {
+    let mut table = Table::new(["", "wanted", "got", "allowed"]);
+    let shown =
+        |x: Measured| if x.value.is_finite() { with_error(x.value, Some(x.error)) } else { "-".into() };
+    for (route, got) in
+        [("contact angle by three tensions, degrees", found.young), ("by a ridge, degrees", found.ridge)]
+    {
+        let missed = if found.meets(got) { "" } else { ", missed" };
+        table.push([route.to_owned(), found.wanted.to_string(), shown(got), format!("{TOLERANCE}{missed}")]);
+    }
+    let mut free =
+        |name: &str, got: Measured| table.push([name.to_owned(), "free".into(), shown(got), String::new()]);
+    free("tension of the liquid and its vapour", found.slab.tension);
+    if let Some(film) = found.film {
+        free("of the wall and the liquid", film.liquid.unwrap_or(Measured::NONE));
+        free("of the wall and the vapour", film.vapour);
+    }
+    free("density of the liquid", found.slab.density);
+    say!("");
+    say::table(&table);
+    if let Some(lines) = found.lines("\"zlo\"", None) {
+        say!("{}", lines.trim_end());
+    }
+    if let Some(why) = &found.refusal {
+        say!("MISSED: {why}");
+    }
+}
+
+/// The model as the scene names it: by its file name beside the scene.
+fn reference(a: &OfWall) -> String {
+    let folder =
+        |path: &Path| std::path::absolute(path).ok().and_then(|path| path.parent().map(Path::to_owned));
+    match folder(&a.model) == folder(&a.out) {
+        true => file_name(&a.model),
+        false => std::path::absolute(&a.model).unwrap_or_else(|_| a.model.clone()).display().to_string(),
+    }
+}
+
+/// The command line that repeats the search.
+fn command(a: &OfWall) -> String {
+    let mut text = format!(
+        "psidpd model wall {} --contact-angle {} --kT {}",
+        file_name(&a.model),
+        a.contact_angle,
+        a.kt
+    );
+    for (option, value) in [("density", a.density), ("viscosity", a.viscosity)] {
+        if let Some(value) = value {
+            text += &format!(" --{option} {value}");
+        }
+    }
+    text + &format!(" --seed {} --out {}", a.seed, file_name(&a.out))
+}
