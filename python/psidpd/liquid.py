@@ -1,4 +1,4 @@
-"""Models of liquids from their data sheets."""
+"""Models of liquids from their data sheets, and walls from their contact angles."""
 
 from __future__ import annotations
 
@@ -80,17 +80,48 @@ class Liquid:
         """
         numbers = {key: getattr(self, key) for key in self.__dataclass_fields__ if key != "name"}
         sizes = {"molecules": molecules, "rc": rc, "drop": drop, "particles": particles, "number_density": number_density}
-        given = [(key, value) for key, value in (numbers | sizes).items() if value is not None]
-        options = [f"--{key.replace('_', '-')}={float(value)!r}" for key, value in given]
-        with tempfile.TemporaryDirectory() as folder:
-            table = Path(folder, "found.json")
-            command = [sys.executable, "-m", "psidpd", "model", "liquid", *options, f"--seed={seed}"]
-            command += ["--out", os.path.abspath(out), "--json", str(table)]
-            command += ["--anyway"] * anyway + ["--overwrite"] * overwrite + ["--", self.name]
-            # From an empty folder, as Python imports what lies in the working one.
-            run = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-            text = read(table)
-            if text is not None:
-                found: dict[str, Any] = json.loads(text)
-                return found
-        raise (InputError if run.returncode == 2 else RunStoppedError)(run.stderr.strip())
+        return found("liquid", self.name, numbers | sizes | {"seed": seed}, out, anyway=anyway, overwrite=overwrite)
+
+
+def wall(
+    model: AnyPath,
+    out: AnyPath,
+    *,
+    contact_angle: float,
+    kT: float = 1.0,
+    density: float | None = None,
+    viscosity: float | None = None,
+    seed: int = 1,
+    anyway: bool = False,
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Finds the wall on which a liquid has a contact angle, in degrees, as `psidpd model wall` does: minutes.
+
+    Writes the scene of a ridge on it to `out`, and gives what was found: "good", the "value" of the "knob" (the strength of the wall's
+    attraction or its density), the angles "young" and "ridge" with their errors, and the tensions. If the angle is not met `out` is
+    written with `anyway` alone. density is about that of the liquid, if theory does not know it; with its viscosity it does not slip.
+
+    Raises InputError for a model or an angle that cannot be used.
+    """
+    numbers = {"contact_angle": contact_angle, "kT": kT, "density": density, "viscosity": viscosity, "seed": seed}
+    return found("wall", os.path.abspath(model), numbers, out, anyway=anyway, overwrite=overwrite)
+
+
+def found(
+    verb: str, name: str, numbers: dict[str, float | None], out: AnyPath, *, anyway: bool, overwrite: bool
+) -> dict[str, Any]:
+    """What `psidpd model VERB` writes with --json."""
+    given = [(key, value) for key, value in numbers.items() if value is not None]
+    options = [f"--{key.replace('_', '-')}={value if isinstance(value, int) else float(value)!r}" for key, value in given]
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder, "found.json")
+        command = [sys.executable, "-m", "psidpd", "model", verb, *options]
+        command += ["--out", os.path.abspath(out), "--json", str(table)]
+        command += ["--anyway"] * anyway + ["--overwrite"] * overwrite + ["--", name]
+        # From an empty folder, as Python imports what lies in the working one.
+        run = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        text = read(table)
+        if text is not None:
+            result: dict[str, Any] = json.loads(text)
+            return result
+    raise (InputError if run.returncode == 2 else RunStoppedError)(run.stderr.strip())

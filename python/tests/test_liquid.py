@@ -22,6 +22,16 @@ def test_impossible_liquids_have_a_table_and_no_file(tmp_path):
     assert not (tmp_path / "water.toml").exists()
 
 
+def test_walls_that_cannot_be_are_refused(tmp_path):
+    model = tmp_path / "gas.toml"
+    model.write_text('title = "g"\nspecies = ["F"]\n[[pair]]\nbetween = ["F", "F"]\nform = "soft"\nstrength = 25.0\nrange = 1.0\n')
+    out = tmp_path / "wall.toml"
+    for options, why in [({"contact_angle": 60}, "density"), ({"contact_angle": 190}, "160 degrees"), ({"contact_angle": 60.0, "kT": -1}, "kT")]:
+        with pytest.raises(psidpd.InputError, match=why):
+            psidpd.wall(model, out, **options)
+    assert not out.exists()
+
+
 def test_coolprop_knows_water():
     pytest.importorskip("CoolProp")
     water = psidpd.Liquid.from_coolprop("Water", T=298.15)

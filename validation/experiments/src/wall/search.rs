@@ -5,6 +5,8 @@ use crate::ExperimentError;
 use crate::liquid::Trouble;
 use psidpd_core::document::FileError;
 use psidpd_core::model::Model;
+use psidpd_core::model::PairTerm;
+use psidpd_core::model::pair::PairForm as _;
 use psidpd_observe::Measured;
 use serde::Serialize;
 
@@ -19,9 +21,17 @@ pub enum Knob {
 }
 
 impl Knob {
-    /// That of a model: its densities attract if no pair potential does.
+    /// That of a model: the strength, if its pair potentials attract as a whole, ∫ φ r² dr < 0.
     pub fn of(model: &Model, kt: f64) -> Result<Knob, FileError> {
-        Ok(if model.at(kt)?.pairs.is_empty() { Knob::Density } else { Knob::Strength })
+        const POINTS: u32 = 1000;
+        let fluid = model.at(kt)?;
+        let integral = |term: &PairTerm| {
+            let phi = &term.potential;
+            let places = (0..POINTS).map(|k| (f64::from(k) + 0.5) / f64::from(POINTS) * phi.range());
+            places.map(|r| phi.at(r).0 * r * r).sum::<f64>() * phi.range()
+        };
+        let whole: f64 = fluid.pairs.iter().map(integral).sum();
+        Ok(if whole < 0.0 { Knob::Strength } else { Knob::Density })
     }
 
     /// The key of a `[[wall]]`.
@@ -106,9 +116,9 @@ pub fn surface(trials: &[Trial], share: f64) -> f64 {
     held.min_by(|a, b| off(a).total_cmp(&off(b))).map_or(0.0, |t| t.surface)
 }
 
-/// Three digits, as a scene has it.
+/// Four digits, as a scene has it.
 pub fn rounded(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// Seeks the share; `trials` has what is known already, and what is measured comes to it.
@@ -177,24 +187,30 @@ enum Next {
 }
 
 fn next(trials: &[Trial], goal: f64, tolerance: f64, [least, most]: [f64; 2]) -> Next {
-    let below = trials.iter().filter(|t| t.is_below(goal)).map(|t| t.share).reduce(f64::max);
-    let above = trials.iter().filter(|t| !t.is_below(goal)).map(|t| t.share).reduce(f64::min);
-    let guess = match (below, above) {
+    let order = |a: &&Trial, b: &&Trial| a.share.total_cmp(&b.share);
+    let below = trials.iter().filter(|t| t.is_below(goal)).max_by(order);
+    let above = trials.iter().filter(|t| !t.is_below(goal)).min_by(order);
+    let (below, above) = match (below, above) {
         (None, None) => return Next::Try(FIRST),
-        (Some(below), None) if below >= most => return Next::Beyond,
-        (Some(below), None) => return Next::Try([1.3 * below, 1.7 * below].map(|s| s.min(most))),
-        (None, Some(above)) if above <= least => return Next::Beyond,
-        (None, Some(above)) => return Next::Try([0.5 * above, 0.8 * above].map(|s| s.max(least))),
-        // Without a line: between them.
-        (Some(below), Some(above)) => match line(trials, goal) {
-            Some((share, error)) if error <= tolerance => return Next::Found(share),
-            // Noise can put a film on the wrong side of another.
-            Some((share, _)) => share.clamp(0.8 * below.min(above), 1.25 * below.max(above)),
-            None => 0.5 * (below + above),
-        },
+        (Some(below), None) if below.share >= most => return Next::Beyond,
+        (Some(below), None) => return Next::Try([1.3, 1.7].map(|factor| (factor * below.share).min(most))),
+        (None, Some(above)) if above.share <= least => return Next::Beyond,
+        (None, Some(above)) => return Next::Try([0.5, 0.8].map(|factor| (factor * above.share).max(least))),
+        (Some(below), Some(above)) => (below, above),
     };
-    let between = below.zip(above).map_or(0.0, |(below, above)| (above - below).abs());
-    let aside = (0.25 * between / guess).clamp(ASIDE[0], ASIDE[1]);
+    let guess = match line(trials, goal) {
+        Some((share, error)) if error <= tolerance => return Next::Found(share),
+        // Noise can put a film on the wrong side of another.
+        Some((share, _)) => {
+            share.clamp(0.8 * below.share.min(above.share), 1.25 * below.share.max(above.share))
+        }
+        None => {
+            let known = below.cosine.zip(above.cosine);
+            let part = known.map_or(0.5, |(low, high)| (goal - low.value) / (high.value - low.value));
+            below.share + part.clamp(0.1, 0.9) * (above.share - below.share)
+        }
+    };
+    let aside = (0.25 * (above.share - below.share).abs() / guess).clamp(ASIDE[0], ASIDE[1]);
     Next::Try([1.0 - aside, 1.0 + aside].map(|aside| (aside * guess).clamp(least, most)))
 }
 
