@@ -357,6 +357,7 @@ fn errors_of_every_verb_name_the_file() {
         "lammps plugin --lammps F",
         "bench --lammps F --out out",
         "model liquid w --data F --rc 1e-9 --temperature 300 --out x.toml",
+        "model wall F --contact-angle 60 --out x.toml",
     ];
     for (name, text) in
         [("broken", Some("x = [[[\n\"")), ("empty", Some("")), ("missing", None), ("folder", None)]
@@ -407,6 +408,8 @@ fn errors_of_every_verb_name_the_file() {
         ("calibrate w.toml --density 5:6 --out c.toml --threads 100000", &["from 1 to 1024"]),
         ("model liquid w --density 0.997 --rc 1e-9 --out x.toml", &["density = 0.997", "SI units"]),
         ("model liquid w --density 997 --molecules 3 --out x.toml", &["molar_mass"]),
+        ("model wall m.toml --contact-angle 190 --out x.toml", &["160 degrees"]),
+        ("model wall m.toml --contact-angle 60 --density -1 --out x.toml", &["above 0"]),
         ("reproduce --threads 100000", &["from 1 to 1024"]),
         ("bench --threads 100000", &["from 1 to 1024"]),
         ("pareto s.toml --threads 0", &["from 1 to 1024"]),

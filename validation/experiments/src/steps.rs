@@ -3,7 +3,7 @@
 use psidpd_dynamics::integrator::{Coupling, Integrator};
 use psidpd_dynamics::trial::{Piece, two_digits};
 
-/// Its lines in a stage of a scene, without dt.
+/// The lines of the step in a stage of a scene, without dt.
 pub const STEP: &str = "integrator = \"force-gradient\"\nlambda = 0.17\nthermostat_every = 2\n";
 
 pub const ADVISED: Integrator = Integrator::ForceGradient {

@@ -9,7 +9,7 @@ pub struct Arguments {
     /// Only the integrators that are recommended, velocity Verlet in both precisions, the others in mixed.
     #[arg(long, conflicts_with = "full")]
     quick: bool,
-    /// With runs of a million steps.
+    /// Also make runs of a million steps.
     #[arg(long)]
     full: bool,
     /// In LAMMPS with the plugin too, which must be installed.

@@ -67,7 +67,7 @@ enum Colour {
     Density,
     /// The size of its velocity.
     Speed,
-    /// Its excess free energy.
+    /// The excess free energy of the particle.
     Psi,
 }
 

@@ -83,7 +83,7 @@ pub struct Piece {
     pub drag: f64,
     /// The pressure at kT of its configurations.
     pub pressure: f64,
-    /// Its thermal pressure `∂p/∂kT / ρ`.
+    /// The thermal pressure of the piece, `∂p/∂kT / ρ`.
     pub thermal_pressure: f64,
 }
 
@@ -180,7 +180,7 @@ impl Piece {
         }))
     }
 
-    /// Its particles, in equilibrium.
+    /// The particles of the piece, in equilibrium.
     pub fn state(&self) -> &State {
         &self.state
     }

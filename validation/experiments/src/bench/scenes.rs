@@ -71,9 +71,9 @@ pub struct WholeScene {
     pub steps: u64,
     pub threads: usize,
     pub as_shipped: Seconds,
-    /// Without `[observe]` and `[output]`.
+    /// The scene without `[observe]` and `[output]`.
     pub bare: Seconds,
-    /// Processor time as shipped over that without.
+    /// Processor time as shipped over that of the bare scene.
     pub ratio: f64,
 }
 

@@ -57,7 +57,7 @@ pub enum Goal {
 pub struct Round {
     pub degree: usize,
     pub goal: Goal,
-    /// For each (β at α), row-major.
+    /// The corrections of each pair (β at α), row-major.
     pub fits: Vec<Fit>,
     /// Largest |⟨ρ̃⟩/ρ − 1|.
     pub density_residual: f64,

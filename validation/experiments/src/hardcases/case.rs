@@ -13,7 +13,7 @@ pub enum Must {
     /// It ends, and has counted the evaluations beyond the bounds of a density.
     Counted,
     Stops,
-    /// It is refused before its first step, with a reason.
+    /// The run is refused before its first step, with a reason.
     Refused,
     /// Engine and reference agree within this part of the largest force, in double precision; in mixed precision within
     /// single precision's part.
@@ -220,7 +220,7 @@ mod tests {
         }
     }
 
-    /// Of each bound what is just within, and what is just beyond.
+    /// A value just within each bound passes, and one just beyond it fails.
     #[test]
     fn bounds_are_where_they_are_said_to_be() {
         let right =

@@ -24,7 +24,7 @@ pub struct Deck<'a> {
 }
 
 impl<'a> Deck<'a> {
-    /// At kT = 1, as comparisons have it.
+    /// The deck at kT = 1, as comparisons have it.
     pub fn new(style: &'a PairStyle, seed: u64, data: String) -> Deck<'a> {
         Deck {
             style,

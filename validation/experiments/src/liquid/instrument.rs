@@ -8,9 +8,9 @@ use serde::Serialize;
 /// The liquid in equilibrium, in the units of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Equilibrium {
-    /// At the density of the goals.
+    /// The pressure at the density of the goals.
     pub pressure: Measured,
-    /// ∂p/∂ρ there.
+    /// ∂p/∂ρ at the density of the goals.
     pub stiffness: Measured,
     pub tension: Measured,
     /// Density of the liquid between its vapours.

@@ -25,7 +25,7 @@ pub enum Source {
     Printed,
     /// The paper has it as a curve, a formula or words; how near is near enough is our choice.
     Read,
-    /// It is not published: another run of this program, or its mean field.
+    /// The number is not published: another run of this program, or its mean field.
     Own,
 }
 

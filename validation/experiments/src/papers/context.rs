@@ -46,7 +46,7 @@ pub struct Fluid<'a> {
 }
 
 impl Fluid<'_> {
-    /// At kT = 1, with the step and the box of most papers.
+    /// A fluid at kT = 1, with the step and the box of most papers.
     pub fn of(model: &str) -> Fluid<'_> {
         Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" }
     }

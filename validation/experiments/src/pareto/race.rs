@@ -31,7 +31,7 @@ pub struct Rule<'a> {
 }
 
 impl Rule<'_> {
-    /// For so many settings, each looked at so many times for so many quantities.
+    /// The rule for a number of settings, each judged by a number of quantities at each of a number of looks.
     pub fn new(tolerances: &[Tolerance], settings: usize, quantities: usize, looks: usize) -> Rule<'_> {
         Rule { tolerances, margin: threshold((settings * quantities * looks).max(1), ALARM) }
     }
@@ -77,7 +77,7 @@ pub fn shares(open: usize) -> [f64; 2] {
 /// none where it stopped, `more` samples some of them on, in that round of so many, and says whether there is time for another.
 ///
 /// # Errors
-/// Those of `more`.
+/// Fails if `more` fails.
 pub fn race<S, E>(
     state: &mut S,
     rule: &Rule,

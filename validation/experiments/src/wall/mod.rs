@@ -100,7 +100,7 @@ pub struct Found {
     /// Why there is no such wall.
     pub refusal: Option<String>,
     pub good: bool,
-    /// With the step of the runs.
+    /// The liquid in units of its model, and the step of the runs.
     #[serde(skip)]
     pub units: Units,
 }

@@ -25,7 +25,7 @@ pub struct Runs<'a> {
     sought: &'a Sought,
     folder: &'a Path,
     knob: Knob,
-    /// With a guess of the liquid's density, then what the slab has.
+    /// The units; their density is a guess, then that of the slab.
     units: Units,
 }
 

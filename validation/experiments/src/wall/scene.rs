@@ -35,7 +35,7 @@ pub struct Units {
 pub struct Setting {
     pub title: String,
     edges: [f64; 3],
-    /// Its [`wall`], if it has one.
+    /// The lines of the [`wall`], if there is one.
     wall: String,
     /// The shape of the liquid.
     shape: String,

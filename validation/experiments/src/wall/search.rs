@@ -21,7 +21,7 @@ pub enum Knob {
 }
 
 impl Knob {
-    /// That of a model: the strength, if its pair potentials attract as a whole, ∫ φ r² dr < 0.
+    /// The free number of a model's walls: the strength, if its pair potentials attract as a whole, ∫ φ r² dr < 0.
     pub fn of(model: &Model, kt: f64) -> Result<Knob, FileError> {
         const POINTS: u32 = 1000;
         let fluid = model.at(kt)?;

@@ -83,7 +83,7 @@ struct Near<'a> {
     single: Single,
 }
 
-/// The same in single precision.
+/// What distances are measured by, in single precision.
 struct Single {
     edges: [[f32; 3]; 3],
     period: [f32; 3],

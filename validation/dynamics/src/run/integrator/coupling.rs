@@ -5,12 +5,12 @@ use psidpd_core::engine::Want;
 use psidpd_core::engine::thermostat::Stream;
 
 impl Coupling {
-    /// Its action for steps of `dt`.
+    /// The action of the thermostat for steps of `dt`.
     fn action(self, dt: f64) -> Heat {
         Heat { update: self.update, noise: self.noise, time: dt * self.every as f64, stream: Stream(0) }
     }
 
-    /// Its action in the present step of `dt`, if it is its turn.
+    /// The action of the thermostat in the present step of `dt`, if it is its turn.
     fn heat(self, system: &Simulation, dt: f64) -> Option<Heat> {
         system.step_number().is_multiple_of(self.every).then(|| self.action(dt))
     }

@@ -51,9 +51,9 @@ pub struct Surroundings<'a> {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Faults {
     pub fast: Option<usize>,
-    /// It is beyond a wall even after reflection.
+    /// A particle is beyond a wall even after reflection.
     pub escaped: Option<usize>,
-    /// It is more boxes away than can be counted.
+    /// A particle is more boxes away than can be counted.
     pub uncounted: Option<usize>,
 }
 

@@ -15,7 +15,7 @@ pub struct Path {
     pub time: f64,
     /// The velocity of the step at the start less that of the path, in units of force over mass.
     pub kicked: f64,
-    /// The same of the positions.
+    /// The position of the step at the start less that of the path, in units of force over mass.
     shift: f64,
     /// The velocity that moves the particles less that of the step, in the same units.
     pub ahead: f64,
@@ -87,7 +87,7 @@ pub struct Bounce {
     beyond: f64,
     /// Place of the step at the start.
     start: f64,
-    /// Its way, with the places of the step at its ends and the velocities that carry momentum; empty if ways are not recorded.
+    /// The way of the particle, with the places of the step at its ends and the velocities that carry momentum; empty if ways are not recorded.
     arcs: Vec<Arc>,
 }
 

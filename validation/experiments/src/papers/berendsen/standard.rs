@@ -31,7 +31,7 @@ pub fn water(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
     Ok(())
 }
 
-/// With Lowe's thermostat, or drag and noise.
+/// Runs standard DPD with Lowe's thermostat, or with drag and noise.
 fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, ExperimentError> {
     let scene = format!(
         "kT = 1.0\nseed = 1\nbox = {:?}\ndensity = 3.0\ndt = {dt:?}\nintegrator = \"{integrator}\"\nequilibrate = {}\nsteps = {}\n\
