@@ -77,6 +77,18 @@ const USUAL: &[Usual] = &[
             row(100.0, [23.8, 0.4], Some([0.0121, 0.0003])),
         ],
     },
+    Usual {
+        name: "Warren's liquid, A = −40, B = 40",
+        strength: -40.0,
+        many_body: 40.0,
+        density: 5.08,
+        rows: &[
+            row(4.5, [7.12, 0.10], Some([0.0378, 0.0003])),
+            row(18.0, [8.82, 0.13], Some([0.0298, 0.0003])),
+            row(50.0, [13.25, 0.10], Some([0.0195, 0.0002])),
+            row(100.0, [20.18, 0.10], Some([0.0126, 0.0002])),
+        ],
+    },
 ];
 
 /// Strengths and densities that differ by less are the same.

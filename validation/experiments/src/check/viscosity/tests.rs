@@ -86,6 +86,7 @@ fn units_do_not_matter() {
         (IDEAL.to_owned(), IDEAL.to_owned(), 3.0),
         (soft(25.0, 1.0), soft(25.0 * e / l, l), 3.0),
         (warrens(-40.0, 25.0, 1.0), warrens(-40.0 * e / l, 25.0 * e * l * l, l), 6.05),
+        (warrens(-40.0, 40.0, 1.0), warrens(-40.0 * e / l, 40.0 * e * l * l, l), 5.08),
     ] {
         let one = flow(&at(&plain, 4.5, 1.0, 1.0, ""), 1.0, Some(rho)).unwrap();
         let other = flow(&at(&scaled, 4.5 * m / time, l, e, ""), m, Some(rho / l.powi(3))).unwrap();
