@@ -419,11 +419,17 @@ fn usual_tolerances_are_those_of_most_native_points() {
 #[test]
 fn more_time_is_for_what_is_open() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = tiny(folder.path());
+    let tiny = tiny(folder.path());
+    let text = tiny.source.text().replace("box = 4.0", "box = 3.0");
+    let scene = Scene::parse("tiny", &text, folder.path()).unwrap();
     let origin = Origin::of(&scene, Duration::from_millis(100), NonZeroUsize::MIN).unwrap();
-    let physics = &setting::physics(Choice::Few)[..3];
+    let physics = [0.5, 1.0, 0.75].map(|multiple| Physics {
+        integrator: Integrator::VelocityVerlet,
+        multiple,
+        precision: Precision::Double,
+    });
     let progress = Progress::new();
-    let mut field = Field::begun(&origin, physics, [Effort::Samples(1); 2], &progress).unwrap();
+    let mut field = Field::begun(&origin, &physics, [Effort::Samples(1); 2], &progress).unwrap();
     let samples = |field: &Field| -> Vec<u64> {
         let References { configurations, small_steps } = &field.references;
         let references = [configurations.as_ref().unwrap().sampled(), small_steps.sampled()];
