@@ -549,7 +549,8 @@ mod tests {
             let (shell, is_above) = (1 + place / 2 % 15, place % 2 == 1);
             expected[shell - usize::from(!is_above)] += 1;
             let r = (shell as f64 + if is_above { 1e-9 } else { -1e-9 }) / bins as f64 * range;
-            let [u, turn]: [f64; 2] = [random.random::<f64>() * 2.0 - 1.0, random.random::<f64>() * 6.28];
+            let [u, turn]: [f64; 2] =
+                [random.random::<f64>() * 2.0 - 1.0, std::f64::consts::TAU * random.random::<f64>()];
             let flat = (1.0 - u * u).sqrt();
             let at = [place % 10, place / 10 % 10, place / 100]
                 .map(|k| 2.9 * k as f64 + random.random::<f64>() * 0.5);
