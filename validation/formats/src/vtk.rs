@@ -126,3 +126,87 @@ pub fn write_vti(grid: &Grid, frame: &Frame, to: &mut impl Write) -> io::Result<
     file.line("</PointData>");
     file.write("ImageData", to)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_core::engine::PeriodicBox;
+
+    /// The XML, and the numbers of an array as VTK reads them: after the underscore and the length of the array.
+    fn array<const B: usize>(file: &[u8], name: &str) -> Vec<[u8; B]> {
+        let mark = b"<AppendedData encoding=\"raw\">\n_";
+        let end = file.windows(mark.len()).position(|part| part == mark).unwrap();
+        let xml = std::str::from_utf8(&file[..end]).unwrap();
+        let line = xml.lines().find(|line| line.contains(&format!("Name=\"{name}\""))).unwrap();
+        let attribute = |key: &str| -> usize {
+            line.split(&format!("{key}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+        };
+        let data = &file[end + mark.len() + attribute("offset")..];
+        let length = u64::from_le_bytes(data[..8].try_into().unwrap()) as usize;
+        assert_eq!(length, B * attribute("NumberOfTuples") * attribute("NumberOfComponents"), "{name}");
+        data[8..8 + length].as_chunks::<B>().0.to_vec()
+    }
+
+    fn written(write: impl Fn(&Frame, &mut Vec<u8>)) -> Vec<u8> {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0, 5.0, 6.0], [true; 3]).unwrap();
+        let x = [[0.5, 1.0, 2.0], [3.0, 0.25, 5.5], [1.0, 2.0, 3.0]];
+        let (species, tag, names) = ([0, 1, 1], [3, 1, 2], ["A".to_owned(), "B".to_owned()]);
+        let frame = Frame {
+            step: 7,
+            time: 0.35,
+            dimensions: 3,
+            domain: &domain,
+            names: &names,
+            x: &x,
+            v: None,
+            species: &species,
+            tag: &tag,
+        };
+        let mut file = Vec::new();
+        write(&frame, &mut file);
+        file
+    }
+
+    /// Every particle is a vertex of one point, whose numbers end where the next one's begin.
+    #[test]
+    fn particles_are_vertices() {
+        let file = written(|frame, to| write_vtp(frame, to).unwrap());
+        let of = |name: &str| array::<8>(&file, name).into_iter().map(i64::from_le_bytes).collect::<Vec<_>>();
+        let (points, ends) = (of("connectivity"), of("offsets"));
+        let mut begin = 0;
+        let vertices: Vec<Vec<i64>> = ends
+            .iter()
+            .map(|end| points[std::mem::replace(&mut begin, *end) as usize..*end as usize].to_vec())
+            .collect();
+        assert_eq!(vertices, [[0], [1], [2]]);
+        let ids: Vec<i32> = array::<4>(&file, "id").into_iter().map(i32::from_le_bytes).collect();
+        let species: Vec<i32> = array::<4>(&file, "species").into_iter().map(i32::from_le_bytes).collect();
+        assert_eq!((ids, species), (vec![3, 1, 2], vec![0, 1, 1]));
+        let x: Vec<f64> = array::<8>(&file, "Points").into_iter().map(f64::from_le_bytes).collect();
+        assert_eq!(x[3..6], [3.0, 0.25, 5.5]);
+        let time: Vec<f64> = array::<8>(&file, "TimeValue").into_iter().map(f64::from_le_bytes).collect();
+        assert_eq!(time, [0.35]);
+    }
+
+    /// Extents name the first and the last point of each direction, so they have as many points as there are values.
+    #[test]
+    fn extents_have_as_many_points_as_values() {
+        let values: Vec<f32> = (0..24u8).map(f32::from).collect();
+        let grid = Grid {
+            origin: [0.5, -1.0, 2.0],
+            spacing: [1.0, 0.5, 0.25],
+            size: [4, 3, 2],
+            fields: vec![("density".to_owned(), values.clone())],
+        };
+        let file = written(|frame, to| write_vti(&grid, frame, to).unwrap());
+        let xml = String::from_utf8_lossy(&file);
+        for key in ["WholeExtent", " Extent"] {
+            let extent = xml.split(&format!("{key}=\"")).nth(1).unwrap().split('"').next().unwrap();
+            let ends: Vec<i64> = extent.split(' ').map(|end| end.parse().unwrap()).collect();
+            let points: Vec<i64> = ends.chunks(2).map(|ends| ends[1] - ends[0] + 1).collect();
+            assert_eq!(points, [4, 3, 2]);
+        }
+        let found: Vec<f32> = array::<4>(&file, "density").into_iter().map(f32::from_le_bytes).collect();
+        assert_eq!(found, values);
+    }
+}

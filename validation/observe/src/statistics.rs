@@ -249,6 +249,25 @@ mod tests {
     use rand::{SeedableRng, rngs::StdRng};
     use rand_distr::{Distribution, StandardNormal};
 
+    /// The two-sided 5 % points of Student's t, from tables, at the degrees of freedom of Welch: 2(n − 1) for equal errors, and n − 1 of
+    /// the one that has all of the error.
+    #[test]
+    fn few_samples_have_the_probabilities_of_student() {
+        let of = |mean: f64, error: f64, n: usize| Estimate { mean, error, samples: n, tau: 0.5 };
+        for (n, point) in [(6, 2.228), (11, 2.086), (3, 2.776)] {
+            let half = 1.0 / 2f64.sqrt();
+            let found = difference(&of(point, half, n), &of(0.0, half, n));
+            assert!((found.p_value - 0.05).abs() < 1e-4 && (found.z - point).abs() < 1e-12, "{n}: {found:?}");
+        }
+        for (n, point) in [(6, 2.571), (11, 2.228), (21, 2.086)] {
+            let found = difference(&of(point, 1.0, n), &of(0.0, 1e-9, 1000));
+            assert!((found.p_value - 0.05).abs() < 1e-4, "{n}: {found:?}");
+        }
+        // Samples that hang together count as so many fewer.
+        let slow = Estimate { tau: 2.5, ..of(2.571, 1.0, 30) };
+        assert!((difference(&slow, &of(0.0, 1e-9, 1000)).p_value - 0.05).abs() < 1e-4);
+    }
+
     /// A stationary AR(1) series of unit variance; τ = (1 + φ) / 2(1 − φ).
     fn autoregressive(phi: f64, n: usize, rng: &mut StdRng) -> Vec<f64> {
         let noise = (1.0 - phi * phi).sqrt();

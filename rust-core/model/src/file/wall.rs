@@ -157,6 +157,23 @@ mod tests {
         }
     }
 
+    /// The matter of B responds to a particle of A with ∂ψ_B/∂n_A, to one of B with ∂ψ_B/∂n_B at its local density; ψ of A is no part of it.
+    #[test]
+    fn matter_responds_to_each_species_by_its_own_slope() {
+        let text = "title = \"m\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
+                    [excess_free_energy]\nA = \"2*n_A + 3*n_B\"\nB = \"5*n_A + 0.5*n_B^2\"\n";
+        let fluid = Model::parse("m.toml", text).unwrap().at(0.7).unwrap();
+        let found = bind_wall(&Wall { local_densities: vec![2.3], ..wall(1) }, &fluid).unwrap();
+        for z in [0.0, 0.5] {
+            for (field, slope) in found.fields.iter().zip([5.0, 2.3]) {
+                let n = field.densities[0].1.at(z)[0];
+                let energy: f64 = field.energies.iter().map(|e| e.at(z)[0]).sum();
+                assert!(n > 0.1 && (energy - slope * n).abs() < 1e-9, "{z}: {energy} {slope} {n}");
+            }
+        }
+        assert!((found.fields[0].densities[0].1.at(0.0)[0] - 0.5 * 6.05).abs() < 1e-8);
+    }
+
     #[test]
     fn what_has_no_wall_is_refused() {
         let stated = "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\

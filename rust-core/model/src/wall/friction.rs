@@ -119,14 +119,72 @@ mod tests {
         assert_eq!(friction.at(1.0), [0.0; 2]);
     }
 
+    /// Sums of `γ w_R² r̂ r̂` over a fine grid of points behind the face, in the plane and in space, for three exponents.
+    #[test]
+    fn friction_is_what_a_sum_over_points_is() {
+        let (range, gamma, density) = (1.3, 2.5, 4.0);
+        for dimensions in [2, 3] {
+            for exponent in [0.25, 1.0, 1.5] {
+                let friction = Friction::of(dimensions, density, [gamma, range, exponent]);
+                for z in [0.0, 0.2, 0.7, 1.1] {
+                    let (steps, mut sums) = (1000, [0.0; 2]);
+                    let h = range / f64::from(steps);
+                    for deep in 0..steps {
+                        let depth = z + (f64::from(deep) + 0.5) * h;
+                        for aside in 0..steps {
+                            let y = (f64::from(aside) + 0.5) * h;
+                            let r = depth.hypot(y);
+                            let ring = if dimensions == 2 { 2.0 } else { 2.0 * std::f64::consts::PI * y };
+                            let weight = density
+                                * gamma
+                                * ring
+                                * h
+                                * h
+                                * (1.0 - r / range).max(0.0).powf(2.0 * exponent);
+                            // On a ring half of y² is along each direction of the face.
+                            sums[0] += weight * (y / r).powi(2) / (dimensions - 1) as f64;
+                            sums[1] += weight * (depth / r).powi(2);
+                        }
+                    }
+                    for (found, sum) in friction.at(z).into_iter().zip(sums) {
+                        let off = (found - sum).abs() / friction.at(0.0)[0];
+                        assert!(off < 1e-3, "{dimensions}-D, exponent {exponent}, {z}: {found} {sum}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The strength without slip is that of the same fluid in other units of mass, length and energy.
+    #[test]
+    fn the_strength_without_slip_has_no_units() {
+        for dimensions in [2usize, 3] {
+            let of = |mass: f64, length: f64, energy: f64| {
+                let time = length * (mass / energy).sqrt();
+                let per_volume = length.powi(-(dimensions as i32));
+                let friction = Friction::of(dimensions, 3.0 * per_volume, [4.5 * mass / time, length, 1.0]);
+                let viscosity = 0.9 * energy * time * per_volume;
+                friction.factor_without_slip(viscosity, 3.0 * per_volume, [0.7 * energy, 1.5 * mass])
+            };
+            let expected = of(1.0, 1.0, 1.0);
+            for units in [[3.0, 1.0, 1.0], [1.0, 1.4, 1.0], [1.0, 1.0, 0.3], [0.4, 2.5, 1.7]] {
+                let found = of(units[0], units[1], units[2]);
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-9,
+                    "{dimensions}-D {units:?}: {found} {expected}"
+                );
+            }
+        }
+    }
+
     /// Strong friction holds all within its range, weak friction next to nothing: in between one strength has no slip. Where ζ is
     /// weak the momentum that the face takes is ρ∫ζ u, and the length of slip η/ρ∫ζ less the mean place of the friction.
     #[test]
     fn one_strength_has_no_slip() {
         let friction = Friction::of(3, 6.05, [18.0, 1.0, 1.0]);
-        let (eta, rho) = (7.8, 6.05);
-        let factor = friction.factor_without_slip(eta, rho, [1.0, 1.0]);
-        let surplus = SURPLUS[0] + SURPLUS[1] * (rho / eta).powi(2);
+        let (eta, rho, kt, mass) = (7.8, 6.05, 0.7, 3.0);
+        let factor = friction.factor_without_slip(eta, rho, [kt, mass]);
+        let surplus = SURPLUS[0] + SURPLUS[1] * kt / mass * (mass * rho / eta).powi(2);
         assert!((friction.slip(eta, rho, factor) + surplus).abs() < 1e-9 && factor > 1.0, "{factor}");
         let (mut sum, mut place) = (0.0, 0.0);
         for k in 0..1000 {

@@ -44,3 +44,45 @@ pub fn shardlow(pair: &Encounter) -> f64 {
 pub fn lowe_andersen(pair: &Encounter) -> f64 {
     if pair.chance < -(-2.0 * pair.a).exp_m1() { pair.impulse(-1.0, 1.0) } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand, of masses 1 and 3 at kT = 0.7, over all random numbers: what is left of u in the mean, `exp(−DΔt/μ)` where the rule says
+    /// so, and the variance kT/μ, which stays. ξ of ±1 has the moments that count, and chances lie evenly.
+    #[test]
+    fn rules_leave_what_they_say_and_keep_the_variance() {
+        let (mu, kt): (f64, f64) = (0.75, 0.7);
+        let exponential = |a: f64| (-2.0 * a).exp();
+        type Rule = (fn(&Encounter) -> f64, fn(f64) -> f64);
+        let rules: [Rule; 3] = [
+            (ornstein_uhlenbeck, exponential),
+            (shardlow, |a| (1.0 - a) / (1.0 + a)),
+            (lowe_andersen, exponential),
+        ];
+        for (number, (rule, left)) in rules.into_iter().enumerate() {
+            for a in [0.02, 0.3, 0.7, 2.0] {
+                let g = (a * mu).sqrt();
+                let after = |u: f64| {
+                    let (mut mean, mut square) = (0.0, 0.0);
+                    let chances = 4000;
+                    for k in 0..chances {
+                        for xi in [-1.0, 1.0] {
+                            let chance = (f64::from(k) + 0.5) / f64::from(chances);
+                            let pair = Encounter { along: g * u, a, square: g * g, mu, kt, xi, chance };
+                            let u = u + rule(&pair) * g / mu;
+                            mean += u / f64::from(2 * chances);
+                            square += u * u / f64::from(2 * chances);
+                        }
+                    }
+                    [mean, square]
+                };
+                let [mean, _] = after(1.3);
+                assert!((mean - 1.3 * left(a)).abs() < 1e-3, "{number} {a}: {mean}");
+                let [_, square] = after((kt / mu).sqrt());
+                assert!((square - kt / mu).abs() < 1e-9, "{number} {a}: {square}");
+            }
+        }
+    }
+}

@@ -162,15 +162,33 @@ mod tests {
     use crate::tests::support::{self, SET6};
     use psidpd_core::engine::Want;
 
-    fn advice(stage: &str) -> Option<Advice> {
+    /// Advice for Warren's liquid in units of energy and mass that are 0.7 and 3 of the usual ones, for a step in the usual units of time.
+    fn advice(dt: f64, rest: &str) -> Option<Advice> {
+        let (kt, mass): (f64, f64) = (0.7, 3.0);
+        let mut model = SET6.to_owned();
+        for (usual, here) in [
+            ("A  = -40.0", format!("A  = {:?}", -40.0 * kt)),
+            ("B  = 25.0", format!("B  = {:?}", 25.0 * kt)),
+            ("gamma = 18.0", format!("gamma = {:?}", 18.0 * (mass * kt).sqrt())),
+        ] {
+            assert!(model.contains(usual));
+            model = model.replace(usual, &here);
+        }
+        let dt = dt * time();
         let text = format!(
-            "model = \"m.toml\"\nkT = 1.0\nseed = 7\nbox = 4.0\ndensity = 6.05\n[[stage]]\nname = \"run\"\nsteps = 200000\n{stage}"
+            "model = \"m.toml\"\nkT = {kt:?}\nseed = 7\nbox = 4.0\ndensity = 6.05\n[masses]\nF = {mass:?}\n\
+             [[stage]]\nname = \"run\"\nsteps = 200000\ndt = {dt:?}\n{rest}"
         );
-        let scene = support::scene(SET6, &text).unwrap();
+        let scene = support::scene(&model, &text).unwrap();
         let mut run = scene.simulation(scene.initial_state()).unwrap();
-        run.prepare(0.005, Want::FORCES).unwrap();
-        run.advance(400, 0.005, Integrator::VelocityVerlet).unwrap();
+        run.prepare(0.005 * time(), Want::FORCES).unwrap();
+        run.advance(400, 0.005 * time(), Integrator::VelocityVerlet).unwrap();
         Advice::of(&mut run, &scene.stages[0])
+    }
+
+    /// The usual unit of time.
+    fn time() -> f64 {
+        (3.0f64 / 0.7).sqrt()
     }
 
     /// Warren's liquid has ω = 18.3 and κ = 22.5. Measurements at Δt = 0.01 gave an error of the carried pressure of 16.6(3) % of ρkT,
@@ -178,15 +196,17 @@ mod tests {
     /// evaluations of forces and half of a thermostat, together 4.5 steps of velocity Verlet.
     #[test]
     fn a_better_step_is_named_where_there_is_one() {
-        let found = advice("dt = 0.01\n").unwrap();
+        let found = advice(0.01, "").unwrap();
         assert!((0.16..0.21).contains(&found.errors[1]), "{found:?}");
-        assert!((0.04..0.06).contains(&found.better_dt) && (0.4..1.0).contains(&found.time), "{found:?}");
-        assert!((found.time - 4.5 * 0.01 / found.better_dt).abs() < 1e-12, "{found:?}");
+        let better = found.better_dt / time();
+        assert!((0.04..0.061).contains(&better) && (0.4..1.0).contains(&found.time), "{found:?}");
+        assert!((found.time - 4.5 * 0.01 / better).abs() < 1e-12, "{found:?}");
         assert!(found.better_errors.iter().all(|e| *e < 0.03), "{found:?}");
         assert!(found.to_string().contains("integrator = \"force-gradient\", lambda = 0.17"), "{found}");
-        for good in ["dt = 0.0002\n", "dt = 0.06\nintegrator = \"force-gradient\"\n", "thermostat = false\n"]
+        for (dt, good) in
+            [(0.0002, ""), (0.06, "integrator = \"force-gradient\"\n"), (0.01, "thermostat = false\n")]
         {
-            assert_eq!(advice(good), None, "{good}");
+            assert_eq!(advice(dt, good), None, "{good}");
         }
     }
 

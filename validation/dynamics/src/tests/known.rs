@@ -264,12 +264,14 @@ fn the_pressure_of_configurations_leaves_velocities_out() {
 }
 
 /// Particles of masses 1 and 3 with velocities (2, 0, 0) and (−1, 1, 0) have the momentum (−1, 3, 0) and Σ m v² = 10. The flow
-/// has 10/4 of that sum, and the rest is dNkT. A frozen particle counts in neither, whatever its velocity.
+/// has 10/4 of that sum, and the rest is dNkT, in the plane and in space. A frozen particle counts in neither, whatever its velocity.
 #[test]
 fn flow_and_temperature_know_masses_and_frozen_particles() {
     let v = [[2.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [7.0, 7.0, 7.0]];
-    let show = |observe: &str| {
-        let mut shown = Shown::new(IDEAL_MIXTURE, 1.0, &[4.0; 3], &[[1.0; 3]; 3], observe);
+    let show = |dimensions: usize, observe: &str| {
+        let model = IDEAL_MIXTURE.replace("species", &format!("dimensions = {dimensions}\nspecies"));
+        let x = [[1.0, 1.0, if dimensions == 2 { 0.0 } else { 1.0 }]; 3];
+        let mut shown = Shown::new(&model, 0.7, &[4.0; 3][..dimensions], &x, observe);
         for _ in 0..3 {
             shown.sample(|view| View {
                 v: &v,
@@ -279,14 +281,18 @@ fn flow_and_temperature_know_masses_and_frozen_particles() {
                 ..view
             });
         }
-        shown.finish().remove(0)
+        shown.finish()
     };
-    let flow = show("velocity_profile = { bins = 1 }");
+    let flow = show(3, "velocity_profile = { bins = 1 }").remove(0);
     for (column, expected) in [("velocity_x", -0.25), ("velocity_y", 0.75), ("velocity_z", 0.0)] {
         assert!((value(&flow, column) - expected).abs() < 1e-14, "{flow:?}");
     }
-    let temperature = show("temperature_profile = { bins = 1 }");
-    assert!((value(&temperature, "temperature") - 7.5 / 6.0).abs() < 1e-14, "{temperature:?}");
+    for dimensions in [2, 3] {
+        let expected = 7.5 / (2.0 * dimensions as f64);
+        let found = show(dimensions, "temperature_profile = { bins = 1 }");
+        assert!((value(&found[0], "temperature") - expected).abs() < 1e-14, "{found:?}");
+        assert!((found[1].scalar("mean").unwrap().value - expected).abs() < 1e-14, "{found:?}");
+    }
 }
 
 /// The trace of the pressure tensor times the volume, summed over all shells around a drop, is r·F of the one force there is.

@@ -37,6 +37,9 @@ fn poles_and_spinodals_are_named() {
     // kT_c = 8a/27b = 5.93, ρ_c = 1/3b = 3.33
     let cold = found(van_der_waals(), 4.0, Some(vec![3.6]));
     assert!(has(&cold, "spinodal") && has(&cold, "singular"), "{cold:?}");
+    // The pole is at 1/b.
+    let pole = cold.warnings.iter().find(|w| w.id == "singular").unwrap();
+    assert!(pole.message.contains("total density 10.0000, 2.78 times the mean"), "{pole:?}");
     let hot = found(van_der_waals(), 8.0, Some(vec![1.0]));
     assert!(!has(&hot, "spinodal"), "{hot:?}");
     let beyond = found(van_der_waals(), 8.0, Some(vec![12.0]));
@@ -157,7 +160,15 @@ fn a_quadratic_kernel_is_not_advised_where_it_is_quadratic() {
         warning.unwrap_or_else(|| panic!("{findings:?}")).message.clone()
     };
     assert!(cluster("bell").contains("positive definite kernel"));
-    assert!(!cluster("quadratic").contains("kernel"));
+    let message = cluster("quadratic");
+    assert!(!message.contains("kernel"));
+    // The wavelength is 2π/k*.
+    let after = |words: &str| -> f64 {
+        let rest = message.split(words).nth(1).unwrap();
+        rest.split([':', ';']).next().unwrap().trim().parse().unwrap()
+    };
+    let product = after("at k* = ") * after("wavelength ");
+    assert!((product / std::f64::consts::TAU - 1.0).abs() < 2e-3, "{message}");
 }
 
 /// The crystal of A = −100 and B = 80 is announced as what it is, and Warren's liquid is not.

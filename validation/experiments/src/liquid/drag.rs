@@ -107,3 +107,27 @@ fn next(trials: &[Tried], goal: f64, density: f64) -> Option<Drag> {
     }
     Some(Drag { gamma: gamma.clamp(WEAKEST, STRONGEST), ..last.drag })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the usual weight it is 2πγρ²r_c⁵/1575, as in textbooks; of others the integral of r⁴ w² over spheres, by a sum.
+    #[test]
+    fn the_part_of_the_drag_is_that_of_kinetic_theory() {
+        let pi = std::f64::consts::PI;
+        let usual = per_gamma(&Drag { gamma: 7.0, ..USUAL }, 3.0);
+        assert!((usual / (2.0 * pi * 9.0 / 1575.0) - 1.0).abs() < 1e-12, "{usual}");
+        for [range, exponent] in SHAPES {
+            let steps = 100_000;
+            let h = range / f64::from(steps);
+            let at = |k: i32| {
+                let r = (f64::from(k) + 0.5) * h;
+                r.powi(4) * (1.0 - r / range).powf(2.0 * exponent)
+            };
+            let expected = 2.0 * pi / 15.0 * 25.0 * h * (0..steps).map(at).sum::<f64>();
+            let found = per_gamma(&Drag { gamma: 1.0, range, exponent }, 5.0);
+            assert!((found / expected - 1.0).abs() < 1e-4, "{range} {exponent}: {found} {expected}");
+        }
+    }
+}

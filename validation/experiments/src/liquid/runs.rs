@@ -144,6 +144,43 @@ impl Runs<'_> {
             observe,
         }
     }
+
+    /// Two flows of a liquid whose viscosity is about `guess`, and for a result the liquid at rest before them.
+    fn flows(&self, guess: f64, dt: f64, care: Care) -> Vec<Setting<'static>> {
+        let density = self.liquid.goals.density;
+        // v = ρ a z (D − z)/2η in each half of width D.
+        let half = 0.5 * CHANNEL[2];
+        let mut settings = vec![Setting {
+            title: "two flows",
+            edges: CHANNEL,
+            initial: format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n"),
+            acceleration: 8.0 * guess * VELOCITY / (density * half * half),
+            settle: 8.0 + density * half * half / guess,
+            time: longer(care, TIMES[2]),
+            dt,
+            observe: OF_FLOW,
+        }];
+        if care != Care::Search {
+            settings.insert(0, self.homogeneous(1.0, longer(care, TIMES[2]), dt, OF_MOTION));
+        }
+        settings
+    }
+
+    /// The scenes of [`Runs::flows`].
+    #[cfg(test)]
+    pub fn scenes_of_flows(
+        &self,
+        (fluid, drag): (&Strengths, &Drag),
+        guess: f64,
+        dt: f64,
+        care: Care,
+    ) -> Vec<Scene> {
+        self.model(fluid, drag).unwrap();
+        let scene = |setting: &Setting| {
+            Scene::parse(setting.title, &setting.text(self.seed(care)), self.folder).unwrap()
+        };
+        self.flows(guess, dt, care).iter().map(scene).collect()
+    }
 }
 
 fn longer(care: Care, time: f64) -> f64 {
@@ -199,23 +236,7 @@ impl Instrument for Runs<'_> {
 
     fn flow(&mut self, fluid: &Strengths, drag: &Drag, guess: f64, care: Care) -> Result<Flow, Trouble> {
         let dt = self.dt(&self.model(fluid, drag)?)?;
-        let density = self.liquid.goals.density;
-        // v = ρ a z (D − z)/2η in each half of width D.
-        let half = 0.5 * CHANNEL[2];
-        let mut settings = vec![Setting {
-            title: "two flows",
-            edges: CHANNEL,
-            initial: format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n"),
-            acceleration: 8.0 * guess * VELOCITY / (density * half * half),
-            settle: 8.0 + density * half * half / guess,
-            time: longer(care, TIMES[2]),
-            dt,
-            observe: OF_FLOW,
-        }];
-        if care != Care::Search {
-            settings.insert(0, self.homogeneous(1.0, longer(care, TIMES[2]), dt, OF_MOTION));
-        }
-        let found = self.run(&settings, care)?;
+        let found = self.run(&self.flows(guess, dt, care), care)?;
         let last = &found[found.len() - 1];
         let diffusion = match care {
             Care::Search => Measured::NONE,

@@ -208,3 +208,29 @@ fn plane(trials: &[Trial], best: &Trial, aim: usize, free: &[usize], prior: &[f6
     let found = matrix.lu().solve(&right).unwrap_or(DVector::zeros(n));
     (found[0], found.iter().skip(1).copied().collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two trials that are known well give value and slope, and a third that is known badly changes neither, whatever the theory says.
+    #[test]
+    fn a_plane_goes_through_what_is_known_well() {
+        let trial = |attraction: f64, value: f64, error: f64| {
+            let measured = Measured { value, error };
+            let found =
+                Equilibrium { pressure: measured, stiffness: measured, tension: measured, liquid: measured };
+            Trial { fluid: Strengths { attraction, linear: 0.0, square: 0.5 }, found }
+        };
+        // A step of one size changes the pressure by 3; the theory says 5.
+        let well = [trial(-40.0, 1.0, 1e-3), trial(-39.0, 1.3, 1e-3)];
+        let badly = trial(-30.0, 90.0, 30.0);
+        let (value, slopes) = plane(&well, &well[0], 0, &[0], &[5.0]);
+        assert!((value - 1.0).abs() < 1e-3 && (slopes[0] - 3.0).abs() < 0.1, "{value} {slopes:?}");
+        let (value, slopes) = plane(&[well[0], well[1], badly], &well[0], 0, &[0], &[5.0]);
+        assert!((value - 1.0).abs() < 2e-3 && (slopes[0] - 3.0).abs() < 0.2, "{value} {slopes:?}");
+        // Of a single trial the slope is that of the theory.
+        let (value, slopes) = plane(&well[..1], &well[0], 0, &[0], &[5.0]);
+        assert!((value - 1.0).abs() < 1e-9 && (slopes[0] - 5.0).abs() < 1e-9, "{value} {slopes:?}");
+    }
+}

@@ -200,12 +200,29 @@ mod tests {
     /// quantity of one setting the margin of one race in 20 is 1.96, for a thousand 4.06.
     #[test]
     fn margins_are_those_of_all_looks() {
-        let measured = Measured { value: 0.005, error: 0.001 };
-        let errors = vec![Deviation::new(Class::Energy, "u", measured, 0.005, 0.001)];
+        for off in [0.005, -0.005] {
+            let measured = Measured { value: off, error: 0.001 };
+            let errors = vec![Deviation::new(Class::Energy, "u", measured, off, 0.001)];
+            margins_hold(&errors);
+        }
+        // Energies that are too low are as wrong as those that are too high.
+        let tolerances = ["u=1%".parse().unwrap()];
+        let rule = Rule::new(&tolerances, 1, 1, 1);
+        let of = |off: f64| {
+            let measured = Measured { value: off, error: 0.001 };
+            rule.standing(&[Deviation::new(Class::Energy, "u", measured, off, 0.001)])
+        };
+        assert_eq!(
+            [of(-0.02), of(-0.0101), of(-0.002)],
+            [Standing::Beyond, Standing::Open, Standing::Within]
+        );
+    }
+
+    fn margins_hold(errors: &[Deviation]) {
         let of = |bound: &str, looks: usize| {
             let tolerances = [bound.parse().unwrap()];
             let rule = Rule::new(&tolerances, 1, 1, looks);
-            (rule.standing(&errors), rule.margin())
+            (rule.standing(errors), rule.margin())
         };
         let (standing, one) = of("u=0.71%", 1);
         assert!(standing == Standing::Within && (one - 1.96).abs() < 0.001, "{one}");
@@ -214,6 +231,39 @@ mod tests {
         assert_eq!((of("u=0.1%", 1000).0, of("u=0.09%", 1000).0), (Standing::Open, Standing::Beyond));
         // What is asked for and not measured is not within.
         assert_eq!(of("sigma=1%", 1).0, Standing::Open);
+        let both = ["u=1%".parse().unwrap(), "sigma=1%".parse().unwrap()];
+        assert_eq!(Rule::new(&both, 1, 1, 1).standing(errors), Standing::Open);
+        // More settings and more quantities are as many chances as more looks.
+        let margin = |settings, quantities, looks| Rule::new(&[], settings, quantities, looks).margin();
+        assert!(
+            margin(10, 20, 5) == thousand && margin(1000, 1, 1) == thousand && margin(1, 1000, 1) == thousand
+        );
+    }
+
+    /// A setting that a first look finds beyond its tolerance, and later ones within, stays beyond; one that stops is beyond.
+    #[test]
+    fn a_verdict_stands() {
+        let tolerances = ["u=1%".parse().unwrap()];
+        let rule = Rule::new(&tolerances, 3, 1, 3);
+        let look = |round: &usize| {
+            let error = |off: f64, error: f64| {
+                let measured = Measured { value: off, error };
+                Some(vec![Deviation::new(Class::Energy, "u", measured, off, error)])
+            };
+            match round {
+                0 => vec![error(0.05, 0.001), error(0.005, 0.01), error(0.0, 0.001)],
+                _ => vec![error(0.0, 0.001), error(0.005, 0.01), None],
+            }
+        };
+        let costs = [Some(1.0), Some(2.0), Some(3.0)];
+        let (mut round, mut asked) = (0, Vec::new());
+        let found = race(&mut round, &rule, &costs, 2, look, |round, open, _| {
+            *round += 1;
+            asked.push(open.to_vec());
+            Ok::<bool, ()>(true)
+        });
+        assert_eq!(found, Ok(vec![Standing::Beyond, Standing::Open, Standing::Beyond]));
+        assert_eq!(asked, [[1], [1]]);
     }
 
     #[test]

@@ -389,6 +389,8 @@ fn longer_runs_renew_points_of_their_setting() {
     let physics: Vec<Physics> =
         [2.0, 1.0].map(|multiple| code(Host::Native, multiple).setting.physics).to_vec();
     assert_eq!([0, 1].map(|k| cheapest_of(&points, &physics[k])), [Some(7.0), Some(1.0)]);
+    let on_threads = [9.0, 3.0].map(|cost| Point { cost: Cost::of(&[cost]), ..points[1].clone() });
+    assert_eq!(cheapest_of(&[&points[..], &on_threads].concat(), &physics[0]), Some(3.0));
     let found = |u: f64| fake(Host::Native, 1.0, [u, 0.001], [1.0; 3]).errors;
     let made = Made { quantities: Quantities::default(), samples: 640, time: 32.0 };
     renew(&mut points, &physics, &[Ok(made), Err("too hot".into())], &[Some(found(0.02)), None]);
@@ -411,4 +413,32 @@ fn usual_tolerances_are_those_of_most_native_points() {
     };
     assert_eq!(of([0.002, 0.002, 0.012]), Some(0.01));
     assert_eq!(of([0.002, 0.012, 0.012]), Some(0.05));
+}
+
+/// More time goes to what is open and to the references, to that of dynamics where it is asked for, and to nobody else.
+#[test]
+fn more_time_is_for_what_is_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let tiny = tiny(folder.path());
+    let text = tiny.source.text().replace("box = 4.0", "box = 3.0");
+    let scene = Scene::parse("tiny", &text, folder.path()).unwrap();
+    let origin = Origin::of(&scene, Duration::from_millis(100), NonZeroUsize::MIN).unwrap();
+    let physics = [0.5, 1.0, 0.75].map(|multiple| Physics {
+        integrator: Integrator::VelocityVerlet,
+        multiple,
+        precision: Precision::Double,
+    });
+    let progress = Progress::new();
+    let mut field = Field::begun(&origin, &physics, [Effort::Samples(1); 2], &progress).unwrap();
+    let samples = |field: &Field| -> Vec<u64> {
+        let References { configurations, small_steps } = &field.references;
+        let references = [configurations.as_ref().unwrap().sampled(), small_steps.sampled()];
+        references.into_iter().chain(field.sampled()).map(|made| made.unwrap().samples).collect()
+    };
+    for dynamics in [false, true] {
+        let before = samples(&field);
+        field.sample_on(&[1], 0.05, dynamics, &progress);
+        let grew: Vec<bool> = samples(&field).iter().zip(&before).map(|(a, b)| a > b).collect();
+        assert_eq!(grew, [true, dynamics, false, true, false]);
+    }
 }

@@ -537,6 +537,38 @@ mod tests {
         }
     }
 
+    /// Pairs a billionth of a shell below and above the edge of each shell, in every direction, each alone in its part of the box: their
+    /// shells are known, and single precision does not tell them.
+    #[test]
+    fn pairs_at_edges_are_in_their_shell() {
+        let mut random = StdRng::seed_from_u64(8);
+        let (bins, range) = (16, 1.0);
+        let domain = PeriodicBox::orthogonal([0.3, -7.0, 1.1], [30.0, 31.0, 29.0], [true; 3]).unwrap();
+        let (mut x, mut expected) = (Vec::new(), vec![0; bins]);
+        for place in 0..1000 {
+            let (shell, is_above) = (1 + place / 2 % 15, place % 2 == 1);
+            expected[shell - usize::from(!is_above)] += 1;
+            let r = (shell as f64 + if is_above { 1e-9 } else { -1e-9 }) / bins as f64 * range;
+            let [u, turn]: [f64; 2] =
+                [random.random::<f64>() * 2.0 - 1.0, std::f64::consts::TAU * random.random::<f64>()];
+            let flat = (1.0 - u * u).sqrt();
+            let at = [place % 10, place / 10 % 10, place / 100]
+                .map(|k| 2.9 * k as f64 + random.random::<f64>() * 0.5);
+            x.push(at);
+            x.push([at[0] + r * flat * turn.cos(), at[1] + r * flat * turn.sin(), at[2] + r * u]);
+        }
+        let found = count(
+            &Pool::new(NonZeroUsize::MIN),
+            &x,
+            &vec![0; x.len()],
+            1,
+            &domain,
+            3,
+            Shells { range, bins },
+        );
+        assert_eq!(found, expected);
+    }
+
     #[test]
     fn nothing_makes_no_pairs() {
         let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();

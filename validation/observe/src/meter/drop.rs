@@ -309,6 +309,17 @@ mod tests {
             for k in 0..10 {
                 assert!(drop.shells.push(&row) && drop.size.push(&[f64::from(k), 100.0, 9.0, 0.0]));
             }
+            // A square that is known to 2 % is that of a radius that is known to 1 %.
+            let mut shaking = drop.clone();
+            let squares: Vec<f64> = (0..500).map(|k| 9.0 * (1.0 + 0.3 * f64::from(k * k).sin())).collect();
+            shaking.size = Series::new(4);
+            squares.iter().for_each(|square| assert!(shaking.size.push(&[0.0, 100.0, *square, 0.0])));
+            let (square, found) =
+                (Measured::mean(&squares), shaking.finish()[0].scalar("radius_gyration").unwrap());
+            assert!(
+                (found.error / found.value - 0.5 * square.error / square.value).abs() < 1e-9,
+                "{found:?}"
+            );
             let out = drop.finish();
             let get = |name: &str| out[0].scalar(name).unwrap().value;
             // The equimolar radius of a tanh profile is R up to terms of second order in d/R.

@@ -36,24 +36,24 @@ pub fn peak(name: &str, title: &str, unit: &str, places: &[f64], series: &Series
 mod tests {
     use super::*;
 
-    /// Samples of a parabola of known height and place, on points that are not evenly spaced, each multiplied by a factor whose mean
-    /// is 1: the height has the error of the factor, and the place none.
+    /// Samples of parabolas of known height and place, left and right of their highest point, on points that are not evenly spaced,
+    /// each multiplied by a factor: the height is that of the mean factor with its error, and the place has none.
     #[test]
     fn the_top_of_a_parabola_is_found() {
         let places = [0.0, 0.4, 1.0, 1.5, 2.2, 2.6];
-        let values = places.map(|x: f64| 3.0 - (x - 1.3) * (x - 1.3));
-        let mut series = Series::new(places.len());
-        for k in 0..400 {
-            let factor = 1.0 + if k % 2 == 0 { 0.1 } else { -0.1 };
-            series.push(&values.map(|y| factor * y));
+        let factors: Vec<f64> = (0..400).map(|k| 1.0 + 0.1 * f64::from(k * k).sin()).collect();
+        let factor = Measured::mean(&factors);
+        for top in [0.8, 1.1, 1.3, 1.7] {
+            let values = places.map(|x: f64| 3.0 - (x - top) * (x - top));
+            let mut series = Series::new(places.len());
+            factors.iter().for_each(|factor| assert!(series.push(&values.map(|y| factor * y))));
+            let found = peak("curve_peak", "Peak", "length", &places, &series).unwrap();
+            let [height, place] = ["height", "at"].map(|name| found.scalar(name).unwrap());
+            assert!((height.value - 3.0 * factor.value).abs() < 1e-12, "{top}: {found:?}");
+            assert!((place.value - top).abs() < 1e-12 && place.error < 1e-12, "{top}: {found:?}");
+            let share = height.error / (3.0 * factor.error);
+            assert!((0.7..1.4).contains(&share), "{share}: {found:?}");
         }
-        let found = peak("curve_peak", "Peak", "length", &places, &series).unwrap();
-        let of = |name: &str| found.scalar(name).unwrap();
-        assert!(
-            (of("height").value - 3.0).abs() < 1e-12 && (of("at").value - 1.3).abs() < 1e-12,
-            "{found:?}"
-        );
-        assert!(of("height").error < 0.02 && of("at").error < 1e-12, "{found:?}");
         let mut rising = Series::new(places.len());
         (0..20).for_each(|_| assert!(rising.push(&places)));
         assert!(peak("curve_peak", "Peak", "length", &places, &rising).is_none());

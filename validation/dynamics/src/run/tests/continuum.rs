@@ -183,6 +183,145 @@ fn walls_take_the_momentum_that_the_fluid_loses() {
     }
 }
 
+/// A particle of the heavier species, so slow that it stays and so cold that there is no noise, loses `m v (1 − exp(−ζΔt/m))` of its momentum
+/// in each step. The virial of that force along the line to the face is in the pressure and in the recorded drag, and the wall has
+/// taken the momentum.
+#[test]
+fn friction_of_a_wall_is_in_the_pressure() {
+    let (mass, dt, z) = (3.0, 0.3, 0.2);
+    for high in [false, true] {
+        let wall = Wall {
+            axis: 1,
+            high,
+            species: 0,
+            density: 3.0,
+            local_densities: Vec::new(),
+            velocity: [0.0; 3],
+            drag: [Some(20.0), Some(1.0)],
+        };
+        let text = "title = \"g\"\nspecies = [\"A\", \"B\"]\n";
+        let model = Model::parse("m.toml", text).unwrap().with_walls(vec![wall]);
+        let y = if high { 7.0 - z } else { 2.0 + z };
+        let start = [3e-15, -1e-15, 2e-15];
+        let state = State {
+            domain: PeriodicBox::orthogonal([0.0, 2.0, 0.0], [4.0, 5.0, 6.0], [true, false, true]).unwrap(),
+            mass: vec![1.0, mass],
+            x: vec![[1.0, y, 1.0]],
+            v: vec![start],
+            species: vec![1],
+            tag: vec![1],
+            image: vec![[0; 3]],
+        };
+        for name in ["velocity-verlet", "baoab", "aboba", "force-gradient"] {
+            let integrator = Integrator::ALL.iter().find(|(other, _)| *other == name).unwrap().1;
+            let mut run = Simulation::new(&model, 1e-60, state.clone(), 7).unwrap();
+            run.record_flux(Recorded::Lines);
+            run.prepare_for(integrator, dt, Want::TOTALS).unwrap();
+            let friction = run.engine().plan().walls()[0].fields[1].friction.clone().unwrap();
+            let [along, across] = friction.at(z);
+            let zeta = [along, across, along];
+            for step in 0..3 {
+                run.step(dt, integrator, Want::TOTALS).unwrap();
+                let force: [f64; 3] = std::array::from_fn(|c| {
+                    let before = start[c] * (-zeta[c] * dt / mass * f64::from(step)).exp();
+                    -mass * before * (1.0 - (-zeta[c] * dt / mass).exp()) / dt
+                });
+                let d = [0.0, if high { -z } else { z }, 0.0];
+                let (total, rest) = (run.pressure_tensor(), run.conservative_pressure_tensor());
+                let flux = run.flux().unwrap();
+                let drag = psidpd_observe::flux::Flux { drag: flux.drag.clone(), ..Default::default() }.sum();
+                for (c, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                    let expected = 0.5 * (d[a] * force[b] + d[b] * force[a]);
+                    for found in [120.0 * (total[c] - rest[c]), drag[c]] {
+                        assert!((found - expected).abs() < 1e-8 * 1e-15, "{name} {c}: {found} {expected}");
+                    }
+                }
+                for (found, force) in flux.on_walls(1)[0].into_iter().zip(force) {
+                    assert!((found + force).abs() < 1e-8 * 1e-15, "{name}: {found} {force}");
+                }
+            }
+        }
+    }
+}
+
+/// Soft particles of two species, between walls of the second that move.
+const PAIRS: &str = "title = \"p\"\nspecies = [\"A\", \"B\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 15\n\
+     range = 1\n[[pair]]\nbetween = [\"A\", \"B\"]\nform = \"soft\"\nstrength = 25\nrange = 1\n[[pair]]\nbetween = [\"B\", \"B\"]\n\
+     form = \"soft\"\nstrength = 20\nrange = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
+
+/// The meter's forces per area, times area and time, are the momentum that the fluid loses, to rounding, as a step of ABOBA has one kick: of masses
+/// 1 and 3 at kT = 0.7, in space and in the plane, on areas of which no two are alike.
+#[test]
+fn the_meter_of_walls_has_the_momentum_that_the_fluid_loses() {
+    for (model, lengths, boundary, faces, area) in [
+        (
+            PAIRS.to_owned(),
+            "[3.0, 4.0, 5.0]",
+            "\"periodic\", \"periodic\", \"reflecting\"",
+            ["zlo", "zhi"],
+            12.0,
+        ),
+        (
+            PAIRS.to_owned(),
+            "[3.0, 4.0, 5.0]",
+            "\"reflecting\", \"periodic\", \"periodic\"",
+            ["xlo", "xhi"],
+            20.0,
+        ),
+        (
+            format!("dimensions = 2\n{PAIRS}"),
+            "[6.0, 7.0]",
+            "\"periodic\", \"reflecting\"",
+            ["ylo", "yhi"],
+            6.0,
+        ),
+        (
+            format!("dimensions = 2\n{PAIRS}"),
+            "[6.0, 7.0]",
+            "\"reflecting\", \"periodic\"",
+            ["xlo", "xhi"],
+            7.0,
+        ),
+    ] {
+        let dimensions = if model.starts_with("dim") { 2 } else { 3 };
+        let [low, high] = faces;
+        let velocity = ["0.0", "0.4", "-0.3"].map(|v| if low.starts_with('x') { v } else { "0.0" });
+        let velocity = if low == "zlo" { ["0.4", "-0.3", "0.0"] } else { velocity };
+        let velocity = if low == "ylo" { ["0.4", "0.0", "0.0"] } else { velocity };
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 0.7\nseed = 5\ndensity = 3.0\n[masses]\nB = 3.0\n\
+             [box]\nlengths = {lengths}\nboundary = [{boundary}]\n\
+             [[wall]]\nkind = \"continuum\"\nspecies = \"B\"\nfaces = [\"{low}\"]\ndensity = 2.0\ndrag = 9.0\n\
+             [[wall]]\nkind = \"continuum\"\nspecies = \"B\"\nfaces = [\"{high}\"]\nvelocity = [{}]\n\
+             [[stage]]\nname = \"run\"\nsteps = 60\ndt = 0.01\nintegrator = \"aboba\"\n\
+             [observe]\nevery = 1\nwall_force = true\n",
+            velocity[..dimensions].join(", ")
+        );
+        let scene = support::scene(&model, &text).unwrap();
+        let stage = &scene.stages[0];
+        let mut run = scene.simulation(scene.initial_state()).unwrap();
+        scene.enter(stage, &mut run).unwrap();
+        run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
+        run.record_flux(Recorded::Sum);
+        let mut observers = psidpd_observe::Observers::new(&scene.observe, ["run"]);
+        let first = momentum(&run);
+        for _ in 0..60 {
+            run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+            observers.sample(run.view(0.0), "run");
+        }
+        let out = observers.finish();
+        let last = momentum(&run);
+        for (c, axis) in ["x", "y", "z"].into_iter().enumerate().take(dimensions) {
+            let on = |face: &str| out[0].scalar(&format!("{face}_{axis}")).unwrap().value;
+            let taken = (on(low) + on(high)) * area * 0.6;
+            let lost = first[c] - last[c];
+            assert!((taken - lost).abs() < 1e-9 && lost.abs() > 1e-3, "{low} {axis}: {taken} {lost}");
+            // Fluids push walls apart.
+            assert!(!low.starts_with(axis) || on(low) < -1.0 && on(high) > 1.0, "{low} {axis}");
+        }
+    }
+}
+
 /// The configurational temperature of a particle in front of a wall is that of Boltzmann's distribution, an integral over its height.
 #[test]
 fn the_configurational_temperature_knows_walls() {
@@ -290,6 +429,23 @@ fn walls_are_read_and_refused() {
     let surplus = SURPLUS[0] + SURPLUS[1] * (3.0f64 / 0.8).powi(2);
     assert!((friction.slip(0.8, 3.0, 1.0) + surplus).abs() < 1e-9 && drag > 1.0, "{drag}");
     assert_eq!(faces(&fluid.walls, &read.domain, 3).len(), 2);
+    // The range of the drag is that of the wall, local densities are those that are stated, and matter is as dense as what moves.
+    let own = scene("faces = [\"zlo\"]\nspecies = \"B\"\ndrag = 7.0\ndrag_range = 0.6").unwrap();
+    let walls = own.model.at(1.0).unwrap().walls;
+    let frictions: Vec<_> = walls[0].fields.iter().map(|field| field.friction.as_ref().unwrap()).collect();
+    assert!(frictions.iter().all(|friction| friction.range() == 0.6));
+    // At the face the trace of ζ is ρ γ 2π R³/30.
+    let trace = |z: f64| 2.0 * frictions[0].at(z)[0] + frictions[0].at(z)[1];
+    let expected = 3.0 * 7.0 * std::f64::consts::PI * 0.6f64.powi(3) / 15.0;
+    assert!((trace(0.0) / expected - 1.0).abs() < 1e-6, "{} {expected}", trace(0.0));
+    assert_eq!(between(STAGE).model.walls()[0].local_densities, [2.3]);
+    let parts = "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 40.0\nfrozen = true\n\
+                 [[part]]\nshape = \"rest\"\ndensity = 4.0\n";
+    let text = format!(
+        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nsteps = 3\n{BOX}{parts}[[wall]]\nkind = \"continuum\"\nfaces = [\"zhi\"]\n"
+    );
+    let beside = support::scene(IDEAL, &text).unwrap();
+    assert!((beside.model.walls()[0].density - 4.0).abs() < 1e-9, "{}", beside.model.walls()[0].density);
     // A wall without drag is smooth.
     let smooth = scene("faces = [\"zlo\"]\nspecies = \"B\"\ndrag = 0.0").unwrap();
     let fields = smooth.model.at(1.0).unwrap().walls[0].fields.clone();
