@@ -196,6 +196,7 @@ fn friction_of_a_wall_is_in_the_pressure() {
             species: 0,
             density: 3.0,
             local_densities: Vec::new(),
+            strength: 1.0,
             velocity: [0.0; 3],
             drag: [Some(20.0), Some(1.0)],
         };
