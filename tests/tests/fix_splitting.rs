@@ -235,6 +235,32 @@ fn the_drag_of_a_pair_is_that_of_the_formula() {
     }
 }
 
+/// 1 728 pairs at rest, half a range apart along x and too far from others to see them: a short step gives each atom the velocity
+/// √(2γkTΔt) w_R ξ/m, whose fourth moment over the square of its second is 3 if ξ is normal and 1.8 if it is uniform. Their standard
+/// errors are √(24/1728) = 0.12 and below 0.03, that of the second moment √(2/1728), 3.4 %; all bounds are five of them.
+#[test]
+fn the_noise_of_a_pair_has_the_distribution_of_its_name() {
+    let (_folder, path) = file("title = \"pair\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n");
+    for (noise, fourth, off) in [("", 3.0, 0.6), ("noise gaussian", 3.0, 0.6), ("noise uniform", 1.8, 0.15)] {
+        let script = format!(
+            "units lj\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\n\
+             lattice custom 0.25 a1 2 0 0 a2 0 2 0 a3 0 0 2 basis 0.25 0.25 0.25 basis 0.5 0.25 0.25\n\
+             region b block 0 12 0 12 0 12\ncreate_box 1 b\ncreate_atoms 1 box\nmass 1 2\n{}\
+             pair_style dpd/psi 0.7 {SEED}\npair_coeff * * \"{path}\" A\n\
+             fix 1 all dpd/splitting two-stage {noise}\ntimestep 1e-4\nrun 1\n",
+            load()
+        );
+        let end = run(&script, 1);
+        assert_eq!(end.v.len(), 2 * 1728);
+        let mean = |power: i32| end.v.iter().map(|v| v[0].powi(power)).sum::<f64>() / end.v.len() as f64;
+        let second = 2.0 * 6.0 * 0.7 * 1e-4 * 0.25 / 4.0;
+        assert!((mean(2) / second - 1.0).abs() < 0.17, "{noise}: {} {second}", mean(2));
+        let found = mean(4) / mean(2).powi(2);
+        assert!((found - fourth).abs() < off, "{noise}: {found}");
+        assert!(end.v.iter().all(|v| v[1].abs().max(v[2].abs()) < 1e-12), "{noise}");
+    }
+}
+
 /// A liquid with large displacements takes the same steps on any ranks.
 #[test]
 fn displaced_atoms_find_their_ghosts() {

@@ -184,23 +184,31 @@ impl Scene {
         self.precision.unwrap_or_default()
     }
 
-    /// Number densities of the species in every part that is not frozen. Several such parts with more than
-    /// one species add the densities of all parts mixed; without them the list is empty.
+    fn moving_parts(&self) -> Vec<&Part> {
+        self.initial.parts().iter().filter(|part| !part.frozen && part.count > 0).collect()
+    }
+
+    /// Number densities of the species in every part that is not frozen; none for a start from a file.
+    pub fn densities_of_parts(&self) -> Vec<Vec<f64>> {
+        let of = |part: &Part| {
+            let volume = part.shape.volume(self.model.dimensions());
+            part.composition.share(part.count).into_iter().map(|n| n as f64 / volume).collect()
+        };
+        self.moving_parts().into_iter().map(of).collect()
+    }
+
+    /// The mixtures that a scene of several species may come to: each of several parts, and the last all parts mixed. Without several
+    /// parts or species the list is empty.
     pub fn mixtures(&self) -> Vec<Vec<f64>> {
-        let dimensions = self.model.dimensions();
-        let parts: Vec<_> = self.initial.parts().iter().filter(|p| !p.frozen && p.count > 0).collect();
-        let species = self.model.species().len();
-        if species < 2 || parts.len() < 2 {
+        let (species, mut all) = (self.model.species().len(), self.densities_of_parts());
+        if species < 2 || all.len() < 2 {
             return Vec::new();
         }
         let (mut counts, mut volume) = (vec![0.0; species], 0.0);
-        let mut all: Vec<Vec<f64>> = Vec::new();
-        for part in parts {
-            let here = part.shape.volume(dimensions);
+        for part in self.moving_parts() {
             let share = part.composition.share(part.count);
             counts.iter_mut().zip(&share).for_each(|(sum, n)| *sum += *n as f64);
-            volume += here;
-            all.push(share.into_iter().map(|n| n as f64 / here).collect());
+            volume += part.shape.volume(self.model.dimensions());
         }
         all.push(counts.into_iter().map(|n| n / volume).collect());
         all

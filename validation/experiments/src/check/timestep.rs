@@ -229,10 +229,10 @@ const TOO_DENSE: f64 = 1.1;
 /// The densities of the species in the parts of a scene, and of the liquid that a thinner start condenses to.
 fn compositions(scene: &Scene, kt: f64) -> Result<Vec<Vec<f64>>, RunError> {
     let densities = scene.densities();
-    let mut parts = scene.mixtures();
-    // The last is the mean of the whole box.
-    parts.pop();
+    let mut parts = scene.densities_of_parts();
     parts.retain(|rho| *rho != densities);
+    let total = |rho: &[f64]| rho.iter().sum::<f64>();
+    parts.sort_by(|a, b| total(b).total_cmp(&total(a)));
     let mut all = vec![densities];
     all.append(&mut parts);
     all.truncate(PIECES);

@@ -192,4 +192,26 @@ mod tests {
             }
         }
     }
+
+    /// ψ = 3n is a pair energy of 2 · 3 w(r), with w = 15/(2π)(1 − r)², beside φ = 5(1 − r)²; the table has r times their sum.
+    #[test]
+    fn a_linear_excess_free_energy_is_a_pair_energy_of_the_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Grid { spacing: 0.01, largest_density: 40.0, densities: 41 };
+        let text = "title = 't'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\n[excess_free_energy]\nF = '3*n'\n\
+                    [[pair]]\nbetween = ['F', 'F']\nform = 'soft'\nstrength = 10\nrange = 1\n";
+        let fluid = Model::parse("m.toml", text).unwrap().at(1.0).unwrap();
+        let path = folder.path().join("t.eam.alloy");
+        write(&fluid, &[1.0], grid, &path, Existing::Replace).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let values: Vec<f64> =
+            text.lines().skip(6).flat_map(str::split_whitespace).map(|x| x.parse().unwrap()).collect();
+        let pairs = &values[values.len() - (values.len() - 41) / 2..];
+        for k in [1usize, 20, 50, 99, 100, 103] {
+            let r = 0.01 * k as f64;
+            let square = (1.0 - r).max(0.0).powi(2);
+            let expected = r * (6.0 * 15.0 / (2.0 * PI) + 5.0) * square;
+            assert!((pairs[k] - expected).abs() < 1e-9, "{r}: {} {expected}", pairs[k]);
+        }
+    }
 }

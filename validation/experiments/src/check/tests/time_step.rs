@@ -124,6 +124,10 @@ fn the_stiffest_part_decides() {
         is_near(parts.frequency, dense.frequency, 0.03) && is_near(parts.drag, dense.drag, 0.05),
         "{parts:?} {dense:?}"
     );
+    // A thin layer in a fluid of more particles counts as well.
+    let thin = slab(8.0).replace("thickness = 5.0", "thickness = 1.0");
+    let layer = of(SOFT, &(thin + &part("rest", 2.0)));
+    assert!(is_near(layer.frequency, dense.frequency, 0.03), "{layer:?} {dense:?}");
     // κ of Warren's liquid is 22.5; theory's liquid is up to 8 % denser, and a thin start that has not condensed has a fifth less.
     let thin = of(SET6, "density = 2.0\n");
     assert!(is_near(thin.drag, 22.5, 0.12), "{thin:?}");
