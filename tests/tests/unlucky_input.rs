@@ -309,12 +309,18 @@ fn a_full_standard_output_is_an_error_of_every_verb() {
     for verb in verbs() {
         let tried = lines.iter().any(|line| line.split(' ').next() == Some(&verb)) || verb == "lammps";
         assert!(tried != long.contains(&verb.as_str()), "{verb}");
-        let source = psidpd_tests::root().join("validation/src/cli").join(match verb.as_str() {
-            "completions" | "man" => "shell.rs".to_owned(),
-            verb => format!("{verb}.rs"),
-        });
-        let text = std::fs::read_to_string(&source).unwrap().replace("eprintln!(", "");
-        assert!(!text.contains("println!(") && !text.contains("print!("), "{}", source.display());
+        let folder = psidpd_tests::root().join("validation/src/cli");
+        let sources = match verb.as_str() {
+            "completions" | "man" => vec![folder.join("shell.rs")],
+            verb if folder.join(verb).is_dir() => {
+                folder.join(verb).read_dir().unwrap().map(|entry| entry.unwrap().path()).collect()
+            }
+            verb => vec![folder.join(format!("{verb}.rs"))],
+        };
+        for source in sources {
+            let text = std::fs::read_to_string(&source).unwrap().replace("eprintln!(", "");
+            assert!(!text.contains("println!(") && !text.contains("print!("), "{}", source.display());
+        }
     }
 }
 

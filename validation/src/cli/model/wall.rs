@@ -8,16 +8,16 @@ pub struct OfWall {
     /// The model file of the liquid, of one species.
     model: PathBuf,
     /// The contact angle, through the liquid.
-    #[arg(long, value_name = "DEGREES", value_parser = angle)]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
     contact_angle: f64,
     /// kT.
     #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true, value_parser = temperature)]
     kt: f64,
     /// About the number density of the liquid beside its vapour; that of theory if left out.
-    #[arg(long, value_name = "RHO", value_parser = positive)]
+    #[arg(long, value_name = "RHO", allow_negative_numbers = true, value_parser = positive)]
     density: Option<f64>,
     /// The viscosity of the liquid, so that it does not slip on the wall of the scene that is written.
-    #[arg(long, value_name = "ETA", value_parser = positive)]
+    #[arg(long, value_name = "ETA", allow_negative_numbers = true, value_parser = positive)]
     viscosity: Option<f64>,
     /// Write the scene even if the angle is not met.
     #[arg(long)]
