@@ -197,25 +197,30 @@ struct Sample {
 
 const DENSER: f64 = 1.04;
 
-/// The fluid of a scene where its particles are fastest.
+fn total(densities: &[f64]) -> f64 {
+    densities.iter().sum()
+}
+
+/// The fluid of a scene where its particles are fastest; why there is none, if a denser part cannot be tried.
 fn sampled(scene: &Scene, kt: f64) -> Result<Result<Sample, NoPiece>, RunError> {
-    let mut fastest: Result<(Piece, Vec<f64>), NoPiece> = Err(NoPiece::Empty);
+    let mut fastest: Option<(Piece, Vec<f64>)> = None;
+    let mut unknown = (0.0, NoPiece::Empty);
     for densities in compositions(scene, kt)? {
         match (settled(scene, kt, &densities)?, &fastest) {
-            (Ok(piece), Ok((other, _))) if piece.frequency <= other.frequency => {}
-            (Ok(piece), _) => fastest = Ok((piece, densities)),
-            (Err(why), Err(_)) => fastest = Err(why),
-            (Err(_), Ok(_)) => {}
+            (Ok(piece), Some((other, _))) if piece.frequency <= other.frequency => {}
+            (Ok(piece), _) => fastest = Some((piece, densities)),
+            (Err(why), _) if total(&densities) >= unknown.0 => unknown = (total(&densities), why),
+            (Err(_), _) => {}
         }
     }
     let (piece, densities) = match fastest {
-        Ok(fastest) => fastest,
-        Err(why) => return Ok(Err(why)),
+        Some((piece, densities)) if total(&densities) >= unknown.0 => (piece, densities),
+        _ => return Ok(Err(unknown.1)),
     };
-    let total: f64 = densities.iter().sum();
     let denser: Vec<f64> = densities.iter().map(|rho| DENSER * rho).collect();
     let compressed = settled(scene, kt, &denser)?.ok().map(|piece| piece.pressure);
-    let resistance = compressed.map(|compressed| (compressed - piece.pressure) / ((DENSER - 1.0) * total));
+    let resistance =
+        compressed.map(|compressed| (compressed - piece.pressure) / ((DENSER - 1.0) * total(&densities)));
     Ok(Ok(Sample { piece, resistance: resistance.filter(|resistance| *resistance > 0.0) }))
 }
 
@@ -230,8 +235,8 @@ const TOO_DENSE: f64 = 1.1;
 fn compositions(scene: &Scene, kt: f64) -> Result<Vec<Vec<f64>>, RunError> {
     let densities = scene.densities();
     let mut parts = scene.densities_of_parts();
-    parts.retain(|rho| *rho != densities);
-    let total = |rho: &[f64]| rho.iter().sum::<f64>();
+    // Of one species a thinner part is never stiffer.
+    parts.retain(|rho| *rho != densities && (rho.len() > 1 || total(rho) > 1.02 * total(&densities)));
     parts.sort_by(|a, b| total(b).total_cmp(&total(a)));
     let mut all = vec![densities];
     all.append(&mut parts);

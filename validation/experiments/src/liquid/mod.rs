@@ -25,6 +25,7 @@ pub use error::{LiquidError, Refusal};
 pub use fluid::{Drag, Strengths};
 pub use instrument::{Care, Equilibrium, Flow, Instrument, Trouble};
 pub use numbers::{Number, Properties, Scales};
+pub(crate) use runs::stopped;
 pub use search::Trial;
 pub use sheet::{ENTRIES, Entries, Entry, Goals, Liquid, TOLERANCE, Tolerance};
 

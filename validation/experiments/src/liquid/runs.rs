@@ -188,7 +188,7 @@ fn longer(care: Care, time: f64) -> f64 {
 }
 
 /// A run that stops says something of the fluid; another error does not.
-fn stopped(error: RunError) -> Trouble {
+pub fn stopped(error: RunError) -> Trouble {
     if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
 }
 

@@ -86,7 +86,6 @@ trait Instrument {
 /// A wall, and what was found of it.
 #[derive(Debug, Serialize)]
 pub struct Found {
-    pub kt: f64,
     pub wanted: f64,
     pub knob: Knob,
     /// The free number: a factor of the pair potentials, or the density of the matter.
@@ -101,14 +100,13 @@ pub struct Found {
     pub refusal: Option<String>,
     pub good: bool,
     /// The liquid in units of its model, and the step of the runs.
-    #[serde(skip)]
     pub units: Units,
 }
 
 impl Found {
-    /// Whether an angle is the wanted one, within the tolerance and its error.
+    /// Whether an angle is the wanted one, within the tolerance and a standard error that is no larger.
     pub fn meets(&self, angle: Measured) -> bool {
-        (angle.value - self.wanted).abs() <= TOLERANCE + angle.error
+        angle.error <= TOLERANCE && (angle.value - self.wanted).abs() <= TOLERANCE + angle.error
     }
 }
 
@@ -142,7 +140,8 @@ fn wall_by(
         Ok(slab) if slab.tension.value > 0.0 => slab,
         Ok(slab) => {
             let why = format!(
-                "the slab has a tension of {:.2}: it is no liquid beside its vapour",
+                "the slab has a tension of {:.2}: it is no liquid beside its vapour; lower kT, or give the density of the liquid, \
+                 --density",
                 slab.tension.value
             );
             return Err(conditions(why));
@@ -155,7 +154,6 @@ fn wall_by(
         slab.density.value, slab.density.error, slab.tension.value, slab.tension.error
     ));
     let mut found = Found {
-        kt: sought.kt,
         wanted: sought.angle,
         knob,
         value: f64::NAN,

@@ -4,7 +4,7 @@ use super::scene::{FILM, HEIGHT, Setting, Units, wall};
 use super::search::{Knob, rounded};
 use super::{Film, Instrument, Slab, Sought, conditions};
 use crate::bulk::Observed;
-use crate::liquid::Trouble;
+use crate::liquid::{Trouble, stopped};
 use crate::{ExperimentError, jobs, steps};
 use psidpd_core::model::Fluid;
 use psidpd_core::theory::MeanField;
@@ -61,9 +61,7 @@ impl<'a> Runs<'a> {
             Observed::read(&folder)
         };
         let all = jobs::each(settings.iter().enumerate().collect(), run);
-        all.into_iter().collect::<Result<_, _>>().map_err(|error| {
-            if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
-        })
+        all.into_iter().collect::<Result<_, _>>().map_err(stopped)
     }
 
     /// The free number of a share of what the liquid has.
@@ -126,9 +124,11 @@ pub fn split(
     let touches = low.max(high) > 0.75 * of_liquid;
     // From the wall with the film to its middle, beside the density there.
     let up = |z: f64| if low >= high { z } else { height - z };
-    let bulk: Vec<f64> =
-        ideal.iter().filter(|(z, _)| (0.4..0.6).contains(&(up(*z) / film))).map(|(_, p)| p.value).collect();
-    let bulk = bulk.iter().sum::<f64>() / bulk.len().max(1) as f64;
+    let bulk = if low >= high {
+        mean(0.4 * film, 0.6 * film)
+    } else {
+        mean(height - 0.6 * film, height - 0.4 * film)
+    };
     let missing =
         ideal.iter().filter(|(z, _)| up(*z) < 0.5 * film).map(|(_, p)| 1.0 - p.value / bulk).sum::<f64>();
     let surface = missing * height / ideal.len().max(1) as f64;

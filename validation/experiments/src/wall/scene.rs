@@ -1,10 +1,11 @@
 //! The scenes that measure: a slab of the liquid, a film on a wall, and a ridge, which is what is written. Lengths are in ranges of the
 //! forces, times in thermal units r √(m/kT).
 
+use super::Found;
 use super::ridge::ridge;
 use super::search::{Knob, rounded};
-use super::{Found, Sought};
 use crate::steps::{FIRST, STEP};
+use serde::Serialize;
 use std::fmt::Write;
 
 /// Edges of a film along its wall, its thickness, and the height of the box, in which the vapour has at least as much.
@@ -21,7 +22,7 @@ const SPREAD: f64 = 150.0;
 const RIDGE: f64 = 350.0;
 
 /// The liquid in units of its model, and the step that it is moved with.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Units {
     pub kt: f64,
     /// The range of the forces.
@@ -144,12 +145,7 @@ impl Found {
     }
 
     /// The scene of the ridge, with a model of this name; `command` goes into its comment. `None` if no wall was found.
-    pub fn scene(
-        &self,
-        sought: &Sought,
-        (model, viscosity): (&str, Option<f64>),
-        command: &str,
-    ) -> Option<String> {
+    pub fn scene(&self, (model, viscosity): (&str, Option<f64>), seed: u64, command: &str) -> Option<String> {
         let lines = self.lines("\"zlo\"", viscosity)?;
         let mut head = format!(
             "# By\n#   {command}\n# By three tensions the contact angle is {:.1}({:.1}), by the shape of this ridge {:.1}({:.1}) degrees.\n",
@@ -160,6 +156,6 @@ impl Found {
         }
         let surface = self.film.map_or(0.0, |film| film.surface);
         let ridge = Setting::ridge(self.wanted, surface, lines, &self.units);
-        Some(head + &ridge.text(model, &self.units, sought.seed))
+        Some(head + &ridge.text(model, &self.units, seed))
     }
 }

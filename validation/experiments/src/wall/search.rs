@@ -217,27 +217,20 @@ fn next(trials: &[Trial], goal: f64, tolerance: f64, [least, most]: [f64; 2]) ->
 /// The share at which the straight line through the films near the goal has it, and the standard error of the line there; `None` unless
 /// there are films on both sides.
 fn line(trials: &[Trial], goal: f64) -> Option<(f64, f64)> {
-    let near: Vec<(f64, Measured)> = trials
+    let near: Vec<[f64; 3]> = trials
         .iter()
         .filter_map(|t| {
             let cosine = t.cosine.filter(|c| (c.value - goal).abs() <= NEAR)?;
             let error = cosine.error.hypot(CURVED * (cosine.value - goal).powi(2));
-            Some((t.share, Measured { error, ..cosine }))
+            Some([t.share, cosine.value, 1.0 / (error * error).max(1e-12)])
         })
         .collect();
-    let (weight, mean) = near.iter().fold((0.0, [0.0; 2]), |(sum, [x, y]), (share, cosine)| {
-        let w = 1.0 / (cosine.error * cosine.error).max(1e-12);
-        (sum + w, [x + w * share, y + w * cosine.value])
-    });
-    let [x0, y0] = mean.map(|sum| sum / weight);
-    let (mut xx, mut xy) = (0.0, 0.0);
-    for (share, cosine) in &near {
-        let w = 1.0 / (cosine.error * cosine.error).max(1e-12);
-        xx += w * (share - x0) * (share - x0);
-        xy += w * (share - x0) * (cosine.value - y0);
-    }
-    let slope = xy / xx;
-    let both = [true, false].iter().all(|side| near.iter().any(|(_, c)| (c.value < goal) == *side));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| near.iter().map(|[x, y, w]| w * of(*x, *y)).sum::<f64>();
+    let weight = sum(&|_, _| 1.0);
+    let [x0, y0] = [sum(&|x, _| x) / weight, sum(&|_, y| y) / weight];
+    let xx = sum(&|x, _| (x - x0) * (x - x0));
+    let slope = sum(&|x, y| (x - x0) * (y - y0)) / xx;
+    let both = [true, false].iter().all(|side| near.iter().any(|[_, y, _]| (*y < goal) == *side));
     if !(both && slope > 0.0 && slope.is_finite()) {
         return None;
     }

@@ -117,6 +117,10 @@ fn a_ridge_of_another_shape_is_a_miss() {
     let found = of(&mut known, 70.0);
     assert!(!found.good && found.refusal.is_some());
     assert!(found.meets(found.young) && !found.meets(found.ridge));
+    // An angle that is hardly known meets nothing.
+    let at = |value: f64, error: f64| found.meets(Measured { value, error });
+    assert_eq!([at(70.0, 2.9), at(70.0, 3.1), at(75.5, 2.9), at(76.1, 2.9)], [true, false, true, false]);
+    assert!(!found.meets(Measured::NONE));
 }
 
 #[test]
@@ -213,7 +217,7 @@ fn scenes_have_the_wall() {
         let found = Found { wanted, value: 0.8, ..of(&mut Known::new(CURVES[0], 1), 90.0) };
         let found = Found { units, ..found };
         let found = Found { film: Some(Film { surface: 0.21, ..known_film() }), ..found };
-        let text = found.scene(&sought(wanted), ("m.toml", Some(7.0)), "psidpd model wall m.toml").unwrap();
+        let text = found.scene(("m.toml", Some(7.0)), 3, "psidpd model wall m.toml").unwrap();
         let scene = Scene::parse("s.toml", &text, folder.path()).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
         let fluid = scene.model.at(0.7).unwrap();
         assert_eq!((fluid.walls.len(), fluid.walls[0].wall.strength), (1, 0.8));

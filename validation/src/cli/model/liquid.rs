@@ -11,15 +11,8 @@ pub struct OfLiquid {
     /// A TOML file with these numbers, as sound_speed = 1497.0; options replace them.
     #[arg(long, value_name = "FILE")]
     data: Option<PathBuf>,
-    /// Write the model even if a number is not met.
-    #[arg(long)]
-    anyway: bool,
-    /// Seed of the runs.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Where the model file goes.
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[command(flatten)]
+    search: Search,
 }
 
 #[derive(Debug, clap::Args)]
@@ -97,23 +90,16 @@ impl Numbers {
 
 impl OfLiquid {
     pub fn files(&self) -> Files {
-        Files::reads(&self.data).writes([self.out.clone()])
+        Files::reads(&self.data).writes([self.search.out.clone()])
     }
 }
 
 pub fn run(a: &OfLiquid, told: Told) -> Result<Verdict, Failure> {
     let liquid = Liquid::new(&a.name, &entries(a)?).map_err(ExperimentError::from)?;
     say_wanted(&liquid);
-    let found = model(&liquid, a.seed, &command(a), &mut |line| say!("{line}"))?;
+    let found = model(&liquid, a.search.seed, &command(a), &mut |line| say!("{line}"))?;
     print(&found);
-    match &found.text {
-        Some(text) if found.good || a.anyway => {
-            write_bytes(&a.out, told.existing, text.as_bytes())?;
-            say!("written to {}", a.out.display());
-        }
-        Some(_) => say!("nothing is written, as not all numbers are met: --anyway writes this model"),
-        None => say!("nothing is written: there is no model"),
-    }
+    a.search.write(told, found.text.as_deref(), found.good)?;
     conclude(told, &found, found.good)
 }
 
@@ -193,5 +179,5 @@ fn command(a: &OfLiquid) -> String {
     if let Some(data) = &a.data {
         text += &format!(" --data {}", file_name(data));
     }
-    text + &format!(" --seed {} --out {}", a.seed, file_name(&a.out))
+    text + &a.search.command()
 }

@@ -40,6 +40,40 @@ pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
     }
 }
 
+/// Where what is found goes, and from which seed it is sought.
+#[derive(Debug, clap::Args)]
+pub struct Search {
+    /// Write the file even if not all is met.
+    #[arg(long)]
+    anyway: bool,
+    /// Seed of the runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where the file goes.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+impl Search {
+    /// Writes what was found, if it is good or asked for.
+    fn write(&self, told: Told, text: Option<&str>, good: bool) -> Result<(), Failure> {
+        match text {
+            Some(text) if good || self.anyway => {
+                write_bytes(&self.out, told.existing, text.as_bytes())?;
+                say!("written to {}", self.out.display());
+            }
+            Some(_) => say!("nothing is written, as not all is met: --anyway writes the file"),
+            None => say!("nothing is written: nothing was found"),
+        }
+        Ok(())
+    }
+
+    /// The end of the command that repeats the search.
+    fn command(&self) -> String {
+        format!(" --seed {} --out {}", self.seed, file_name(&self.out))
+    }
+}
+
 /// The last part of a path, for the command in the head of a file.
 fn file_name(path: &Path) -> String {
     path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())

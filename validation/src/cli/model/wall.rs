@@ -8,7 +8,7 @@ pub struct OfWall {
     /// The model file of the liquid, of one species.
     model: PathBuf,
     /// The contact angle, through the liquid.
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     contact_angle: f64,
     /// kT.
     #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true, value_parser = temperature)]
@@ -19,20 +19,13 @@ pub struct OfWall {
     /// The viscosity of the liquid, so that it does not slip on the wall of the scene that is written.
     #[arg(long, value_name = "ETA", allow_negative_numbers = true, value_parser = positive)]
     viscosity: Option<f64>,
-    /// Write the scene even if the angle is not met.
-    #[arg(long)]
-    anyway: bool,
-    /// Seed of the runs.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Where the scene of a ridge on this wall goes.
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[command(flatten)]
+    search: Search,
 }
 
 impl OfWall {
     pub fn files(&self) -> Files {
-        Files::reads([&self.model]).writes([self.out.clone()])
+        Files::reads([&self.model]).writes([self.search.out.clone()])
     }
 }
 
@@ -43,12 +36,6 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above 0".into())
 }
 
-fn angle(text: &str) -> Result<f64, String> {
-    let [least, most] = psidpd_experiments::wall::ANGLES;
-    let known = text.parse().ok().filter(|x: &f64| (least..=most).contains(x));
-    known.ok_or_else(|| format!("expected an angle from {least} to {most} degrees"))
-}
-
 pub fn run(a: &OfWall, told: Told) -> Result<Verdict, Failure> {
     let sought = Sought {
         model_file: a.model.clone(),
@@ -56,19 +43,12 @@ pub fn run(a: &OfWall, told: Told) -> Result<Verdict, Failure> {
         kt: a.kt,
         density: a.density,
         angle: a.contact_angle,
-        seed: a.seed,
+        seed: a.search.seed,
     };
     let found = wall(&sought, &mut |line| say!("{line}"))?;
     print(&found);
-    let written = found.scene(&sought, (&reference(a), a.viscosity), &command(a));
-    match &written {
-        Some(text) if found.good || a.anyway => {
-            write_bytes(&a.out, told.existing, text.as_bytes())?;
-            say!("written to {}", a.out.display());
-        }
-        Some(_) => say!("nothing is written, as the angle is not met: --anyway writes this wall"),
-        None => say!("nothing is written: there is no wall"),
-    }
+    let scene = found.scene((&reference(a), a.viscosity), sought.seed, &command(a));
+    a.search.write(told, scene.as_deref(), found.good)?;
     conclude(told, &found, found.good)
 }
 
@@ -104,7 +84,7 @@ fn print(found: &Found) {
 fn reference(a: &OfWall) -> String {
     let folder =
         |path: &Path| std::path::absolute(path).ok().and_then(|path| path.parent().map(Path::to_owned));
-    match folder(&a.model) == folder(&a.out) {
+    match folder(&a.model) == folder(&a.search.out) {
         true => file_name(&a.model),
         false => std::path::absolute(&a.model).unwrap_or_else(|_| a.model.clone()).display().to_string(),
     }
@@ -123,5 +103,5 @@ fn command(a: &OfWall) -> String {
             text += &format!(" --{option} {value}");
         }
     }
-    text + &format!(" --seed {} --out {}", a.seed, file_name(&a.out))
+    text + &a.search.command()
 }

@@ -147,6 +147,24 @@ fn long_steps_are_tried() {
     }
 }
 
+/// A dense layer that is too large to be tried is not judged by the thin fluid around it, which has a piece of 1 022 particles.
+#[test]
+fn a_dense_part_that_cannot_be_tried_is_named() {
+    let model = "title = \"t\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 1\nrange = 4\n\
+                 [[thermostat]]\ngamma = 1\nrange = 1\n";
+    let of = |parts: &str| {
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = [10.0, 10.0, 12.0]\nsteps = 5\ndt = 0.005\n{parts}"
+        );
+        estimates(&scene(model, &text).unwrap()).unwrap()
+    };
+    let layer = "[[part]]\nshape = \"slab\"\nat = 6.0\nthickness = 1.0\ndensity = 10.0\n";
+    let thin = "[[part]]\nshape = \"rest\"\ndensity = 1.5\n";
+    let found = of(&format!("{layer}{thin}"));
+    assert!(found.known.is_empty() && found.unknown[0].why.contains("6000"), "{found:?}");
+    assert_eq!(of(thin).known.len(), 1);
+}
+
 /// What has no estimate says why: without drag, where forces reach so far that no piece is small, and without particles.
 #[test]
 fn a_step_without_estimate_says_why() {
