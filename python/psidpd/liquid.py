@@ -97,8 +97,8 @@ def wall(
 ) -> dict[str, Any]:
     """Finds the wall on which a liquid has a contact angle, in degrees, as `psidpd model wall` does: minutes.
 
-    Writes the scene of a ridge on it to `out`, and gives what was found: "good", the "value" of the "knob" (the strength of the wall's
-    attraction or its density), the angles "young" and "ridge" with their errors, and the tensions. If the angle is not met `out` is
+    Writes the scene of a ridge on it to `out`, and gives what was found: "good", the "strength" of the wall's
+    attraction, the angles "young" and "ridge" with their errors, and the tensions. If the angle is not met `out` is
     written with `anyway` alone. density is about that of the liquid, if theory does not know it; with its viscosity it does not slip.
 
     Raises InputError for a model or an angle that cannot be used.

@@ -26,7 +26,7 @@ def test_walls_that_cannot_be_are_refused(tmp_path):
     model = tmp_path / "gas.toml"
     model.write_text('title = "g"\nspecies = ["F"]\n[[pair]]\nbetween = ["F", "F"]\nform = "soft"\nstrength = 25.0\nrange = 1.0\n')
     out = tmp_path / "wall.toml"
-    for options, why in [({"contact_angle": 60}, "density"), ({"contact_angle": 190}, "160 degrees"), ({"contact_angle": 60.0, "kT": -1}, "kT")]:
+    for options, why in [({"contact_angle": 60}, "do not attract"), ({"contact_angle": 190}, "160 degrees"), ({"contact_angle": 60.0, "kT": -1}, "kT")]:
         with pytest.raises(psidpd.InputError, match=why):
             psidpd.wall(model, out, **options)
     assert not out.exists()

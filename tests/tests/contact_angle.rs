@@ -32,7 +32,7 @@ fn a_drop_has_the_contact_angle_that_was_sought() {
     run("model wall liquid.toml --contact-angle 110 --seed 5 --out wall.toml --json wall.json");
     let text = std::fs::read_to_string(folder.path().join("wall.json")).unwrap();
     let found: Value = serde_json::from_str(&text).unwrap();
-    let [strength, surface] = [&found["value"], &found["film"]["surface"]].map(|x| x.as_f64().unwrap());
+    let [strength, surface] = [&found["strength"], &found["film"]["surface"]].map(|x| x.as_f64().unwrap());
     let scene = std::fs::read_to_string(folder.path().join("wetting.toml")).unwrap();
     let own = scene
         .replace("strength = 0.7 ", &format!("strength = {strength:?} "))

@@ -1,8 +1,8 @@
 //! A wall from its contact angle.
 //!
-//! The wall is a half-space of the liquid's own matter (`[[wall]]` of a scene), and one number of it is free ([`Knob`]). By Young's law,
+//! The wall is a half-space of the liquid's own matter (`[[wall]]` of a scene), whose strength of attraction is free. By Young's law,
 //! `γ_LV cos θ = γ_WV − γ_WL`, three tensions make the angle: that of the liquid's surface from a slab, and those of the wall below a film
-//! and beside the vapour from the film's profile of stress. The free number is sought by such films ([`search`]); the angle of the result
+//! and beside the vapour from the film's profile of stress. The strength is sought by such films ([`search`]); the angle of the result
 //! is measured by longer ones from other seeds, and by a ridge of the liquid on the wall, whose shape knows nothing of stress.
 
 mod ridge;
@@ -13,7 +13,7 @@ mod search;
 mod tests;
 
 pub use scene::Units;
-pub use search::{Knob, Trial};
+pub use search::Trial;
 
 use crate::ExperimentError;
 use crate::liquid::Trouble;
@@ -77,19 +77,18 @@ impl Film {
 trait Instrument {
     fn units(&self) -> Units;
     fn slab(&mut self) -> Result<Slab, Trouble>;
-    /// Films on walls with these shares, one after the other or side by side.
-    fn films(&mut self, shares: [f64; 2]) -> Result<[Film; 2], Trouble>;
+    /// Films on walls with these strengths, one after the other or side by side.
+    fn films(&mut self, strengths: [f64; 2]) -> Result<[Film; 2], Trouble>;
     /// The mean of two longer films from other seeds, and the angle, in degrees, at which a ridge meets the surface.
-    fn result(&mut self, share: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble>;
+    fn result(&mut self, strength: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble>;
 }
 
 /// A wall, and what was found of it.
 #[derive(Debug, Serialize)]
 pub struct Found {
     pub wanted: f64,
-    pub knob: Knob,
-    /// The free number: a factor of the pair potentials, or the density of the matter.
-    pub value: f64,
+    /// The factor of the pair potentials between fluid and matter.
+    pub strength: f64,
     pub slab: Slab,
     pub film: Option<Film>,
     /// θ in degrees by Young's law, and by the shape of a ridge.
@@ -120,9 +119,8 @@ pub fn wall(sought: &Sought, told: &mut dyn FnMut(&str)) -> Result<Found, Experi
         return Err(conditions(format!("a contact angle from {least} to {most} degrees can be sought")));
     }
     let folder = temporary_folder()?;
-    let knob = Knob::of(&sought.model, sought.kt)?;
-    let mut runs = runs::Runs::new(sought, knob, folder.path())?;
-    wall_by(sought, knob, &mut runs, told)
+    let mut runs = runs::Runs::new(sought, folder.path())?;
+    wall_by(sought, &mut runs, told)
 }
 
 fn conditions(why: String) -> ExperimentError {
@@ -132,7 +130,6 @@ fn conditions(why: String) -> ExperimentError {
 /// Finds the wall with what `instrument` measures.
 fn wall_by(
     sought: &Sought,
-    knob: Knob,
     instrument: &mut dyn Instrument,
     told: &mut dyn FnMut(&str),
 ) -> Result<Found, ExperimentError> {
@@ -155,8 +152,7 @@ fn wall_by(
     ));
     let mut found = Found {
         wanted: sought.angle,
-        knob,
-        value: f64::NAN,
+        strength: f64::NAN,
         slab,
         film: None,
         young: Measured::NONE,
@@ -167,20 +163,17 @@ fn wall_by(
         units: instrument.units(),
     };
     for round in 0..ROUNDS {
-        let share = match search::search(sought.angle, knob, &slab, instrument, &mut found.trials, told)? {
-            End::Found(share) => share,
+        let strength = match search::search(sought.angle, &slab, instrument, &mut found.trials, told)? {
+            End::Found(strength) => search::rounded(strength),
             End::None(why) => {
                 found.refusal = Some(why);
                 return Ok(found);
             }
         };
-        found.value = search::rounded(knob.value(share, slab.density.value));
-        told(&format!(
-            "measuring {} = {}: longer films from other seeds, and a ridge",
-            knob.key(),
-            found.value
-        ));
-        let (film, ridge) = match instrument.result(share, search::surface(&found.trials, share), round) {
+        found.strength = strength;
+        told(&format!("measuring strength = {strength}: longer films from other seeds, and a ridge"));
+        let (film, ridge) = match instrument.result(strength, search::surface(&found.trials, strength), round)
+        {
             Ok(result) => result,
             Err(Trouble::Failed(error)) => return Err(error),
             Err(trouble) => {
@@ -188,7 +181,7 @@ fn wall_by(
                 return Ok(found);
             }
         };
-        let trial = Trial::of(share, &film, &slab);
+        let trial = Trial::of(strength, &film, &slab);
         let cosine = trial.cosine;
         (found.film, found.young, found.ridge) = (Some(film), search::angle(cosine), ridge);
         found.good = found.meets(found.young) && found.meets(found.ridge);

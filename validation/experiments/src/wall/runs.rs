@@ -1,7 +1,7 @@
 //! Measures by runs: a slab of the liquid, films on a wall, and a ridge.
 
 use super::scene::{FILM, HEIGHT, Setting, Units, wall};
-use super::search::{Knob, rounded};
+use super::search::attracts;
 use super::{Film, Instrument, Slab, Sought, conditions};
 use crate::bulk::Observed;
 use crate::liquid::{Trouble, stopped};
@@ -24,18 +24,24 @@ const OUTPUT: &str = "[output]\nthermo = 0\ncheckpoint = 0\n";
 pub struct Runs<'a> {
     sought: &'a Sought,
     folder: &'a Path,
-    knob: Knob,
     /// The units; their density is a guess, then that of the slab.
     units: Units,
 }
 
 impl<'a> Runs<'a> {
-    pub fn new(sought: &'a Sought, knob: Knob, folder: &'a Path) -> Result<Runs<'a>, ExperimentError> {
+    pub fn new(sought: &'a Sought, folder: &'a Path) -> Result<Runs<'a>, ExperimentError> {
         let Sought { model, kt, .. } = sought;
         if model.species().len() != 1 || model.dimensions() != 3 {
             return Err(conditions("a wall is sought for a model of one species in three dimensions".into()));
         }
         let fluid = model.at(*kt)?;
+        if !attracts(&fluid) {
+            return Err(conditions(
+                "the pair potentials of the model do not attract, so that no strength of a wall makes liquids wet it; the density of its \
+                 matter may, `density` of [[wall]]"
+                    .into(),
+            ));
+        }
         let none = || {
             conditions(
                 "theory knows no liquid of this model beside its vapour: give its density, --density".into(),
@@ -46,7 +52,7 @@ impl<'a> Runs<'a> {
         let of = Composition { model, masses: &[1.0], kt: *kt, densities: &[density], seed: sought.seed };
         let piece = Piece::settled(&of)?.map_err(|why| conditions(format!("the liquid: {why}")))?;
         let units = Units { kt: *kt, range: fluid.cutoff(), density, dt: steps::dt(&piece) };
-        Ok(Runs { sought, folder, knob, units })
+        Ok(Runs { sought, folder, units })
     }
 
     /// Runs scenes side by side, each from its seed; the last is the longest.
@@ -64,13 +70,8 @@ impl<'a> Runs<'a> {
         all.into_iter().collect::<Result<_, _>>().map_err(stopped)
     }
 
-    /// The free number of a share of what the liquid has.
-    fn value(&self, share: f64) -> f64 {
-        rounded(self.knob.value(share, self.units.density))
-    }
-
-    fn film(&self, share: f64, time: f64) -> Setting {
-        Setting::film(self.knob, self.value(share), time, &self.units)
+    fn film(&self, strength: f64, time: f64) -> Setting {
+        Setting::film(strength, time, &self.units)
     }
 
     fn tensions(&self, observed: &Observed) -> Film {
@@ -90,7 +91,7 @@ fn guess(fluid: &Fluid) -> Result<Option<f64>, ExperimentError> {
 }
 
 /// Tensions of the wall from the integral of `P_N − P_T` up to each height, and the whole of it: below the middle of the film, and beside
-/// the vapour. Where the film is tells the share of the particles in the pressure, which is `of_liquid` in the liquid: it may have gone
+/// the vapour. Where the film is tells the part of the particles in the pressure, which is `of_liquid` in the liquid: it may have gone
 /// over to the upper wall.
 pub fn split(
     (integral, whole): (&[(f64, Measured)], Measured),
@@ -154,17 +155,17 @@ impl Instrument for Runs<'_> {
         Ok(slab)
     }
 
-    fn films(&mut self, shares: [f64; 2]) -> Result<[Film; 2], Trouble> {
-        let found = self.run(&shares.map(|share| (self.film(share, SEARCH), self.sought.seed)))?;
+    fn films(&mut self, strengths: [f64; 2]) -> Result<[Film; 2], Trouble> {
+        let found = self.run(&strengths.map(|strength| (self.film(strength, SEARCH), self.sought.seed)))?;
         Ok([0, 1].map(|k| self.tensions(&found[k])))
     }
 
-    fn result(&mut self, share: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble> {
+    fn result(&mut self, strength: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble> {
         let seed = |number: u64| self.sought.seed.wrapping_add(1000 + 10 * round + number);
-        let lines = wall(self.knob, self.value(share), &self.units, "\"zlo\"");
+        let lines = wall(strength, &self.units, "\"zlo\"");
         let found = self.run(&[
-            (self.film(share, RESULT), seed(0)),
-            (self.film(share, RESULT), seed(1)),
+            (self.film(strength, RESULT), seed(0)),
+            (self.film(strength, RESULT), seed(1)),
             (Setting::ridge(self.sought.angle, surface, lines, &self.units), seed(2)),
         ])?;
         let films = [0, 1].map(|k| self.tensions(&found[k]));

@@ -3,7 +3,7 @@
 
 use super::Found;
 use super::ridge::ridge;
-use super::search::{Knob, rounded};
+use super::search::rounded;
 use crate::steps::{FIRST, STEP};
 use serde::Serialize;
 use std::fmt::Write;
@@ -45,11 +45,12 @@ pub struct Setting {
     observe: String,
 }
 
-/// The lines of a `[[wall]]` with this value of its free number.
-pub fn wall(knob: Knob, value: f64, units: &Units, faces: &str) -> String {
-    let density = if knob == Knob::Density { value } else { rounded(units.density) };
-    let strength = if knob == Knob::Strength { format!("strength = {value:?}\n") } else { String::new() };
-    format!("[[wall]]\nkind = \"continuum\"\nfaces = [{faces}]\ndensity = {density:?}\n{strength}")
+/// The lines of a `[[wall]]`.
+pub fn wall(strength: f64, units: &Units, faces: &str) -> String {
+    let [density, strength] = [units.density, strength].map(rounded);
+    format!(
+        "[[wall]]\nkind = \"continuum\"\nfaces = [{faces}]\ndensity = {density:?}\nstrength = {strength:?}\n"
+    )
 }
 
 /// A length with three decimals.
@@ -72,13 +73,13 @@ impl Setting {
     }
 
     /// A film on the lower of two walls.
-    pub fn film(knob: Knob, value: f64, time: f64, units: &Units) -> Setting {
+    pub fn film(strength: f64, time: f64, units: &Units) -> Setting {
         // A layer that touches the face is pushed off.
         let [thickness, middle] = [FILM, 0.5 * FILM + 0.2].map(|length| shown(length * units.range));
         Setting {
             title: "A film on a wall".into(),
             edges: [ALONG, ALONG, HEIGHT],
-            wall: wall(knob, value, units, "\"zlo\", \"zhi\""),
+            wall: wall(strength, units, "\"zlo\", \"zhi\""),
             shape: format!("shape = \"slab\"\nthickness = {thickness:?}\nat = {middle:?}\n"),
             settle: SETTLE,
             time,
@@ -140,7 +141,7 @@ impl Setting {
 impl Found {
     /// The lines of the `[[wall]]`, with the drag on which a liquid of this viscosity does not slip; `None` if no wall was found.
     pub fn lines(&self, faces: &str, viscosity: Option<f64>) -> Option<String> {
-        let lines = self.value.is_finite().then(|| wall(self.knob, self.value, &self.units, faces))?;
+        let lines = self.strength.is_finite().then(|| wall(self.strength, &self.units, faces))?;
         Some(lines + &viscosity.map_or(String::new(), |eta| format!("viscosity = {eta:?}\n")))
     }
 

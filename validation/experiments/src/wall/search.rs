@@ -1,69 +1,28 @@
-//! The number of the wall at which cos θ is as wanted: by two films at a time, until a straight line through those near the goal has it.
+//! The strength of the wall at which cos θ has a value: by two films at a time, until a straight line through those near the goal has it.
 
 use super::{Film, Instrument, Slab, conditions};
 use crate::ExperimentError;
 use crate::liquid::Trouble;
-use psidpd_core::document::FileError;
-use psidpd_core::model::Model;
-use psidpd_core::model::PairTerm;
 use psidpd_core::model::pair::PairForm as _;
+use psidpd_core::model::{Fluid, PairTerm};
 use psidpd_observe::Measured;
 use serde::Serialize;
 
-/// What of a wall is free: with more of it liquids wet better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Knob {
-    /// The factor of pair potentials between fluid and matter.
-    Strength,
-    /// The density of the matter, of models without pair potentials.
-    Density,
-}
-
-impl Knob {
-    /// The free number of a model's walls: the strength, if its pair potentials attract as a whole, ∫ φ r² dr < 0.
-    pub fn of(model: &Model, kt: f64) -> Result<Knob, FileError> {
-        const POINTS: u32 = 1000;
-        let fluid = model.at(kt)?;
-        let integral = |term: &PairTerm| {
-            let phi = &term.potential;
-            let places = (0..POINTS).map(|k| (f64::from(k) + 0.5) / f64::from(POINTS) * phi.range());
-            places.map(|r| phi.at(r).0 * r * r).sum::<f64>() * phi.range()
-        };
-        let whole: f64 = fluid.pairs.iter().map(integral).sum();
-        Ok(if whole < 0.0 { Knob::Strength } else { Knob::Density })
-    }
-
-    /// The key of a `[[wall]]`.
-    pub fn key(self) -> &'static str {
-        match self {
-            Knob::Strength => "strength",
-            Knob::Density => "density",
-        }
-    }
-
-    /// The number for a share of what the liquid, of this density, has itself.
-    pub fn value(self, share: f64, density: f64) -> f64 {
-        match self {
-            Knob::Strength => share,
-            Knob::Density => share * density,
-        }
-    }
-
-    /// The least and the largest share that are tried.
-    fn ends(self) -> [f64; 2] {
-        match self {
-            Knob::Strength => [0.02, 4.0],
-            Knob::Density => [0.02, 1.5],
-        }
-    }
+/// Whether the pair potentials of a fluid attract as a whole, ∫ φ r² dr < 0: only then do liquids wet better on a stronger wall.
+pub fn attracts(fluid: &Fluid) -> bool {
+    const POINTS: u32 = 1000;
+    let integral = |term: &PairTerm| {
+        let phi = &term.potential;
+        let places = (0..POINTS).map(|k| (f64::from(k) + 0.5) / f64::from(POINTS) * phi.range());
+        places.map(|r| phi.at(r).0 * r * r).sum::<f64>() * phi.range()
+    };
+    fluid.pairs.iter().map(integral).sum::<f64>() < 0.0
 }
 
 /// A wall that was tried.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Trial {
-    /// Over what the liquid itself has.
-    pub share: f64,
+    pub strength: f64,
     /// `cos θ`; `None` if the film left the wall.
     pub cosine: Option<Measured>,
     /// See [`Film::surface`].
@@ -71,8 +30,8 @@ pub struct Trial {
 }
 
 impl Trial {
-    pub fn of(share: f64, film: &Film, slab: &Slab) -> Trial {
-        Trial { share, cosine: film.cosine(slab), surface: film.surface }
+    pub fn of(strength: f64, film: &Film, slab: &Slab) -> Trial {
+        Trial { strength, cosine: film.cosine(slab), surface: film.surface }
     }
 
     fn is_below(&self, goal: f64) -> bool {
@@ -87,7 +46,10 @@ pub enum End {
     None(String),
 }
 
-/// The first shares, and how far those of a pair lie from the guess between them, as a share of it, at least and at most.
+/// The least and the largest strength that are tried.
+const ENDS: [f64; 2] = [0.02, 4.0];
+
+/// The first strengths, and how far those of a pair lie from the guess between them, relative to it, at least and at most.
 const FIRST: [f64; 2] = [0.6, 1.2];
 const ASIDE: [f64; 2] = [0.015, 0.06];
 
@@ -110,9 +72,9 @@ pub fn angle(cosine: Option<Measured>) -> Measured {
 }
 
 /// The surface of the wall that is nearest to this one and held its film.
-pub fn surface(trials: &[Trial], share: f64) -> f64 {
+pub fn surface(trials: &[Trial], strength: f64) -> f64 {
     let held = trials.iter().filter(|t| t.cosine.is_some());
-    let off = |t: &&Trial| (t.share - share).abs();
+    let off = |t: &&Trial| (t.strength - strength).abs();
     held.min_by(|a, b| off(a).total_cmp(&off(b))).map_or(0.0, |t| t.surface)
 }
 
@@ -121,10 +83,9 @@ pub fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-/// Seeks the share; `trials` has what is known already, and what is measured comes to it.
+/// Seeks the strength; `trials` has what is known already, and what is measured comes to it.
 pub fn search(
     wanted: f64,
-    knob: Knob,
     slab: &Slab,
     instrument: &mut dyn Instrument,
     trials: &mut Vec<Trial>,
@@ -133,31 +94,31 @@ pub fn search(
     let goal = wanted.to_radians().cos();
     let tolerance = CONTENT.to_radians() * wanted.to_radians().sin();
     for _ in 0..PAIRS {
-        let shares = match next(trials, goal, tolerance, knob.ends()) {
-            Next::Found(share) => return Ok(End::Found(share)),
-            Next::Beyond => return Ok(End::None(beyond(trials, goal, knob, slab))),
-            Next::Try(shares) => shares,
+        let strengths = match next(trials, goal, tolerance) {
+            Next::Found(strength) => return Ok(End::Found(strength)),
+            Next::Beyond => return Ok(End::None(beyond(trials, goal))),
+            Next::Try(strengths) => strengths,
         };
-        let films = match instrument.films(shares) {
+        let films = match instrument.films(strengths) {
             Ok(films) => films,
             Err(Trouble::Failed(error)) => return Err(error),
             Err(trouble) => return Err(conditions(format!("a film on a wall: {trouble}"))),
         };
-        for (share, film) in shares.into_iter().zip(films) {
-            let trial = Trial::of(share, &film, slab);
-            told(&said(&trial, knob, slab));
+        for (strength, film) in strengths.into_iter().zip(films) {
+            let trial = Trial::of(strength, &film, slab);
+            told(&said(&trial));
             trials.push(trial);
         }
     }
     // The best line that there is.
     Ok(match line(trials, goal) {
-        Some((share, _)) => End::Found(share),
-        None => End::None(beyond(trials, goal, knob, slab)),
+        Some((strength, _)) => End::Found(strength),
+        None => End::None(beyond(trials, goal)),
     })
 }
 
-fn said(trial: &Trial, knob: Knob, slab: &Slab) -> String {
-    let of = format!("{} = {:.3}", knob.key(), knob.value(trial.share, slab.density.value));
+fn said(trial: &Trial) -> String {
+    let of = format!("strength = {:.3}", trial.strength);
     match trial.cosine {
         None => format!("{of}: the film leaves the wall"),
         Some(cosine) => {
@@ -169,11 +130,11 @@ fn said(trial: &Trial, knob: Knob, slab: &Slab) -> String {
 }
 
 /// The nearest wall that was tried, in words.
-fn beyond(trials: &[Trial], goal: f64, knob: Knob, slab: &Slab) -> String {
+fn beyond(trials: &[Trial], goal: f64) -> String {
     let off = |t: &&Trial| t.cosine.map_or(goal + 1.0, |c| (c.value - goal).abs());
     match trials.iter().min_by(|a, b| off(a).total_cmp(&off(b))) {
         Some(nearest) => {
-            format!("no wall that was tried has this angle; the nearest: {}", said(nearest, knob, slab))
+            format!("no wall that was tried has this angle; the nearest: {}", said(nearest))
         }
         None => "no film was measured".into(),
     }
@@ -186,35 +147,39 @@ enum Next {
     Beyond,
 }
 
-fn next(trials: &[Trial], goal: f64, tolerance: f64, [least, most]: [f64; 2]) -> Next {
-    let order = |a: &&Trial, b: &&Trial| a.share.total_cmp(&b.share);
+fn next(trials: &[Trial], goal: f64, tolerance: f64) -> Next {
+    let [least, most] = ENDS;
+    let order = |a: &&Trial, b: &&Trial| a.strength.total_cmp(&b.strength);
     let below = trials.iter().filter(|t| t.is_below(goal)).max_by(order);
     let above = trials.iter().filter(|t| !t.is_below(goal)).min_by(order);
     let (below, above) = match (below, above) {
         (None, None) => return Next::Try(FIRST),
-        (Some(below), None) if below.share >= most => return Next::Beyond,
-        (Some(below), None) => return Next::Try([1.3, 1.7].map(|factor| (factor * below.share).min(most))),
-        (None, Some(above)) if above.share <= least => return Next::Beyond,
-        (None, Some(above)) => return Next::Try([0.5, 0.8].map(|factor| (factor * above.share).max(least))),
+        (Some(below), None) if below.strength >= most => return Next::Beyond,
+        (Some(below), None) => {
+            return Next::Try([1.3, 1.7].map(|factor| (factor * below.strength).min(most)));
+        }
+        (None, Some(above)) if above.strength <= least => return Next::Beyond,
+        (None, Some(above)) => {
+            return Next::Try([0.5, 0.8].map(|factor| (factor * above.strength).max(least)));
+        }
         (Some(below), Some(above)) => (below, above),
     };
     let guess = match line(trials, goal) {
-        Some((share, error)) if error <= tolerance => return Next::Found(share),
+        Some((strength, error)) if error <= tolerance => return Next::Found(strength),
         // Noise can put a film on the wrong side of another.
-        Some((share, _)) => {
-            share.clamp(0.8 * below.share.min(above.share), 1.25 * below.share.max(above.share))
-        }
+        Some((strength, _)) => strength
+            .clamp(0.8 * below.strength.min(above.strength), 1.25 * below.strength.max(above.strength)),
         None => {
             let known = below.cosine.zip(above.cosine);
             let part = known.map_or(0.5, |(low, high)| (goal - low.value) / (high.value - low.value));
-            below.share + part.clamp(0.1, 0.9) * (above.share - below.share)
+            below.strength + part.clamp(0.1, 0.9) * (above.strength - below.strength)
         }
     };
-    let aside = (0.25 * (above.share - below.share).abs() / guess).clamp(ASIDE[0], ASIDE[1]);
+    let aside = (0.25 * (above.strength - below.strength).abs() / guess).clamp(ASIDE[0], ASIDE[1]);
     Next::Try([1.0 - aside, 1.0 + aside].map(|aside| (aside * guess).clamp(least, most)))
 }
 
-/// The share at which the straight line through the films near the goal has it, and the standard error of the line there; `None` unless
+/// The strength at which the straight line through the films near the goal has it, and the standard error of the line there; `None` unless
 /// there are films on both sides.
 fn line(trials: &[Trial], goal: f64) -> Option<(f64, f64)> {
     let near: Vec<[f64; 3]> = trials
@@ -222,7 +187,7 @@ fn line(trials: &[Trial], goal: f64) -> Option<(f64, f64)> {
         .filter_map(|t| {
             let cosine = t.cosine.filter(|c| (c.value - goal).abs() <= NEAR)?;
             let error = cosine.error.hypot(CURVED * (cosine.value - goal).powi(2));
-            Some([t.share, cosine.value, 1.0 / (error * error).max(1e-12)])
+            Some([t.strength, cosine.value, 1.0 / (error * error).max(1e-12)])
         })
         .collect();
     let sum = |of: &dyn Fn(f64, f64) -> f64| near.iter().map(|[x, y, w]| w * of(*x, *y)).sum::<f64>();
@@ -234,6 +199,6 @@ fn line(trials: &[Trial], goal: f64) -> Option<(f64, f64)> {
     if !(both && slope > 0.0 && slope.is_finite()) {
         return None;
     }
-    let share = x0 + (goal - y0) / slope;
-    Some((share, (1.0 / weight + (share - x0) * (share - x0) / xx).sqrt()))
+    let strength = x0 + (goal - y0) / slope;
+    Some((strength, (1.0 / weight + (strength - x0) * (strength - x0) / xx).sqrt()))
 }

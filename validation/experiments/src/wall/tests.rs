@@ -2,16 +2,16 @@
 
 use super::runs::split;
 use super::scene::Setting;
-use super::search::{angle, rounded};
+use super::search::{angle, attracts, rounded};
 use super::*;
-use crate::models::{SET6, STANDARD};
+use crate::models::{SET6, SPLINE, STANDARD};
 use psidpd_dynamics::scene::Scene;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 const UNITS: Units = Units { kt: 1.0, range: 1.0, density: 6.0, dt: 0.04 };
 
-/// A wall whose cosine is a curve of the share, with noise of the standard error 0.014, uniform within ±0.024.
+/// A wall whose cosine is a curve of the strength, with noise of the standard error 0.014, uniform within ±0.024.
 struct Known {
     curve: fn(f64) -> f64,
     /// Films leave walls with a lower cosine.
@@ -31,16 +31,16 @@ impl Known {
         Known { curve, leaves: -0.95, ridge_off: 0.0, vapour: 0.0, rng, asked: Vec::new() }
     }
 
-    fn film(&mut self, share: f64, error: f64) -> Film {
-        self.asked.push(share);
-        let exact = (self.curve)(share);
+    fn film(&mut self, strength: f64, error: f64) -> Film {
+        self.asked.push(strength);
+        let exact = (self.curve)(strength);
         let cosine = exact + 3f64.sqrt() * error * self.rng.random_range(-1.0..1.0);
         // γ_WL = γ_WV − γ_LV cos θ
         let liquid = Measured { value: self.vapour - TENSION * cosine, error: TENSION * error };
         Film {
             liquid: (exact > self.leaves).then_some(liquid),
             vapour: self.vapour.into(),
-            surface: 0.3 / share,
+            surface: 0.3 / strength,
         }
     }
 }
@@ -54,15 +54,15 @@ impl Instrument for Known {
         Ok(Slab { tension: TENSION.into(), density: 6.0.into() })
     }
 
-    fn films(&mut self, shares: [f64; 2]) -> Result<[Film; 2], Trouble> {
-        Ok(shares.map(|share| self.film(share, 0.014)))
+    fn films(&mut self, strengths: [f64; 2]) -> Result<[Film; 2], Trouble> {
+        Ok(strengths.map(|strength| self.film(strength, 0.014)))
     }
 
-    fn result(&mut self, share: f64, surface: f64, _: u64) -> Result<(Film, Measured), Trouble> {
-        // That of a wall of about this share.
-        assert!((surface * share / 0.3 - 1.0).abs() < 0.5, "{surface} {share}");
-        let film = self.film(share, 0.005);
-        let exact = (self.curve)(share).clamp(-1.0, 1.0).acos().to_degrees();
+    fn result(&mut self, strength: f64, surface: f64, _: u64) -> Result<(Film, Measured), Trouble> {
+        // That of a wall of about this strength.
+        assert!((surface * strength / 0.3 - 1.0).abs() < 0.5, "{surface} {strength}");
+        let film = self.film(strength, 0.005);
+        let exact = (self.curve)(strength).clamp(-1.0, 1.0).acos().to_degrees();
         Ok((film, Measured { value: exact + self.ridge_off, error: 1.0 }))
     }
 }
@@ -73,7 +73,7 @@ fn sought(angle: f64) -> Sought {
 }
 
 fn of(known: &mut Known, angle: f64) -> Found {
-    wall_by(&sought(angle), Knob::Strength, known, &mut |_| ()).unwrap()
+    wall_by(&sought(angle), known, &mut |_| ()).unwrap()
 }
 
 /// As that of Warren's set 6, and one that is steep, one that is flat and far from the first guess.
@@ -89,7 +89,7 @@ fn the_wall_is_found_through_noise() {
                 let mut known = Known::new(curve, seed);
                 known.vapour = 0.4;
                 let found = of(&mut known, wanted);
-                let exact = curve(found.value).acos().to_degrees();
+                let exact = curve(found.strength).acos().to_degrees();
                 assert!((exact - wanted).abs() < 3.5, "{wanted}, seed {seed}: {exact} {:?}", found.trials);
                 assert!(found.good && found.refusal.is_none(), "{wanted}, seed {seed}: {found:?}");
                 assert!(known.asked.len() <= 20, "{wanted}, seed {seed}: {:?}", known.asked);
@@ -98,15 +98,12 @@ fn the_wall_is_found_through_noise() {
     }
 }
 
-/// The attraction is free where there is one, else the density.
+/// The spline attracts beyond its repulsive core.
 #[test]
-fn what_attracts_is_free() {
-    let knob = |text: &str| Knob::of(&Model::parse("m.toml", text).unwrap(), 1.0).unwrap();
-    assert_eq!(knob(SET6), Knob::Strength);
-    assert_eq!(
-        [knob(STANDARD), knob(include_str!("../../../models/van-der-waals-3d.toml"))],
-        [Knob::Density; 2]
-    );
+fn what_attracts_is_known() {
+    let attracts = |text: &str| attracts(&Model::parse("m.toml", text).unwrap().at(1.0).unwrap());
+    assert_eq!([SET6, SPLINE].map(attracts), [true; 2]);
+    assert_eq!([STANDARD, include_str!("../../../models/van-der-waals-3d.toml")].map(attracts), [false; 2]);
 }
 
 /// Both routes must have the angle.
@@ -126,15 +123,10 @@ fn a_ridge_of_another_shape_is_a_miss() {
 #[test]
 fn what_no_wall_has_is_refused_with_the_nearest() {
     let found = of(&mut Known::new(|s| 0.2 - (-s).exp(), 1), 60.0);
-    assert!(!found.good && found.value.is_nan());
+    assert!(!found.good && found.strength.is_nan());
     let why = found.refusal.clone().unwrap();
     assert!(why.contains("nearest") && why.contains("strength = 4"), "{why}");
     assert_eq!(found.lines("\"zlo\"", None), None);
-    // A wall of 1.5 times the density of the liquid is the densest that is tried.
-    let mut known = Known::new(|s| 0.2 * s - 1.0, 1);
-    known.leaves = -1.0;
-    let found = wall_by(&sought(60.0), Knob::Density, &mut known, &mut |_| ()).unwrap();
-    assert!(found.refusal.is_some_and(|why| why.contains("density = 9.000")));
     // A film that leaves every wall.
     let found = of(&mut Known::new(|_| -1.0, 1), 150.0);
     assert!(found.refusal.unwrap().contains("leaves"));
@@ -187,7 +179,7 @@ fn known_film() -> Film {
     Known::new(CURVES[0], 1).film(0.8, 0.01)
 }
 
-/// The scenes are valid, in units of kT 0.7 and a range of 2, and the wall is that of the free number.
+/// The scenes are valid, in units of kT 0.7 and a range of 2, and the wall is as strong as it is said.
 #[test]
 fn scenes_have_the_wall() {
     let folder = tempfile::tempdir().unwrap();
@@ -198,15 +190,15 @@ fn scenes_have_the_wall() {
         let text = setting.text("m.toml", &units, 5);
         Scene::parse("s.toml", &text, folder.path()).unwrap_or_else(|error| panic!("{error:?}\n{text}"))
     };
-    for (knob, share) in [(Knob::Strength, 0.8), (Knob::Density, 0.8)] {
-        let value = rounded(knob.value(share, units.density));
-        let film = Setting::film(knob, value, 100.0, &units);
-        let scene = parsed(&film);
+    for strength in [0.8, 1.234] {
+        let scene = parsed(&Setting::film(strength, 100.0, &units));
         let fluid = scene.model.at(0.7).unwrap();
         let [lower, upper] = &fluid.walls[..] else { panic!("{:?}", fluid.walls) };
         assert!((!lower.wall.high) && upper.wall.high);
-        let [density, strength] = if knob == Knob::Strength { [0.75, 0.8] } else { [0.6, 1.0] };
-        assert_eq!([lower.wall.density, lower.wall.strength], [density, strength]);
+        assert_eq!(
+            [lower.wall.density, lower.wall.strength, upper.wall.strength],
+            [0.75, strength, strength]
+        );
         assert_eq!(scene.domain.lengths(), [12.0, 12.0, 22.0]);
         // A film 10 thick in a box of 12 × 12.
         let expected = 0.75 * 10.0 * 144.0;
@@ -214,7 +206,7 @@ fn scenes_have_the_wall() {
     }
     assert!(parsed(&Setting::slab(&units)).model.at(0.7).unwrap().walls.is_empty());
     for wanted in ANGLES {
-        let found = Found { wanted, value: 0.8, ..of(&mut Known::new(CURVES[0], 1), 90.0) };
+        let found = Found { wanted, strength: 0.8, ..of(&mut Known::new(CURVES[0], 1), 90.0) };
         let found = Found { units, ..found };
         let found = Found { film: Some(Film { surface: 0.21, ..known_film() }), ..found };
         let text = found.scene(("m.toml", Some(7.0)), 3, "psidpd model wall m.toml").unwrap();
@@ -237,6 +229,10 @@ fn only_liquids_beside_their_vapour_have_walls() {
         wall(&sought, &mut |_| ()).unwrap_err().to_string()
     };
     let why = refused(STANDARD);
+    assert!(why.contains("do not attract"), "{why}");
+    let weak = SET6.replace("A  = -40.0", "A  = -4.0");
+    assert!(weak != SET6);
+    let why = refused(&weak);
     assert!(why.contains("--density"), "{why}");
     let why = refused(include_str!("../../../models/van-der-waals-2d.toml"));
     assert!(why.contains("three dimensions"), "{why}");

@@ -18,8 +18,7 @@ pub enum Verb {
     Liquid(Box<OfLiquid>),
     /// Find the wall on which a liquid has a contact angle.
     ///
-    /// The wall is matter behind a reflecting face, `[[wall]]` of a scene; found is the strength of its attraction, or its density if
-    /// the model has no pair potentials. Three tensions and Young's law say the angle; a ridge of the liquid on the wall, which is
+    /// The wall is matter behind a reflecting face, `[[wall]]` of a scene; found is the strength of its attraction. Three tensions and Young's law say the angle; a ridge of the liquid on the wall, which is
     /// written as a scene, is the check. Exits with 1, and writes nothing, if the two are not within 3 degrees of the angle.
     Wall(OfWall),
 }
