@@ -4,19 +4,25 @@ use super::{Film, Instrument, Slab, conditions};
 use crate::ExperimentError;
 use crate::liquid::Trouble;
 use psidpd_core::model::pair::PairForm as _;
+use psidpd_core::model::wall::HalfSpace;
 use psidpd_core::model::{Fluid, PairTerm};
 use psidpd_observe::Measured;
 use serde::Serialize;
 
-/// Whether the pair potentials of a fluid attract as a whole, ∫ φ r² dr < 0: only then do liquids wet better on a stronger wall.
+/// Whether a half-space of a fluid's pair potentials attracts particles somewhere: only then do liquids wet better on a stronger wall.
 pub fn attracts(fluid: &Fluid) -> bool {
-    const POINTS: u32 = 1000;
-    let integral = |term: &PairTerm| {
+    const PLACES: u32 = 200;
+    let dimensions = fluid.dimensions;
+    let of = |term: &PairTerm| {
         let phi = &term.potential;
-        let places = (0..POINTS).map(|k| (f64::from(k) + 0.5) / f64::from(POINTS) * phi.range());
-        places.map(|r| phi.at(r).0 * r * r).sum::<f64>() * phi.range()
+        HalfSpace::of(dimensions, phi.range(), 1.0, |r| phi.at(r))
     };
-    fluid.pairs.iter().map(integral).sum::<f64>() < 0.0
+    let Some(parts) = fluid.pairs.iter().map(of).collect::<Option<Vec<_>>>() else { return false };
+    let places = (0..PLACES).map(|k| f64::from(k) / f64::from(PLACES) * fluid.cutoff());
+    let energies: Vec<f64> = places.map(|z| parts.iter().map(|part| part.at(z)[0]).sum()).collect();
+    // Beyond what is rounding where the potential ends.
+    let largest = energies.iter().fold(0.0, |a: f64, e| a.max(e.abs()));
+    energies.iter().any(|e| *e < -1e-6 * largest)
 }
 
 /// A wall that was tried.

@@ -98,7 +98,7 @@ fn the_wall_is_found_through_noise() {
     }
 }
 
-/// The spline attracts beyond its repulsive core.
+/// The spline's half-space attracts from some distance on, though the spline repels on the whole, as one must for a liquid to last.
 #[test]
 fn what_attracts_is_known() {
     let attracts = |text: &str| attracts(&Model::parse("m.toml", text).unwrap().at(1.0).unwrap());
