@@ -18,6 +18,7 @@
 
     water = psidpd.Liquid.from_coolprop("Water", T=350)      # numbers of a data sheet
     water.model("water.toml", molecules=2)                   # a model that has them
+    psidpd.mixture("water.toml", "oil.toml", "both.toml", tension=0.05)
     psidpd.wall("water.toml", "wall.toml", contact_angle=110)
 
 All numbers are in the reduced units of the model: lengths in r_c, masses in m, energies in the unit of kT. `psidpd.ase`
@@ -26,7 +27,7 @@ has a calculator for ASE, `psidpd.lammps` finds the pair styles for LAMMPS.
 
 from ._psidpd import Engine, Evaluation, Model, estimate, version
 from .errors import InputError, PsidpdError, RunStoppedError
-from .liquid import Liquid, wall
+from .liquid import Liquid, mixture, wall
 from .result import Result, run, sweep
 from .simulation import Simulation
 
@@ -43,6 +44,7 @@ __all__ = [
     "RunStoppedError",
     "Simulation",
     "estimate",
+    "mixture",
     "run",
     "sweep",
     "wall",

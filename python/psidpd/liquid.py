@@ -1,4 +1,4 @@
-"""Models of liquids from their data sheets, and walls from their contact angles."""
+"""Models of liquids from their data sheets, of two from the tension between them, and walls from their contact angles."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,7 @@ class Liquid:
         """
         numbers = {key: getattr(self, key) for key in self.__dataclass_fields__ if key != "name"}
         sizes = {"molecules": molecules, "rc": rc, "drop": drop, "particles": particles, "number_density": number_density}
-        return found("liquid", self.name, numbers | sizes | {"seed": seed}, out, anyway=anyway, overwrite=overwrite)
+        return found("liquid", [self.name], numbers | sizes | {"seed": seed}, out, anyway=anyway, overwrite=overwrite)
 
 
 def wall(
@@ -104,20 +105,59 @@ def wall(
     Raises InputError for a model or an angle that cannot be used.
     """
     numbers = {"contact_angle": contact_angle, "kT": kT, "density": density, "viscosity": viscosity, "seed": seed}
-    return found("wall", os.path.abspath(model), numbers, out, anyway=anyway, overwrite=overwrite)
+    return found("wall", [os.path.abspath(model)], numbers, out, anyway=anyway, overwrite=overwrite)
+
+
+def mixture(
+    model: AnyPath,
+    other: AnyPath,
+    out: AnyPath,
+    *,
+    tension: float,
+    species: tuple[str, str] | None = None,
+    kT: float = 1.0,
+    densities: tuple[float, float] | None = None,
+    seed: int = 1,
+    anyway: bool = False,
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Joins the models of two liquids as `psidpd model mixture` does: minutes.
+
+    The tension of their interface is in N/m if the models have units, else in theirs. Writes the model of both to `out`, with
+    the names of the files or `species` for its species, and gives what was found: "good", "cross", the factor of the
+    attraction between the species, "mass" of a particle of the second, and "layers" with the "tension", in units of the models ("unit" is
+    theirs in N/m), and what is "dissolved". If the tension is not met `out` is written with `anyway` alone. densities are about those of
+    the liquids, if theory does not know them.
+
+    Raises InputError for models that cannot be mixed, or a tension that cannot be used.
+    """
+    numbers = {"tension": tension, "species": species, "kT": kT, "densities": densities, "seed": seed}
+    files = [os.path.abspath(file) for file in (model, other)]
+    return found("mixture", files, numbers, out, anyway=anyway, overwrite=overwrite)
+
+
+Given = float | tuple[float, float] | tuple[str, str] | None
+
+
+def option(key: str, value: Given) -> list[str]:
+    """An option of the command line, with one value or two."""
+    values = value if isinstance(value, tuple) else (value,)
+    texts = [x if isinstance(x, str) else repr(x if isinstance(x, int) or x is None else float(x)) for x in values]
+    name = f"--{key.replace('_', '-')}"
+    # A negative number next to its option is read as a number.
+    return [f"{name}={texts[0]}"] if len(texts) == 1 else [name, *texts]
 
 
 def found(
-    verb: str, name: str, numbers: dict[str, float | None], out: AnyPath, *, anyway: bool, overwrite: bool
+    verb: str, names: list[str], numbers: Mapping[str, Given], out: AnyPath, *, anyway: bool, overwrite: bool
 ) -> dict[str, Any]:
     """What `psidpd model VERB` writes with --json."""
-    given = [(key, value) for key, value in numbers.items() if value is not None]
-    options = [f"--{key.replace('_', '-')}={value if isinstance(value, int) else float(value)!r}" for key, value in given]
+    options = [text for key, value in numbers.items() if value is not None for text in option(key, value)]
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder, "found.json")
         command = [sys.executable, "-m", "psidpd", "model", verb, *options]
         command += ["--out", os.path.abspath(out), "--json", str(table)]
-        command += ["--anyway"] * anyway + ["--overwrite"] * overwrite + ["--", name]
+        command += ["--anyway"] * anyway + ["--overwrite"] * overwrite + ["--", *names]
         # From an empty folder, as Python imports what lies in the working one.
         run = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         text = read(table)

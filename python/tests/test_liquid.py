@@ -32,6 +32,21 @@ def test_walls_that_cannot_be_are_refused(tmp_path):
     assert not out.exists()
 
 
+def test_liquids_that_cannot_be_mixed_are_refused(tmp_path):
+    gas = tmp_path / "gas.toml"
+    gas.write_text('title = "g"\nspecies = ["F"]\n[[pair]]\nbetween = ["F", "F"]\nform = "soft"\nstrength = 25.0\nrange = 1.0\n')
+    out = tmp_path / "both.toml"
+    for options, why in [
+        ({"tension": 1.0}, "both liquids are called gas"),
+        ({"tension": -1.0}, "above 0"),
+        ({"tension": 1.0, "species": ("a", "b"), "densities": (3.0, -3.0)}, "above 0"),
+        ({"tension": 1.0, "species": ("a", "b")}, "theory knows no liquid of a"),
+    ]:
+        with pytest.raises(psidpd.InputError, match=why):
+            psidpd.mixture(gas, gas, out, **options)
+    assert not out.exists()
+
+
 def test_coolprop_knows_water():
     pytest.importorskip("CoolProp")
     water = psidpd.Liquid.from_coolprop("Water", T=298.15)

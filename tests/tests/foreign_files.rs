@@ -141,6 +141,7 @@ fn every_verb_spares_what_it_did_not_make() {
     let slow = [
         ("calibrate w.toml --out F", "c.toml"),
         ("model liquid water --density 997 --rc 1e-9 --temperature 298 --out F", "water.toml"),
+        ("model mixture w.toml w.toml --species a b --tension 5 --out F", "both.toml"),
         ("model wall w.toml --contact-angle 60 --out F", "wall.toml"),
         ("pareto s.toml --out F/..", "pareto.json"),
         ("pareto s.toml --out F/..", "pareto.html"),

@@ -363,6 +363,7 @@ fn errors_of_every_verb_name_the_file() {
         "lammps plugin --lammps F",
         "bench --lammps F --out out",
         "model liquid w --data F --rc 1e-9 --temperature 300 --out x.toml",
+        "model mixture m.toml F --tension 5 --out x.toml",
         "model wall F --contact-angle 60 --out x.toml",
     ];
     for (name, text) in
@@ -414,6 +415,9 @@ fn errors_of_every_verb_name_the_file() {
         ("calibrate w.toml --density 5:6 --out c.toml --threads 100000", &["from 1 to 1024"]),
         ("model liquid w --density 0.997 --rc 1e-9 --out x.toml", &["density = 0.997", "SI units"]),
         ("model liquid w --density 997 --molecules 3 --out x.toml", &["molar_mass"]),
+        ("model mixture w.toml w.toml --tension 5 --out x.toml", &["both liquids are called w", "--species"]),
+        ("model mixture w.toml w.toml --species a --tension 5 --out x.toml", &["2 values"]),
+        ("model mixture w.toml m.toml --tension -5 --out x.toml", &["above 0"]),
         ("model wall m.toml --contact-angle 190 --out x.toml", &["160 degrees"]),
         ("model wall m.toml --contact-angle 60 --density -1 --out x.toml", &["above 0"]),
         ("reproduce --threads 100000", &["from 1 to 1024"]),

@@ -668,7 +668,7 @@ mod tests {
         let run = |body_forces: bool| {
             let text = format!(
                 "kT = 1.0\nseed = 1\nbox = 4.0\ndensity = 6.05\n[[body_force]]\nacceleration = [1e-6, 0.0, 0.0]\n\
-                 reversed_along = \"z\"\n[[stage]]\nname = \"hot\"\nsteps = 400\ndt = 0.04\nbody_forces = {body_forces}\n"
+                 reversed_along = \"z\"\n[[stage]]\nname = \"hot\"\nsteps = 400\ndt = 0.037\nbody_forces = {body_forces}\n"
             );
             watched(SET6, &text)
         };

@@ -12,11 +12,12 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use scene::Units;
+pub use crate::slabs::Units;
 pub use search::Trial;
 
 use crate::ExperimentError;
 use crate::liquid::Trouble;
+use crate::seek::rounded;
 use psidpd_core::model::Model;
 use psidpd_formats::files::temporary_folder;
 use psidpd_observe::Measured;
@@ -164,7 +165,7 @@ fn wall_by(
     };
     for round in 0..ROUNDS {
         let strength = match search::search(sought.angle, &slab, instrument, &mut found.trials, told)? {
-            End::Found(strength) => search::rounded(strength),
+            End::Found(strength) => rounded(strength),
             End::None(why) => {
                 found.refusal = Some(why);
                 return Ok(found);

@@ -1,15 +1,12 @@
 //! Measures by runs: a slab of the liquid, films on a wall, and a ridge.
 
-use super::scene::{FILM, HEIGHT, Setting, Units, wall};
+use super::scene::{HEIGHT, wall};
 use super::search::attracts;
 use super::{Film, Instrument, Slab, Sought, conditions};
 use crate::bulk::Observed;
-use crate::liquid::{Trouble, stopped};
-use crate::{ExperimentError, jobs, steps};
-use psidpd_core::model::Fluid;
-use psidpd_core::theory::MeanField;
-use psidpd_dynamics::run::{RunError, run_scene};
-use psidpd_dynamics::scene::Scene;
+use crate::liquid::Trouble;
+use crate::slabs::{FILM, Run, Setting, Units, guess, mean};
+use crate::{ExperimentError, slabs, steps};
 use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_observe::Measured;
 use std::path::Path;
@@ -17,9 +14,6 @@ use std::path::Path;
 /// Thermal times that films of the search and of the result last.
 const SEARCH: f64 = 250.0;
 const RESULT: f64 = 500.0;
-
-/// Nothing is kept but what is observed.
-const OUTPUT: &str = "[output]\nthermo = 0\ncheckpoint = 0\n";
 
 pub struct Runs<'a> {
     sought: &'a Sought,
@@ -55,19 +49,11 @@ impl<'a> Runs<'a> {
         Ok(Runs { sought, folder, units })
     }
 
-    /// Runs scenes side by side, each from its seed; the last is the longest.
-    fn run(&self, settings: &[(Setting, u64)]) -> Result<Vec<Observed>, Trouble> {
-        let file = &self.sought.model_file;
-        let model = std::path::absolute(file).unwrap_or_else(|_| file.clone()).display().to_string();
-        let run = |(number, (setting, seed)): (usize, &(Setting, u64))| -> Result<Observed, RunError> {
-            let text = setting.text(&model, &self.units, *seed) + OUTPUT;
-            let scene = Scene::parse(&setting.title, &text, Path::new(""))?;
-            let folder = self.folder.join(format!("run-{number}"));
-            run_scene(&scene, &folder, &mut |_| ())?;
-            Observed::read(&folder)
-        };
-        let all = jobs::each(settings.iter().enumerate().collect(), run);
-        all.into_iter().collect::<Result<_, _>>().map_err(stopped)
+    /// Runs settings of the liquid side by side, each from its seed.
+    fn run(&self, settings: Vec<(Setting, u64)>) -> Result<Vec<Observed>, Trouble> {
+        let of =
+            |(setting, seed)| Run { setting, model: self.sought.model_file.clone(), units: self.units, seed };
+        slabs::run(&settings.into_iter().map(of).collect::<Vec<_>>(), self.folder)
     }
 
     fn film(&self, strength: f64, time: f64) -> Setting {
@@ -81,13 +67,6 @@ impl<'a> Runs<'a> {
         let [height, film] = [HEIGHT, FILM].map(|length| length * self.units.range);
         split((&integral, whole), &ideal, [height, film], self.units.density * self.units.kt)
     }
-}
-
-/// The density at which theory with correlations has no pressure.
-fn guess(fluid: &Fluid) -> Result<Option<f64>, ExperimentError> {
-    let theory = MeanField::new(fluid)?;
-    let volume = fluid.cutoff().powi(3);
-    Ok(theory.correlations()?.and_then(|c| c.zero_pressure_density([0.5 / volume, 200.0 / volume])))
 }
 
 /// Tensions of the wall from the integral of `P_N − P_T` up to each height, and the whole of it: below the middle of the film, and beside
@@ -143,7 +122,8 @@ impl Instrument for Runs<'_> {
 
     fn slab(&mut self) -> Result<Slab, Trouble> {
         let seed = self.sought.seed;
-        let found = self.run(&[seed, seed.wrapping_add(1)].map(|seed| (Setting::slab(&self.units), seed)))?;
+        let found =
+            self.run([seed, seed.wrapping_add(1)].map(|seed| (Setting::slab(&self.units), seed)).into())?;
         let mean = |name: &str, column: &str| mean([0, 1].map(|k| found[k].scalar(name, column)));
         let slab = Slab {
             tension: mean("surface_tension", "free_energy"),
@@ -156,17 +136,18 @@ impl Instrument for Runs<'_> {
     }
 
     fn films(&mut self, strengths: [f64; 2]) -> Result<[Film; 2], Trouble> {
-        let found = self.run(&strengths.map(|strength| (self.film(strength, SEARCH), self.sought.seed)))?;
+        let found =
+            self.run(strengths.map(|strength| (self.film(strength, SEARCH), self.sought.seed)).into())?;
         Ok([0, 1].map(|k| self.tensions(&found[k])))
     }
 
     fn result(&mut self, strength: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble> {
         let seed = |number: u64| self.sought.seed.wrapping_add(1000 + 10 * round + number);
         let lines = wall(strength, &self.units, "\"zlo\"");
-        let found = self.run(&[
+        let found = self.run(vec![
             (self.film(strength, RESULT), seed(0)),
             (self.film(strength, RESULT), seed(1)),
-            (Setting::ridge(self.sought.angle, surface, lines, &self.units), seed(2)),
+            (Setting::ridge(self.sought.angle, surface, &lines, &self.units), seed(2)),
         ])?;
         let films = [0, 1].map(|k| self.tensions(&found[k]));
         let liquid = match films.map(|film| film.liquid) {
@@ -177,8 +158,4 @@ impl Instrument for Runs<'_> {
         let film = Film { liquid, vapour: mean(films.map(|film| film.vapour)), surface };
         Ok((film, found[2].scalar("contact_angle", "angle")))
     }
-}
-
-fn mean([a, b]: [Measured; 2]) -> Measured {
-    a.plus(b).times(0.5)
 }

@@ -1,10 +1,10 @@
 //! Walls whose answer is known, in place of runs; profiles and scenes by hand.
 
 use super::runs::split;
-use super::scene::Setting;
-use super::search::{angle, attracts, rounded};
+use super::search::{angle, attracts};
 use super::*;
 use crate::models::{SET6, SPLINE, STANDARD};
+use crate::slabs::Setting;
 use psidpd_dynamics::scene::Scene;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -1,13 +1,15 @@
-//! `psidpd model`: liquids by their data sheets, and walls by their contact angles.
+//! `psidpd model`: liquids by their data sheets, two of them by the tension between them, and walls by their contact angles.
 
 mod liquid;
+mod mixture;
 mod wall;
 
 use super::*;
 use liquid::OfLiquid;
+use mixture::OfMixture;
 use wall::OfWall;
 
-/// Make a model of a liquid, or a wall for it.
+/// Make a model of a liquid or of two, or a wall for it.
 #[derive(Debug, clap::Subcommand)]
 pub enum Verb {
     /// Make a model of a liquid from its data sheet.
@@ -16,6 +18,11 @@ pub enum Verb {
     /// Compressibility, tension and viscosity are met by short runs, and measured again by longer ones. Exits with 1, and
     /// writes nothing, if a number is not met; says then which two numbers conflict, and what is nearest.
     Liquid(Box<OfLiquid>),
+    /// Join the models of two liquids by the tension between them.
+    ///
+    /// Each keeps its own formulas; sought is the attraction between the species. Layers of both, one on the other, have the tension;
+    /// longer runs from other seeds measure the result. Exits with 1, and writes nothing, if it is not within 3 percent.
+    Mixture(OfMixture),
     /// Find the wall on which a liquid has a contact angle.
     ///
     /// The wall is matter behind a reflecting face, `[[wall]]` of a scene; found is the strength of its attraction. Three tensions and Young's law say the angle; a ridge of the liquid on the wall, which is
@@ -27,6 +34,7 @@ impl Verb {
     pub fn files(&self) -> Files {
         match self {
             Verb::Liquid(a) => a.files(),
+            Verb::Mixture(a) => a.files(),
             Verb::Wall(a) => a.files(),
         }
     }
@@ -35,6 +43,7 @@ impl Verb {
 pub fn run(verb: &Verb, told: Told) -> Result<Verdict, Failure> {
     match verb {
         Verb::Liquid(a) => liquid::run(a, told),
+        Verb::Mixture(a) => mixture::run(a, told),
         Verb::Wall(a) => wall::run(a, told),
     }
 }
@@ -76,4 +85,11 @@ impl Search {
 /// The last part of a path, for the command in the head of a file.
 fn file_name(path: &Path) -> String {
     path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| *x > 0.0 && x.is_finite())
+        .ok_or_else(|| "expected a number above 0".into())
 }

@@ -29,13 +29,6 @@ impl OfWall {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|x: &f64| *x > 0.0 && x.is_finite())
-        .ok_or_else(|| "expected a number above 0".into())
-}
-
 pub fn run(a: &OfWall, told: Told) -> Result<Verdict, Failure> {
     let sought = Sought {
         model_file: a.model.clone(),

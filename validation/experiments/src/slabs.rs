@@ -1,0 +1,139 @@
+//! Boxes with slabs and films that are run to measure tensions, and ridges. Lengths are in ranges of the forces, times in thermal units
+//! r √(m/kT).
+
+use crate::bulk::Observed;
+use crate::jobs;
+use crate::liquid::{Trouble, stopped};
+use crate::seek::rounded;
+use crate::steps::{FIRST, STEP};
+use psidpd_core::model::Fluid;
+use psidpd_core::theory::MeanField;
+use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::scene::Scene;
+use psidpd_observe::Measured;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Edges along surfaces, and the thickness of a film or half of a slab.
+pub const ALONG: f64 = 6.0;
+pub const FILM: f64 = 5.0;
+
+/// What settles, and how long a slab is measured.
+pub const SETTLE: f64 = 40.0;
+const SLAB: f64 = 300.0;
+
+/// Nothing is kept but what is observed.
+const OUTPUT: &str = "[output]\nthermo = 0\ncheckpoint = 0\n";
+
+/// The liquid in units of its model, and the step that it is moved with.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Units {
+    pub kt: f64,
+    /// The range of the forces.
+    pub range: f64,
+    /// The number density of the liquid.
+    pub density: f64,
+    pub dt: f64,
+}
+
+/// A box, and where liquid is in it.
+pub struct Setting {
+    pub title: String,
+    pub edges: [f64; 3],
+    /// Lines behind those of the box.
+    pub lines: String,
+    /// The `[[part]]`s.
+    pub parts: String,
+    pub settle: f64,
+    pub time: f64,
+    pub observe: String,
+}
+
+/// A length with three decimals.
+pub fn shown(length: f64) -> f64 {
+    (1e3 * length).round() / 1e3
+}
+
+/// The lines of a `[[part]]` of this shape.
+pub fn part(shape: &str, density: f64) -> String {
+    format!("[[part]]\n{shape}density = {:?}\nlattice = \"fcc\"\n", rounded(density))
+}
+
+/// The shape of a slab of this thickness about a height, or about the middle of the box.
+pub fn slab(thickness: f64, at: Option<f64>, units: &Units) -> String {
+    let shown = |length: f64| shown(length * units.range);
+    let at = at.map_or(String::new(), |at| format!("at = {:?}\n", shown(at)));
+    format!("shape = \"slab\"\nthickness = {:?}\n{at}", shown(thickness))
+}
+
+impl Setting {
+    /// A slab of the liquid with two surfaces.
+    pub fn slab(units: &Units) -> Setting {
+        Setting {
+            title: "A slab".into(),
+            edges: [ALONG, ALONG, 2.0 * FILM + 2.0],
+            lines: String::new(),
+            parts: part(&slab(FILM + 1.0, None, units), units.density),
+            settle: SETTLE,
+            time: SLAB,
+            observe: "every = 5\nsurface_tension = true\ninterface_width = { every = 25 }\n".into(),
+        }
+    }
+
+    /// The scene, with a model of this name and without the section on output.
+    pub fn text(&self, model: &str, units: &Units, seed: u64) -> String {
+        let Units { kt, range, dt, .. } = *units;
+        let steps = |time: f64| (time * range / kt.sqrt() / dt).ceil().max(100.0);
+        let edges = self.edges.map(|edge| shown(edge * range));
+        let mut text = format!(
+            "title = \"{}\"\nmodel = {}\nkT    = {kt:?}\nseed  = {seed}\n\n[box]\nlengths  = {edges:?}\n{}\n{}",
+            self.title,
+            toml::Value::String(model.to_owned()),
+            self.lines,
+            self.parts,
+        );
+        for (name, steps, dt) in [
+            ("begin", 400.0, FIRST * dt),
+            ("settle", steps(self.settle), dt),
+            ("measure", steps(self.time), dt),
+        ] {
+            let dt = rounded(dt);
+            let _ = write!(text, "\n[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
+        }
+        text + "\n[observe]\nstages = [\"measure\"]\n" + &self.observe
+    }
+}
+
+/// A setting with the file of its model, the units of its liquid, and a seed.
+pub struct Run {
+    pub setting: Setting,
+    pub model: PathBuf,
+    pub units: Units,
+    pub seed: u64,
+}
+
+/// Runs scenes side by side; the last is the longest.
+pub fn run(runs: &[Run], folder: &Path) -> Result<Vec<Observed>, Trouble> {
+    let one = |(number, run): (usize, &Run)| -> Result<Observed, RunError> {
+        let model = std::path::absolute(&run.model).unwrap_or_else(|_| run.model.clone());
+        let text = run.setting.text(&model.display().to_string(), &run.units, run.seed) + OUTPUT;
+        let scene = Scene::parse(&run.setting.title, &text, Path::new(""))?;
+        let folder = folder.join(format!("run-{number}"));
+        run_scene(&scene, &folder, &mut |_| ())?;
+        Observed::read(&folder)
+    };
+    let all = jobs::each(runs.iter().enumerate().collect(), one);
+    all.into_iter().collect::<Result<_, _>>().map_err(stopped)
+}
+
+pub fn mean([a, b]: [Measured; 2]) -> Measured {
+    a.plus(b).times(0.5)
+}
+
+/// The density at which theory with correlations has no pressure.
+pub fn guess(fluid: &Fluid) -> Result<Option<f64>, crate::ExperimentError> {
+    let theory = MeanField::new(fluid)?;
+    let volume = fluid.cutoff().powi(3);
+    Ok(theory.correlations()?.and_then(|c| c.zero_pressure_density([0.5 / volume, 200.0 / volume])))
+}
