@@ -223,7 +223,20 @@ impl Plot {
         [x, y]: [&Scale; 2],
         runs: &[Vec<Vec<Shown>>],
     ) -> Fallible {
+        if self.series.iter().all(|series| series.notes.is_empty()) {
+            return Ok(());
+        }
         let mut covered: Vec<Taken> = runs.iter().flatten().flatten().map(|s| taken(chart, s)).collect();
+        // Of lines, what is between their points too.
+        let lines = self.series.iter().zip(runs).filter(|(series, _)| series.style != Style::Points);
+        for ends in lines.flat_map(|(_, runs)| runs).flat_map(|run| run.windows(2)) {
+            let [a, b] = [ends[0].at, ends[1].at].map(|at| chart.backend_coord(&at));
+            let parts = ((b.0 - a.0).abs().max((b.1 - a.1).abs()) / px(4.0)).max(1);
+            covered.extend((0..=parts).map(|k| {
+                let [x, y] = [a.0 + (b.0 - a.0) * k / parts, a.1 + (b.1 - a.1) * k / parts];
+                [x - px(2.0), y - px(2.0), x + px(2.0), y + px(2.0)]
+            }));
+        }
         let (across, up) = chart.plotting_area().get_pixel_range();
         let mut noted: Vec<(i32, i32)> = Vec::new();
         for series in self.series.iter().rev() {
