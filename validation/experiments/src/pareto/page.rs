@@ -251,7 +251,7 @@ pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
                 is probably below the point.";
     let worst = "Of each setting the error that is the largest multiple of its tolerance. Front: nothing cheaper has a smaller one.";
     if let Some(plot) = plot_of_worst(outcome) {
-        plots.push(Item::figure(&plot, &format!("{worst} {what}"))?);
+        plots.push(Item::figure(&plot, format!("{worst} {what}"))?);
     }
     for plot in Class::ALL.into_iter().filter_map(|(_, class)| plot_of(outcome, class)) {
         plots.push(Item::figure(&plot, what)?);
