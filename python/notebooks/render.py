@@ -24,7 +24,7 @@ def shown(output, figure):
     data = output.get("data", {})
     if "image/png" in data:
         (DOCS / "figures" / figure).write_bytes(base64.b64decode(data["image/png"]))
-        return f"![{output.data.get('text/plain', 'A plot')}](figures/{figure})"
+        return f"![The plot of the cell above](figures/{figure})"
     text = output.get("text", data.get("text/plain", ""))
     return f"{FENCE}text\n{text.rstrip()}\n{FENCE}"
 

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::ReportError;
-use super::chart::{Chart, Fallible, GREY, INK, LEFT, SMALL, chart, font, note, pen, px, svg};
+use super::chart::{Area, Chart, Fallible, GREY, INK, LEFT, SMALL, chart, font, note, pen, px, svg};
 use super::scale::Scale;
 use super::text::{fit, one_line, width};
 use psidpd_pictures::colour;
@@ -34,6 +34,10 @@ pub struct Series {
     pub style: Style,
     /// The number of its colour, such as that of a series that belongs to it; its place in the plot if left out.
     pub colour: Option<usize>,
+    /// What is written beside its points, where there is room; those of the last series come first.
+    pub notes: Vec<String>,
+    /// Which points are upper limits: an arrow points down from these. Missing ones are none.
+    pub limits: Vec<bool>,
 }
 
 /// A plot with linear or logarithmic axes.
@@ -71,11 +75,19 @@ fn colour_of(k: usize) -> RGBColor {
 impl Series {
     /// Points without errors.
     pub fn new(name: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Series {
-        Series { name: name.into(), points, errors: None, style, colour: None }
+        Series { name: name.into(), points, style, ..Series::default() }
     }
 
     pub fn with_errors(self, errors: Vec<f64>) -> Series {
         Series { errors: Some(errors), ..self }
+    }
+
+    pub fn with_notes(self, notes: Vec<String>) -> Series {
+        Series { notes, ..self }
+    }
+
+    pub fn with_limits(self, limits: Vec<bool>) -> Series {
+        Series { limits, ..self }
     }
 
     /// The error of a point, if it can be drawn.
@@ -85,13 +97,17 @@ impl Series {
     }
 }
 
-/// A point that can be shown, and the lower and upper end of its error bar.
+/// A point that can be shown, the lower and upper end of its error bar, and whether it is an upper limit.
 #[derive(Clone, Copy)]
 struct Shown {
     at: (f64, f64),
     low: f64,
     high: f64,
+    is_limit: bool,
 }
+
+/// A part of the drawing that is taken, in drawing units: left, top, right, bottom.
+type Taken = [i32; 4];
 
 impl Plot {
     pub fn new(title: impl Into<String>, labels: [impl Into<String>; 2], series: Vec<Series>) -> Plot {
@@ -128,6 +144,7 @@ impl Plot {
             for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
                 draw_series(&mut chart, series.colour.unwrap_or(k), series, runs)?;
             }
+            self.draw_notes(area, &chart, [x, y], &runs)?;
             Ok(())
         })
     }
@@ -188,7 +205,7 @@ impl Plot {
             let error = series.error(k).unwrap_or(0.0);
             let [low, high] = self.within(b, error);
             let (low, high) = (y.clamp(low).unwrap_or(y.ends().0), y.clamp(high).unwrap_or(y.ends().1));
-            Some(Shown { at, low, high })
+            Some(Shown { at, low, high, is_limit: series.limits.get(k) == Some(&true) })
         };
         let points: Vec<Option<Shown>> = series.points.iter().enumerate().map(shown).collect();
         points
@@ -196,6 +213,71 @@ impl Plot {
             .filter(|run| !run.is_empty())
             .map(|run| run.iter().flatten().copied().collect())
             .collect()
+    }
+
+    /// Writes the notes of points beside them where they cover no point, bar or other note, and leaves out the others.
+    fn draw_notes(
+        &self,
+        area: &Area,
+        chart: &Chart,
+        [x, y]: [&Scale; 2],
+        runs: &[Vec<Vec<Shown>>],
+    ) -> Fallible {
+        if self.series.iter().all(|series| series.notes.is_empty()) {
+            return Ok(());
+        }
+        let mut covered: Vec<Taken> = runs.iter().flatten().flatten().map(|s| taken(chart, s)).collect();
+        // Of lines, what is between their points too.
+        let lines = self.series.iter().zip(runs).filter(|(series, _)| series.style != Style::Points);
+        for ends in lines.flat_map(|(_, runs)| runs).flat_map(|run| run.windows(2)) {
+            let [a, b] = [ends[0].at, ends[1].at].map(|at| chart.backend_coord(&at));
+            let parts = ((b.0 - a.0).abs().max((b.1 - a.1).abs()) / px(4.0)).max(1);
+            covered.extend((0..=parts).map(|k| {
+                let [x, y] = [a.0 + (b.0 - a.0) * k / parts, a.1 + (b.1 - a.1) * k / parts];
+                [x - px(2.0), y - px(2.0), x + px(2.0), y + px(2.0)]
+            }));
+        }
+        let (across, up) = chart.plotting_area().get_pixel_range();
+        let mut noted: Vec<(i32, i32)> = Vec::new();
+        for series in self.series.iter().rev() {
+            for (text, &(a, b)) in series.notes.iter().zip(&series.points) {
+                let (Some(a), Some(b)) = (x.clamp(a), y.clamp(b)) else { continue };
+                let at = chart.backend_coord(&(a, b));
+                let text = fit(text, SMALL, NAME);
+                if noted.contains(&at) || text.trim().is_empty() {
+                    continue;
+                }
+                let [long, high] = [px(width(&text, SMALL)), px(SMALL)];
+                let beside = [
+                    (at.0 + px(6.0), at.1 - high / 2),
+                    (at.0 - px(6.0) - long, at.1 - high / 2),
+                    (at.0 - long / 2, at.1 - px(6.0) - high),
+                    (at.0 - long / 2, at.1 + px(6.0)),
+                    (at.0 + px(4.0), at.1 - px(4.0) - high),
+                    (at.0 - px(4.0) - long, at.1 - px(4.0) - high),
+                    (at.0 + px(4.0), at.1 + px(4.0)),
+                    (at.0 - px(4.0) - long, at.1 + px(4.0)),
+                ];
+                let boxes = beside.map(|(left, top)| [left, top, left + long, top + high]);
+                let is_free = |[left, top, right, bottom]: &Taken| {
+                    let inside = across.contains(left)
+                        && across.contains(right)
+                        && up.contains(top)
+                        && up.contains(bottom);
+                    inside
+                        && covered
+                            .iter()
+                            .all(|c| *right < c[0] || c[2] < *left || *bottom < c[1] || c[3] < *top)
+                };
+                if let Some(place) = boxes.into_iter().find(is_free) {
+                    let style = font(SMALL, INK).pos(Pos::new(HPos::Left, VPos::Center));
+                    area.draw(&Text::new(text, (place[0], (place[1] + place[3]) / 2), style))?;
+                    covered.push(place);
+                    noted.push(at);
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Draws horizontal lines, whose names are in the legend, and vertical lines with names above them if there is room.
@@ -220,15 +302,35 @@ impl Plot {
     }
 }
 
-/// Draws a band along a line, and bars at single points.
+/// How far the arrow of an upper limit reaches down from its point, in pixels.
+const ARROW: f64 = 14.0;
+
+/// What the marker of a point, its bar and its arrow take, in a chart.
+fn taken(chart: &Chart, s: &Shown) -> Taken {
+    let (x, y) = chart.backend_coord(&s.at);
+    let [top, bottom] = [s.high, s.low].map(|end| chart.backend_coord(&(s.at.0, end)).1);
+    let arrow = if s.is_limit { px(ARROW) } else { 0 };
+    let r = px(4.0);
+    [x - r, top.min(y - r), x + r, bottom.max(y + r + arrow)]
+}
+
+/// Draws a band along a line, bars at single points, and arrows down from upper limits.
 fn draw_errors(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
     let colour = colour_of(k);
     for run in runs {
         if series.style == Style::Points || run.len() == 1 {
-            let bar = |s: &Shown| {
-                ErrorBar::new_vertical(s.at.0, s.low, s.at.1, s.high, pen(colour, 1.2), px(6.0) as u32)
-            };
-            chart.draw_series(run.iter().filter(|s| s.low < s.high).map(bar))?;
+            let thin = pen(colour, 1.2);
+            let stroke = |path: &[(i32, i32)]| PathElement::new(path.to_vec(), thin);
+            let end = [(px(-3.0), 0), (px(3.0), 0)];
+            for s in run.iter().filter(|s| s.low < s.high) {
+                let (low, high) = ((s.at.0, s.low), (s.at.0, s.high));
+                chart.draw_series([PathElement::new([low, high], thin)])?;
+                chart.draw_series([low, high].map(|at| EmptyElement::at(at) + stroke(&end)))?;
+            }
+            let shaft = [(0, 0), (0, px(ARROW))];
+            let head = [(px(-3.0), px(ARROW - 4.0)), (0, px(ARROW)), (px(3.0), px(ARROW - 4.0))];
+            let limits = run.iter().filter(|s| s.is_limit);
+            chart.draw_series(limits.map(|s| EmptyElement::at(s.at) + stroke(&shaft) + stroke(&head)))?;
         } else if run.iter().any(|s| s.low < s.high) {
             let upper = run.iter().map(|s| (s.at.0, s.high));
             let outline: Vec<_> = upper.chain(run.iter().rev().map(|s| (s.at.0, s.low))).collect();
@@ -339,7 +441,7 @@ mod tests {
                     points: vec![(0.0, 1.0), (f64::NAN, 2.0), (2.0, 3.0), (3.0, 2.0)],
                     errors: Some(vec![0.5, 0.1]),
                     style: Style::Line,
-                    colour: None,
+                    ..Series::default()
                 },
                 Series { name: "none".into(), ..Series::default() },
             ],
@@ -354,6 +456,50 @@ mod tests {
             assert!(texts.iter().any(|t| t == text), "{text} is not in {texts:?}");
         }
         assert!(!texts.iter().any(|t| t == "hidden"));
+    }
+
+    /// Where the texts of a plot are, in drawing units: left, top, right, bottom.
+    fn boxes(svg: &str, of: impl Fn(&str) -> bool) -> Vec<[f64; 4]> {
+        let document = roxmltree::Document::parse(svg).unwrap();
+        let nodes = document.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/2000/svg", "text")));
+        let wanted = nodes.filter(|n| n.text().is_some_and(|t| of(t.trim())));
+        let place = |n: roxmltree::Node| {
+            let of = |name: &str| n.attribute(name).unwrap().parse::<f64>().unwrap();
+            let long = f64::from(px(width(n.text().unwrap().trim(), SMALL)));
+            let high = f64::from(px(SMALL));
+            [of("x"), of("y") - high / 2.0, of("x") + long, of("y") + high / 2.0]
+        };
+        wanted.map(place).collect()
+    }
+
+    #[test]
+    fn notes_stand_beside_points_and_cover_none() {
+        let points: Vec<(f64, f64)> = (0..60).map(|k| (f64::from(k % 8), f64::from(k * k % 17))).collect();
+        let notes = (0..60).map(|k| format!("n{k}")).collect();
+        let crowd = Series::new("crowd", points, Style::Points).with_notes(notes);
+        let one = Series::new("one", vec![(3.5, 8.5)], Style::Points).with_notes(vec!["n-one".into()]);
+        let svg = Plot::new("t", ["x", "y"], vec![crowd, one]).render().unwrap();
+        let all = boxes(&svg, |t| t.starts_with('n'));
+        assert!(all.len() > 20 && texts(&svg).contains(&"n-one".to_owned()), "{}", all.len());
+        let apart = |a: &[f64; 4], b: &[f64; 4]| a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
+        for (k, a) in all.iter().enumerate() {
+            assert!(all[..k].iter().all(|b| apart(a, b)), "{a:?}");
+        }
+    }
+
+    /// A bar leaves the marker of its series as it is in the legend.
+    #[test]
+    fn bars_and_limits_keep_the_markers() {
+        let of = |k: usize| {
+            let none = Series::new("", vec![(0.0, 1.0)], Style::Points);
+            let last = Series::new("s", vec![(1.0, 2.0), (2.0, 1.0)], Style::Points);
+            let last = last.with_errors(vec![0.5, f64::NAN]).with_limits(vec![false, true]);
+            let series = std::iter::repeat_n(none, k).chain([last]).collect();
+            Plot::new("t", ["x", "y"], series).render().unwrap()
+        };
+        // Of the first series the points are circles, and one is in the legend; of the second triangles.
+        assert_eq!(of(0).matches("<circle").count(), 3);
+        assert_eq!((of(1).matches("<circle").count(), of(1).matches("<polygon").count()), (1, 3));
     }
 
     #[test]
@@ -372,8 +518,10 @@ mod tests {
             points in prop::collection::vec(any::<(f64, f64)>(), 0..6),
             errors in prop::option::of(prop::collection::vec(any::<f64>(), 0..8)),
             style in style(),
+            notes in prop::collection::vec(".*", 0..6),
+            limits in prop::collection::vec(any::<bool>(), 0..6),
         ) -> Series {
-            Series { name, points, errors, style, colour: None }
+            Series { name, points, errors, style, notes, limits, colour: None }
         }
     }
 

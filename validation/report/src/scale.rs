@@ -136,7 +136,7 @@ impl ValueFormatter<f64> for Scale {
         let text = format!("{:.decimals$}", value / unit);
         let fraction = text.contains('.');
         let short = if fraction { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-        if short == "-0" { "0".to_owned() } else { short.to_owned() }
+        if short == "-0" { "0".to_owned() } else { short.replace('-', "−") }
     }
 }
 

@@ -35,7 +35,8 @@ pub(super) fn columns(text: &str) -> usize {
 
 /// The approximate width of text in a proportional font, in units of `size`.
 pub(super) fn width(text: &str, size: f64) -> f64 {
-    0.56 * size * columns(text) as f64
+    let capitals = text.chars().filter(|c| c.is_uppercase()).count();
+    size * (0.56 * columns(text) as f64 + 0.14 * capitals as f64)
 }
 
 /// Shortens one line with an ellipsis so that it fits in `room`.

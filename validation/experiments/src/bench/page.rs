@@ -143,22 +143,24 @@ fn memory(outcome: &Benchmark) -> Table {
 fn plot(outcome: &Benchmark, fluid: &'static str, title: &str) -> Plot {
     let best = Instructions::best();
     let wanted = [
-        "lammps mdpd".to_owned(),
-        "lammps eam/alloy".to_owned(),
-        "lammps dpd".to_owned(),
-        "plugin dpd/psi precision mixed".to_owned(),
-        "plugin dpd/psi precision double".to_owned(),
-        format!("native mixed {best} 1"),
-        format!("native double {best} 1"),
-        format!("native mixed {best} 2"),
+        ("lammps mdpd".to_owned(), "LAMMPS, mdpd"),
+        ("lammps eam/alloy".to_owned(), "LAMMPS, eam/alloy"),
+        ("lammps dpd".to_owned(), "LAMMPS, dpd"),
+        ("plugin dpd/psi precision mixed".to_owned(), "psidpd in LAMMPS, mixed precision"),
+        ("plugin dpd/psi precision double".to_owned(), "psidpd in LAMMPS, double precision"),
+        (format!("native mixed {best} 1"), "psidpd, mixed precision"),
+        (format!("native double {best} 1"), "psidpd, double precision"),
+        (format!("native mixed {best} 2"), "psidpd, mixed precision, 2 threads"),
     ];
-    let series = wanted.iter().filter_map(|code| {
-        let runs: Vec<&Timed> = outcome.runs.iter().filter(|r| r.fluid == fluid && r.code == *code).collect();
-        let of = |r: &&Timed| (r.particles as f64, r.mega_particle_steps_per_second.median);
+    let series = wanted.into_iter().filter_map(|(code, name)| {
+        let runs: Vec<&Timed> = outcome.runs.iter().filter(|r| r.fluid == fluid && r.code == code).collect();
+        let speed = |r: &Timed| r.mega_particle_steps_per_second;
+        let points = runs.iter().map(|r| (r.particles as f64, speed(r).median)).collect();
+        let errors = runs.iter().map(|r| 0.5 * (speed(r).max - speed(r).min)).collect();
         let style = if runs.len() > 1 { Style::Line } else { Style::Points };
-        (!runs.is_empty()).then(|| Series::new(code.clone(), runs.iter().map(of).collect(), style))
+        (!runs.is_empty()).then(|| Series::new(name, points, style).with_errors(errors))
     });
-    let labels = ["particles", "10⁶ particle-steps per second"];
+    let labels = ["number of particles", "speed [10⁶ particle-steps/s]"];
     Plot { log_x: true, log_y: true, ..Plot::new(title, labels, series.collect()) }
 }
 
@@ -171,7 +173,8 @@ pub fn report(outcome: &Benchmark) -> Result<String, ExperimentError> {
     ))];
     speed.extend(few(&outcome.options).map(Item::Prose));
     for fluid in &outcome.fluids {
-        speed.push(Item::figure(&plot(outcome, fluid.name, fluid.title), "")?);
+        let caption = "On one thread of one rank, unless the name says otherwise. Bands and bars: half of the range of the rounds.";
+        speed.push(Item::figure(&plot(outcome, fluid.name, fluid.title), caption)?);
     }
     speed.push(Item::Table(speeds(outcome)));
     speed.push(Item::Table(fastest(outcome)));

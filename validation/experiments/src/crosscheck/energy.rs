@@ -17,6 +17,7 @@ use serde_json::json;
 
 pub const SEED: u64 = 20_010_703;
 
+const TIME: &str = "time [length √(mass/energy)]";
 /// Drift allowed over the run, in kT per particle.
 const LARGEST_DRIFT: f64 = 1e-4;
 /// Rise of the temperature that counts as heating.
@@ -77,8 +78,9 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
         let points = trace.time.iter().copied().zip(trace.temperature.iter().copied()).collect();
         heat.push(Series::new(label, points, Style::Line));
     }
-    let heat = Plot::new("Temperature without thermostat", ["time", "kinetic temperature"], heat);
-    let energy = Plot::new("Total energy per particle, less its start", ["time", "kT"], energy);
+    let heat = Plot::new("Temperature without thermostat", [TIME, "kinetic temperature [energy]"], heat);
+    let energy =
+        Plot::new("Total energy per particle, less its start", [TIME, "energy per particle [kT]"], energy);
     let text = format!(
         "{} particles of set 6 at density {}, no drag, no noise, Δt = {}. The built-in's law is its own; its energy is not \
          shown in the second figure because what it tallies is not the potential of its forces.",

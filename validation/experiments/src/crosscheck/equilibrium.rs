@@ -197,7 +197,7 @@ fn report_set(
     let quantities = QUANTITIES.iter().map(|(name, ..)| *name);
     let mut table = Table::new(std::iter::once("code").chain(quantities).chain(["width"]));
     let levels = vec![(set.fluid.density, format!("Warren: {}", set.fluid.density))];
-    let labels = ["z, from the middle of the slab", "number density"];
+    let labels = ["z, from the middle of the slab [length]", "number density [1/length³]"];
     let mut plot = Plot { levels, ..Plot::new(format!("Density profile, {}", set.name), labels, Vec::new()) };
     let code_slug = |code: Code| Setup::new(code, set, ForceLaw::Conservative).slug();
     for ((code, law, _), m) in RUNS.iter().zip(measured) {

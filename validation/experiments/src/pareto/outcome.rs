@@ -1,7 +1,7 @@
 //! What `pareto.json` has.
 
 use super::drift::EnergyDrift;
-use super::quantity::{self, Class, Deviation};
+use super::quantity::{self, Deviation};
 use super::setting::Setting;
 use super::tolerance::{self, Tolerance, Worst};
 use crate::bench::Spread;
@@ -113,11 +113,6 @@ pub struct Point {
 }
 
 impl Point {
-    /// The largest error of a kind, as it is shown.
-    pub fn error(&self, class: Class) -> Option<&Deviation> {
-        self.errors.iter().filter(|d| d.class == class).max_by(|a, b| a.shown().total_cmp(&b.shown()))
-    }
-
     /// Whether all errors are within their bounds, two of their own added, as far as is known; false where nothing was measured
     /// that is bound.
     pub fn is_within(&self, tolerances: &[Tolerance]) -> bool {

@@ -2,6 +2,7 @@
 
 use super::outcome::{Comparison, Point, Reference};
 use super::quantity::{Class, Deviation};
+use super::tolerance::Tolerance;
 use crate::ExperimentError;
 use crate::code::Host;
 use psidpd_report::{Item, Plot, Report, Section, Series, Style, Table, distinct};
@@ -85,56 +86,86 @@ pub fn drifts(outcome: &Comparison) -> Table {
 fn group(p: &Point) -> String {
     match p.code {
         Host::Native => p.integrator.split(',').next().unwrap_or_default().to_owned(),
-        Host::Plugin => "plugin in LAMMPS".to_owned(),
+        Host::Plugin => "psidpd in LAMMPS".to_owned(),
         Host::Lammps => "LAMMPS's own style".to_owned(),
     }
 }
 
-/// Points of error against cost, in groups; `error` and its bar are in percent or in units of a tolerance.
-fn groups(outcome: &Comparison, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
-    let place = |p: &Point| Some((p.cost.as_ref()?.value, error(p)?[0]));
+/// An error as it is drawn: its place, its bar, and whether it is an upper limit.
+struct Drawn {
+    at: f64,
+    bar: f64,
+    is_limit: bool,
+}
+
+/// Points of error against cost, in groups, with their time steps; errors are in percent or in units of a tolerance.
+fn groups(outcome: &Comparison, error: impl Fn(&Point) -> Option<Drawn>) -> Vec<Series> {
+    let place = |p: &Point| Some((p.cost.as_ref()?.value, error(p)?.at));
     let shown: Vec<&Point> = outcome.points.iter().filter(|p| place(p).is_some()).collect();
     let series = |name: String| {
         let own: Vec<&&Point> = shown.iter().filter(|p| group(p) == name).collect();
         let points = own.iter().filter_map(|p| place(p)).collect();
-        let errors = own.iter().map(|p| error(p).map_or(f64::NAN, |e| e[1])).collect();
-        Series::new(name, points, Style::Points).with_errors(errors)
+        let drawn: Vec<Drawn> = own.iter().filter_map(|p| error(p)).collect();
+        Series::new(name, points, Style::Points)
+            .with_errors(drawn.iter().map(|e| e.bar).collect())
+            .with_limits(drawn.iter().map(|e| e.is_limit).collect())
+            .with_notes(own.iter().map(|p| p.dt.to_string()).collect())
     };
     distinct(shown.iter().map(|p| group(p))).into_iter().map(series).collect()
 }
 
 fn plot(title: &str, y_label: String, series: Vec<Series>, levels: Vec<(f64, String)>) -> Plot {
-    let labels = ["wall seconds per unit of simulated time".to_owned(), y_label];
+    let labels = ["wall time per unit of simulated time [s]".to_owned(), y_label];
     Plot { log_x: true, log_y: true, levels, ..Plot::new(title, labels, series) }
 }
 
 /// The worst error of every setting against its cost; the front is a line.
 fn plot_of_worst(outcome: &Comparison) -> Option<Plot> {
-    let error = |p: &Point| Some([p.worst.as_ref()?.ratio, f64::NAN]);
+    let error = |p: &Point| {
+        let worst = p.worst.as_ref()?;
+        let is_limit = p.errors.iter().any(|d| d.name == worst.quantity && !d.resolved);
+        Some(Drawn { at: worst.ratio, bar: f64::NAN, is_limit })
+    };
     let mut series = groups(outcome, error);
     if series.is_empty() {
         return None;
     }
-    let front = outcome.points.iter().filter(|p| p.front);
-    let mut points: Vec<(f64, f64)> =
-        front.filter_map(|p| Some((p.cost.as_ref()?.value, error(p)?[0]))).collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    series.push(Series::new("front", points, Style::Line));
+    let mut front: Vec<&Point> = outcome.points.iter().filter(|p| p.front).collect();
+    let cost = |p: &Point| p.cost.as_ref().map_or(f64::INFINITY, |c| c.value);
+    front.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    let points = front.iter().map(|p| (cost(p), error(p).map_or(f64::NAN, |e| e.at))).collect();
+    let steps = front.iter().map(|p| p.dt.to_string()).collect();
+    series.push(Series::new("front", points, Style::Line).with_notes(steps));
     let label = "worst error over its tolerance".to_owned();
     Some(plot("Worst error against cost", label, series, vec![(1.0, "tolerance".into())]))
 }
 
-/// Error against cost for one kind of quantity.
+/// Error against cost for one kind of quantity. The pressure that LAMMPS prints, which is too noisy, is not judged unless it was asked for.
 fn plot_of(outcome: &Comparison, class: Class) -> Option<Plot> {
+    let is_judged = |d: &&Deviation| {
+        d.class == class && (d.name != "p_total" || outcome.tolerances.iter().any(|t| t.name == d.name))
+    };
     let error = |p: &Point| {
-        let d = p.error(class)?;
-        Some([100.0 * d.shown(), if d.resolved { 100.0 * d.error } else { f64::NAN }])
+        let d = p.errors.iter().filter(is_judged).max_by(|a, b| a.shown().total_cmp(&b.shown()))?;
+        let bar = if d.resolved { 100.0 * d.error } else { f64::NAN };
+        Some(Drawn { at: 100.0 * d.shown(), bar, is_limit: !d.resolved })
     };
     let series = groups(outcome, error);
-    let title = format!("Error of {} against cost", class.name());
-    let levels = outcome.tolerances.iter().filter(|t| t.name == class.name());
-    let levels = levels.map(|t| (100.0 * t.bound, "tolerance".to_owned())).collect();
-    (!series.is_empty()).then(|| plot(&title, format!("error of {}, %", class.name()), series, levels))
+    let judged = outcome.points.iter().flat_map(|p| &p.errors).filter(is_judged);
+    let names = distinct(judged.map(|d| d.name.clone()));
+    let bounds = outcome.tolerances.iter().filter(|t| t.name == class.name() || names.contains(&t.name));
+    let bounds: Vec<_> = bounds.collect();
+    let same = bounds.iter().all(|t| t.bound == bounds[0].bound);
+    let name = |t: &Tolerance| match same {
+        true => "tolerance".to_owned(),
+        false => format!("tolerance of {}, {} %", t.name, (1e6 * t.bound).round() / 1e4),
+    };
+    let levels = bounds.iter().take(if same { 1 } else { usize::MAX });
+    let levels = levels.map(|t| (100.0 * t.bound, name(t))).collect();
+    let [words, unit] = class.words();
+    let of_which = if names.len() > 1 { "largest error" } else { "error" };
+    let label = format!("{of_which} of the {words} [{unit}]");
+    (!series.is_empty()).then(|| plot(&format!("Error of the {words}"), label, series, levels))
 }
 
 /// How sure the recommendation is.
@@ -149,10 +180,13 @@ fn decision(outcome: &Comparison) -> String {
     let cheapest = outcome.undecided.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
     let cheapest = cheapest.map(|k| &outcome.points[*k]);
     let name = cheapest.map_or_else(String::new, |p| format!("{}, dt = {}", p.name(), p.dt));
+    let open = match outcome.undecided.len() {
+        1 => format!("one setting is not decided, {name}"),
+        n => format!("{n} settings are not decided, the cheapest of them {name}"),
+    };
     format!(
-        "Each error counts with two of its standard deviations. By the {margin:.1} that all looks at all settings ask for, {} \
-         settings are not decided, the cheapest of them {name}; longer runs (--minutes) decide more.",
-        outcome.undecided.len()
+        "Each error counts with two of its standard deviations. By the {margin:.1} that all looks at all settings ask for, \
+         {open}; longer runs (--minutes) decide more."
     )
 }
 
@@ -213,11 +247,14 @@ pub fn explanation(outcome: &Comparison) -> String {
 
 pub fn report(outcome: &Comparison) -> Result<String, ExperimentError> {
     let mut plots = Vec::new();
-    let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
-    for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {
-        let caption =
-            "Points without a bar: the error was not resolved; it is probably below the value shown.";
-        plots.push(Item::figure(&plot, caption)?);
+    let what = "Numbers are time steps Δt, where there is room for them; the table has all. An arrow: the error is not resolved, and \
+                is probably below the point.";
+    let worst = "Of each setting the error that is the largest multiple of its tolerance. Front: nothing cheaper has a smaller one.";
+    if let Some(plot) = plot_of_worst(outcome) {
+        plots.push(Item::figure(&plot, format!("{worst} {what}"))?);
+    }
+    for plot in Class::ALL.into_iter().filter_map(|(_, class)| plot_of(outcome, class)) {
+        plots.push(Item::figure(&plot, what)?);
     }
     let mut settings = vec![Item::Prose(explanation(outcome)), Item::Table(table(outcome))];
     settings.extend(outcome.left_out.iter().cloned().map(Item::Prose));

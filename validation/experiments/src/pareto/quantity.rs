@@ -39,6 +39,20 @@ impl Class {
         Class::ALL.iter().find(|(_, class)| *class == self).map_or("", |found| found.0)
     }
 
+    /// What it is in words with its symbol, and the unit of its errors.
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Class::Energy => ["energy per particle u", "% of kT"],
+            Class::Pressure => ["pressure p", "% of ρkT"],
+            Class::Temperature => ["temperature T", "% of kT"],
+            Class::Density => ["coexisting densities ρ", "% of the liquid's"],
+            Class::Tension => ["surface tension σ", "%"],
+            Class::Diffusion => ["diffusion coefficient D", "%"],
+            Class::Viscosity => ["shear viscosity η", "%"],
+            Class::Structure => ["radial distribution function g(r)", "%"],
+        }
+    }
+
     /// Whether it is a property of configurations alone, which a reference without a time step has.
     pub fn is_of_configurations(self) -> bool {
         !matches!(self, Class::Diffusion | Class::Viscosity)
