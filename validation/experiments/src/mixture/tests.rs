@@ -108,7 +108,7 @@ fn what_cannot_be_mixed_is_refused_with_the_reason() {
     assert!(said.contains("units of length differ") && said.contains("--rc 1e-9"), "{said}");
     assert!(merge::units([&plain, &small]).unwrap_err().to_string().contains("has none"));
     let heavy = of(&units(1e-9).replace("mass = 2e-25", "mass = 3e-25"), "heavy");
-    assert_eq!(merge::units([&small, &heavy]).unwrap().1, 1.5);
+    assert!((merge::units([&small, &heavy]).unwrap().1 - 1.5).abs() < 1e-12);
     // One name for both, or one that no species can have, is an error of the model.
     for name in ["small", "a b"] {
         let mut other = small.clone();
@@ -180,7 +180,9 @@ fn the_attraction_is_found_through_noise() {
                 let exact = curve(found.cross);
                 assert!(found.good && found.refusal.is_none(), "{wanted}, seed {seed}: {found:?}");
                 assert!((exact / wanted - 1.0).abs() < 0.075, "{wanted}, seed {seed}: {exact}");
-                assert!(known.asked.len() <= 20, "{wanted}, seed {seed}: {:?}", known.asked);
+                // A small tension needs all pairs, twice.
+                let most = if wanted < 5.0 { 30 } else { 20 };
+                assert!(known.asked.len() <= most, "{wanted}, seed {seed}: {:?}", known.asked);
             }
         }
     }
