@@ -103,7 +103,7 @@ fn renamed(formula: &str, names: &BTreeMap<String, String>) -> String {
         let (before, word) = rest.split_at(start);
         let end = word.find(|c| !is_part(c)).unwrap_or(word.len());
         out += before;
-        // A number, as 1e5, is no name and stays.
+        // A number, as 1e5, is not a name and stays.
         out += names.get(&word[..end]).map_or(&word[..end], |name| name);
         rest = &word[end..];
     }
