@@ -168,7 +168,7 @@ fn of(known: &mut Known, tension: f64) -> Found {
 }
 
 /// As that of water and an oil, and one that is steep.
-const CURVES: [fn(f64) -> f64; 2] = [|s| 14.0 - 9.0 * s - 4.0 * s * s, |s| 14.5 * (1.0 - s.sqrt())];
+const CURVES: [fn(f64) -> f64; 2] = [|s| 14.0 - 9.0 * s - 4.0 * s * s, |s| 14.5 - 16.0 * s.powf(0.8)];
 
 #[test]
 fn the_attraction_is_found_through_noise() {
