@@ -26,6 +26,7 @@ pub const TOLERANCE: f64 = 0.03;
 /// The standard error of the line, relative to the tension, with which the search is content.
 const CONTENT: f64 = 0.01;
 
+/// The first strengths.
 const FIRST: [f64; 2] = [0.5, 0.8];
 
 /// How often the result is measured and sought again.
@@ -97,7 +98,8 @@ impl Found {
         self.layers.map_or(Measured::NONE, |layers| layers.tension.times(self.unit))
     }
 
-    /// `γ_B − γ_A − γ_AB` in the unit of the wanted tension, with the name of B: the one of the larger tension. Above 0 the other spreads on it.
+    /// `γ_B − γ_A − γ_AB` in the unit of the wanted tension, with the index of B, the liquid of the larger tension. Above 0 the other spreads
+    /// on it.
     pub fn spreading(&self) -> (usize, Measured) {
         let [a, b] = self.alone.map(|alone| alone.tension);
         let below = usize::from(b.value > a.value);
@@ -254,6 +256,7 @@ fn search(
         }
     }
     let best = line(&points(&found.trials), goal.value);
+    // The best line that there is.
     Ok(best.map(|(cross, _)| cross).ok_or_else(|| {
         let off = |t: &&Trial| (t.tension.value - wanted).abs();
         let nearest = found.trials.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
