@@ -43,6 +43,14 @@ mod tests {
         for angle in [20.0f64, 30.0, 60.0, 120.0, 160.0] {
             let Ridge { edges, start: [across, top] } = ridge(angle);
             assert!(edges[1] >= HEIGHT + ROOM - 1e-9 && edges[0] > 2.0 * across, "{angle}");
+            // The rectangle has the area of the part of the circle, summed in slices.
+            let widest = 0.5 * edges[0] - ROOM;
+            let radius = if angle < 90.0 { widest / angle.to_radians().sin() } else { widest };
+            let height = radius * (1.0 - angle.to_radians().cos());
+            let wide = |y: f64| 2.0 * (radius * radius - (y - height + radius).powi(2)).sqrt();
+            let slices = (0..4000).map(|k| (f64::from(k) + 0.5) / 4000.0 * height);
+            let area = slices.map(wide).sum::<f64>() * height / 4000.0;
+            assert!((2.0 * across * top / area - 1.0).abs() < 1e-3, "{angle}: {area}");
             assert!(top + ROOM <= edges[1] + 1e-9 && 2.0 * across * top >= AREA - 1e-9);
         }
     }
