@@ -417,6 +417,7 @@ fn errors_of_every_verb_name_the_file() {
         ("model liquid w --density 997 --molecules 3 --out x.toml", &["molar_mass"]),
         ("model mixture w.toml w.toml --tension 5 --out x.toml", &["both liquids are called w", "--species"]),
         ("model mixture w.toml w.toml --species a --tension 5 --out x.toml", &["2 values"]),
+        ("model mixture w.toml w.toml --species a-b c --tension 5 --out x.toml", &["a-b", "letters, digits"]),
         ("model mixture w.toml m.toml --tension -5 --out x.toml", &["above 0"]),
         ("model wall m.toml --contact-angle 190 --out x.toml", &["160 degrees"]),
         ("model wall m.toml --contact-angle 60 --density -1 --out x.toml", &["above 0"]),

@@ -2,14 +2,15 @@
 //! r √(m/kT).
 
 use crate::bulk::Observed;
-use crate::jobs;
 use crate::liquid::{Trouble, stopped};
 use crate::seek::rounded;
 use crate::steps::{FIRST, STEP};
-use psidpd_core::model::Fluid;
+use crate::{ExperimentError, jobs, steps};
+use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::{RunError, run_scene};
 use psidpd_dynamics::scene::Scene;
+use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_observe::Measured;
 use serde::Serialize;
 use std::fmt::Write;
@@ -131,8 +132,28 @@ pub fn mean([a, b]: [Measured; 2]) -> Measured {
     a.plus(b).times(0.5)
 }
 
+/// The units of a liquid of one species with this mass, settled, at about this density or that of theory. `named` is what errors call it,
+/// and the option that gives densities.
+pub fn settled(
+    (model, mass, density): (&Model, f64, Option<f64>),
+    kt: f64,
+    seed: u64,
+    named: [&str; 2],
+) -> Result<Units, ExperimentError> {
+    let [name, option] = named;
+    let fluid = model.at(kt)?;
+    let none = || {
+        let why = format!("theory knows no liquid of {name} beside its vapour: give the density, {option}");
+        ExperimentError::Conditions(why)
+    };
+    let density = density.map_or_else(|| guess(&fluid), |density| Ok(Some(density)))?.ok_or_else(none)?;
+    let of = Composition { model, masses: &[mass], kt, densities: &[density], seed };
+    let piece = Piece::settled(&of)?.map_err(|why| ExperimentError::Conditions(format!("{name}: {why}")))?;
+    Ok(Units { kt, range: fluid.cutoff(), density, dt: steps::dt(&piece) })
+}
+
 /// The density at which theory with correlations has no pressure.
-pub fn guess(fluid: &Fluid) -> Result<Option<f64>, crate::ExperimentError> {
+fn guess(fluid: &Fluid) -> Result<Option<f64>, ExperimentError> {
     let theory = MeanField::new(fluid)?;
     let volume = fluid.cutoff().powi(3);
     Ok(theory.correlations()?.and_then(|c| c.zero_pressure_density([0.5 / volume, 200.0 / volume])))

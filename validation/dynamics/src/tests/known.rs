@@ -216,9 +216,9 @@ fn clusters_have_the_distance_that_they_are_given() {
     assert_eq!(value(&out[0], "mean_size"), 4.0 / 3.0);
 }
 
-/// The liquid density of a slab is the density of its plateau, whose middle is that of the profile. Over ten seeds the two differ by
-/// 0.0026, by the middle, which has fewer samples; four times as much is exceeded by chance once in 16 000 seeds. The tanh fit includes
-/// the interfaces, and is off by more than ten times the error of the plateau. The seed is fixed.
+/// The liquid density of a slab is the density of its plateau, which is the middle of the profile up to 2.1 from its centre. Both
+/// values share the samples of the middle: over ten seeds they differ by 1.8 of the error at most. Three are exceeded by chance once
+/// in 400 seeds. The tanh fit includes the interfaces and deviates more. The seed is fixed.
 #[test]
 fn the_density_of_a_slab_is_that_of_its_middle() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 5\nbox = [6.0, 6.0, 14.0]\ndt = 0.01\nequilibrate = 500\n\
@@ -231,14 +231,13 @@ fn the_density_of_a_slab_is_that_of_its_middle() {
     let z = &profile.x.as_ref().unwrap().values;
     let density = &profile.get("density").unwrap().values;
     let middle: Vec<f64> =
-        z.iter().zip(density).filter(|(z, _)| z.abs() < 1.0).map(|(_, rho)| *rho).collect();
+        z.iter().zip(density).filter(|(z, _)| z.abs() < 2.0).map(|(_, rho)| *rho).collect();
     let middle = middle.iter().sum::<f64>() / middle.len() as f64;
-    assert!((liquid.value - middle).abs() < 0.0105, "{liquid:?} {middle}");
+    assert!((liquid.value - middle).abs() < 3.0 * liquid.error, "{liquid:?} {middle}");
     assert!(liquid.error < 0.003 && out.note.is_empty(), "{liquid:?} {}", out.note);
     let shape: Vec<(f64, f64)> = z.iter().copied().zip(density.iter().copied()).collect();
     let fit = psidpd_observe::profile::interface(&shape).unwrap();
-    println!("the fit has {}, the plateau {liquid:?}, the middle {middle}", fit.liquid);
-    assert!(fit.liquid - liquid.value > 4.0 * liquid.error, "{fit:?} {middle} {liquid:?}");
+    assert!(fit.liquid - middle > 4.0 * liquid.error, "{fit:?} {middle} {liquid:?}");
 }
 
 /// The configurational pressure of a pair of soft spheres is NkT/V + r F/(3V), whatever their velocities. A frozen particle out

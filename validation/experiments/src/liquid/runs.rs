@@ -190,6 +190,15 @@ fn longer(care: Care, time: f64) -> f64 {
     if care == Care::Search { time } else { LONGER * time }
 }
 
+/// How long the slab is measured for this tension.
+pub fn slab_time(care: Care, tension: Option<f64>) -> f64 {
+    let faint = match (care, tension) {
+        (Care::Result(_), Some(tension)) => (FAINT / tension).powi(2).clamp(1.0, 4.0),
+        _ => 1.0,
+    };
+    faint * longer(care, TIMES[1])
+}
+
 /// A run that stops says something of the fluid; another error does not.
 pub fn stopped(error: RunError) -> Trouble {
     if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
@@ -208,10 +217,6 @@ impl Instrument for Runs<'_> {
             .iter()
             .map(|share| self.homogeneous(*share, longer(care, TIMES[0]), dt, OF_BULK))
             .collect();
-        let faint = match (care, self.liquid.goals.tension) {
-            (Care::Result(_), Some(tension)) => (FAINT / tension).powi(2).clamp(1.0, 4.0),
-            _ => 1.0,
-        };
         settings.push(Setting {
             title: "slab",
             edges: [AREA, AREA, HEIGHT],
@@ -220,7 +225,7 @@ impl Instrument for Runs<'_> {
             ),
             acceleration: 0.0,
             settle: 12.0,
-            time: faint * longer(care, TIMES[1]),
+            time: slab_time(care, self.liquid.goals.tension),
             dt,
             observe: OF_SLAB,
         });

@@ -554,3 +554,14 @@ fn gallery() {
         assert!(!found.trials.is_empty() || !found.refusals.is_empty());
     }
 }
+
+/// The error of a tension falls with the root of the time, so half the tension needs four times as much of it.
+#[test]
+fn small_tensions_are_measured_longer() {
+    let time = |care, tension| super::runs::slab_time(care, tension);
+    let usual = time(Care::Result(1), None);
+    assert_eq!([9.0, 4.5].map(|tension| time(Care::Result(1), Some(tension))), [usual; 2]);
+    assert!((time(Care::Result(1), Some(3.0)) / usual - 2.25).abs() < 1e-12);
+    assert_eq!(time(Care::Result(1), Some(0.1)), 4.0 * usual);
+    assert_eq!(time(Care::Search, Some(0.1)), usual / 3.0);
+}

@@ -123,6 +123,12 @@ pub fn mixture(sought: &Sought, told: &mut dyn FnMut(&str)) -> Result<Found, Exp
     if a.name == b.name {
         return Err(conditions(format!("both liquids are called {}: name their species, --species", a.name)));
     }
+    let fits = |name: &str| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if let Some(name) = [&a.name, &b.name].into_iter().find(|name| !fits(name)) {
+        return Err(conditions(format!(
+            "{name:?} names no species: letters, digits and underscores, --species"
+        )));
+    }
     let folder = temporary_folder()?;
     let mut runs = runs::Runs::new(sought, folder.path())?;
     mixture_by(sought, &mut runs, told)

@@ -1,13 +1,12 @@
 //! Measures by runs: a slab of each liquid, and layers of both.
 
 use super::merge::{self, Liquid};
-use super::{Alone, Instrument, Layers, Sought, conditions};
+use super::{Alone, Instrument, Layers, Sought};
 use crate::bulk::Observed;
 use crate::liquid::Trouble;
-use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, guess, mean, part, slab};
-use crate::{ExperimentError, slabs, steps};
+use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, mean, part, slab};
+use crate::{ExperimentError, slabs};
 use psidpd_core::model::Model;
-use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_formats::files::{Existing, write_bytes};
 use psidpd_observe::Measured;
 use std::path::Path;
@@ -35,27 +34,12 @@ impl<'a> Runs<'a> {
         let (_, mass) = merge::units([a, b])?;
         // The merged file is read before anything runs.
         Model::parse("mixture.toml", &merge::text([a, b], sought.kt, 1.0, "")?)?.at(sought.kt)?;
-        let of = |liquid: &Liquid, mass: f64, density: Option<f64>| -> Result<Units, ExperimentError> {
-            let (model, name) = (&liquid.model, &liquid.name);
-            let fluid = model.at(sought.kt)?;
-            let density = density.map_or_else(|| guess(&fluid), |density| Ok(Some(density)))?;
-            let density = density.ok_or_else(|| {
-                conditions(format!(
-                    "theory knows no liquid of {name} beside its vapour: give both densities, --densities"
-                ))
-            })?;
-            let of = Composition {
-                model,
-                masses: &[mass],
-                kt: sought.kt,
-                densities: &[density],
-                seed: sought.seed,
-            };
-            let piece = Piece::settled(&of)?.map_err(|why| conditions(format!("{name}: {why}")))?;
-            Ok(Units { kt: sought.kt, range: fluid.cutoff(), density, dt: steps::dt(&piece) })
+        let of = |liquid: &Liquid, mass: f64, k: usize| {
+            let density = sought.densities.map(|all| all[k]);
+            let named = [liquid.name.as_str(), "--densities"];
+            slabs::settled((&liquid.model, mass, density), sought.kt, sought.seed, named)
         };
-        let density = |k: usize| sought.densities.map(|all| all[k]);
-        let units = [of(a, 1.0, density(0))?, of(b, mass, density(1))?];
+        let units = [of(a, 1.0, 0)?, of(b, mass, 1)?];
         Ok(Runs { sought, folder, units, mass })
     }
 

@@ -5,9 +5,8 @@ use super::search::attracts;
 use super::{Film, Instrument, Slab, Sought, conditions};
 use crate::bulk::Observed;
 use crate::liquid::Trouble;
-use crate::slabs::{FILM, Run, Setting, Units, guess, mean};
-use crate::{ExperimentError, slabs, steps};
-use psidpd_dynamics::trial::{Composition, Piece};
+use crate::slabs::{FILM, Run, Setting, Units, mean};
+use crate::{ExperimentError, slabs};
 use psidpd_observe::Measured;
 use std::path::Path;
 
@@ -36,16 +35,8 @@ impl<'a> Runs<'a> {
                     .into(),
             ));
         }
-        let none = || {
-            conditions(
-                "theory knows no liquid of this model beside its vapour: give its density, --density".into(),
-            )
-        };
-        let density =
-            sought.density.map_or_else(|| guess(&fluid), |density| Ok(Some(density)))?.ok_or_else(none)?;
-        let of = Composition { model, masses: &[1.0], kt: *kt, densities: &[density], seed: sought.seed };
-        let piece = Piece::settled(&of)?.map_err(|why| conditions(format!("the liquid: {why}")))?;
-        let units = Units { kt: *kt, range: fluid.cutoff(), density, dt: steps::dt(&piece) };
+        let units =
+            slabs::settled((model, 1.0, sought.density), *kt, sought.seed, ["this model", "--density"])?;
         Ok(Runs { sought, folder, units })
     }
 

@@ -1,7 +1,6 @@
 use super::*;
 use psidpd_experiments::mixture::{self, Found, Liquid, Sought, TOLERANCE};
 use psidpd_observe::Measured;
-use psidpd_report::quantity::with_error;
 
 #[derive(Debug, clap::Args)]
 pub struct OfMixture {
@@ -56,10 +55,6 @@ pub fn run(a: &OfMixture, told: Told) -> Result<Verdict, Failure> {
     };
     a.search.write(told, text.as_deref(), found.good)?;
     conclude(told, &found, found.good)
-}
-
-fn shown(x: Measured) -> String {
-    if x.value.is_finite() { with_error(x.value, Some(x.error)) } else { "-".into() }
 }
 
 fn print(found: &Found) {

@@ -7,6 +7,8 @@ mod wall;
 use super::*;
 use liquid::OfLiquid;
 use mixture::OfMixture;
+use psidpd_observe::Measured;
+use psidpd_report::quantity::with_error;
 use wall::OfWall;
 
 /// Make a model of a liquid or of two, or a wall for it.
@@ -92,4 +94,8 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|x: &f64| *x > 0.0 && x.is_finite())
         .ok_or_else(|| "expected a number above 0".into())
+}
+
+fn shown(x: Measured) -> String {
+    if x.value.is_finite() { with_error(x.value, Some(x.error)) } else { "-".into() }
 }

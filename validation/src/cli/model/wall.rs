@@ -1,7 +1,6 @@
 use super::*;
 use psidpd_experiments::wall::{Found, Sought, TOLERANCE, wall};
 use psidpd_observe::Measured;
-use psidpd_report::quantity::with_error;
 
 #[derive(Debug, clap::Args)]
 pub struct OfWall {
@@ -47,8 +46,6 @@ pub fn run(a: &OfWall, told: Told) -> Result<Verdict, Failure> {
 
 fn print(found: &Found) {
     let mut table = Table::new(["", "wanted", "got", "allowed"]);
-    let shown =
-        |x: Measured| if x.value.is_finite() { with_error(x.value, Some(x.error)) } else { "-".into() };
     for (route, got) in
         [("contact angle by three tensions, degrees", found.young), ("by a ridge, degrees", found.ridge)]
     {

@@ -136,9 +136,9 @@ fn energy_is_kept_to_second_order_between_faces() {
         (squares / steps as f64).sqrt() / run.len() as f64
     };
     for (name, integrator) in Integrator::ALL {
-        let [coarse, fine] = [0.02, 0.0025].map(|dt| deviation(integrator, dt));
+        let [coarse, fine] = [0.016, 0.002].map(|dt| deviation(integrator, dt));
         println!("{name}: {coarse:.1e} {fine:.1e}");
-        assert!(coarse < 8e-3 && fine < coarse / 20.0, "{name}: {coarse} {fine}");
+        assert!(coarse < 4e-3 && fine < coarse / 20.0, "{name}: {coarse} {fine}");
     }
 }
 
