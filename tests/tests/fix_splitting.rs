@@ -459,11 +459,7 @@ fn iterations_are_counted() {
         }
     }
     // Each run counts its own.
-    // LAMMPS counts the first forces of a timestep, and the thermostat, as the time of fixes.
     let both = said(&format!("{head}run 9\nrun 6\n"), 1);
-    let modify = both.lines().find(|line| line.starts_with("Modify")).unwrap_or_else(|| panic!("{both}"));
-    let share: f64 = modify.split_whitespace().last().unwrap().parse().unwrap();
-    assert!(share > 25.0, "{modify}");
     assert!(both.contains("acted 4 times") && both.contains("acted 3 times"), "{both}");
     let strong = head.replace(&warren(), &folder.path().join("strong.toml").display().to_string());
     let model = std::fs::read_to_string(warren()).unwrap().replace("gamma = 18.0", "gamma = 1e12");
