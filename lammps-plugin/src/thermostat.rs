@@ -35,17 +35,16 @@ impl Style {
             let Style { thermostat, engine, scale, converted, .. } = self;
             let Some(thermostat) = thermostat else { return Ok(false) };
             thermostat.ask_for_forces_on_fixed(heat.fixed);
-            thermostat.take(engine);
             let around = Around { domain: &scale.domain(extent)?, images };
             let (request, _) = converted.take(scale, atoms, None);
             let unit = scale.velocity().powi(2) / scale.energy;
             let mass: &[f64] = &mass.iter().map(|m| m * unit).collect::<Vec<_>>();
             let particles = Particles { owned: mass.len(), ..request.particles };
-            let pool = engine.pool();
-            let rank = Rank { around, particles, species_of_kind: engine.plan().species_of_type(), mass };
-            thermostat.find_pairs_of_rank(pool, &rank, heat.time / scale.time, heat.virial)?;
+            let kinds = engine.plan().species_of_type().to_vec();
+            let rank = Rank { around, particles, species_of_kind: &kinds, mass };
+            thermostat.find_pairs_of_rank_with(engine, &rank, heat.time / scale.time, heat.virial)?;
             let law = if heat.uniform { Law::Uniform } else { Law::Gaussian };
-            thermostat.draw(pool, heat.seed, heat.step, Stream(0), law);
+            thermostat.draw(engine.pool(), heat.seed, heat.step, Stream(0), law);
             Ok(true)
         })
     }

@@ -73,10 +73,9 @@ fn run(arguments: &[String]) -> Result<(), String> {
                 let particles = Particles { owned: count, x, tag, kind };
                 let request = Request { particles, v: &[], step: None, want: Want::FORCES };
                 engine.forces(domain, &request, force, false).map_err(|e| e.to_string())?;
-                thermostat.take(&mut engine);
             }
             let bodies = Bodies { domain, x, tag, species: kind, mass: &[1.0; 2], frozen: &[] };
-            thermostat.find_pairs(&pool, &bodies, dt, false).map_err(|e| e.to_string())?;
+            thermostat.find_pairs_with(&mut engine, &bodies, dt, false).map_err(|e| e.to_string())?;
             thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);
             thermostat.act(&pool, Update::Midpoint, v);
         }
@@ -122,9 +121,8 @@ fn on_rank(mut rank: Rank, fluid: &Fluid, settings: Settings, evaluations: u32) 
         let request = Request { particles, v: &[], step: None, want: Want::FORCES };
         let surroundings = Surroundings::Ghosts(around, Newton::Off);
         drop(engine.first(surroundings, &request, &mut rank.cloud.force).map_err(|e| e.to_string())?);
-        thermostat.take(&mut engine);
         let of_rank = thermostat::Rank { around, particles, species_of_kind: &kinds, mass: &mass };
-        thermostat.find_pairs_of_rank(&pool, &of_rank, dt, false).map_err(|e| e.to_string())?;
+        thermostat.find_pairs_of_rank_with(&mut engine, &of_rank, dt, false).map_err(|e| e.to_string())?;
         thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);
         let mut vectors = rank.v.clone();
         let mut need = thermostat.begin_midpoint(&pool, &mut vectors).map_err(|e| e.to_string())?;

@@ -101,13 +101,15 @@ fn sums_over_pairs(fluid: &Fluid) -> Engine {
 fn heated(settings: Settings, fluid: &Fluid, cloud: &Cloud, ask: Option<&mut Engine>) -> Vec<[f64; 3]> {
     let mut thermostat = PairThermostat::new(&Plan::new(fluid).unwrap(), &settings).unwrap();
     let (pool, mut v) = (Pool::new(settings.threads), cloud.v.clone());
+    let mass = vec![1.0; fluid.species.len()];
+    let bodies = cloud.bodies(&mass);
     if let Some(engine) = ask {
         thermostat.ask(engine, DT, true);
         cloud.energy(engine).unwrap();
-        thermostat.take(engine);
+        thermostat.find_pairs_with(engine, &bodies, DT, true).unwrap();
+    } else {
+        thermostat.find_pairs(&pool, &bodies, DT, true).unwrap();
     }
-    let mass = vec![1.0; fluid.species.len()];
-    thermostat.find_pairs(&pool, &cloud.bodies(&mass), DT, true).unwrap();
     thermostat.draw(&pool, 1, 1, Stream(0), noise::Law::Gaussian);
     thermostat.act(&pool, Update::Midpoint, &mut v);
     v
@@ -145,9 +147,8 @@ fn a_thermostat_takes_the_pairs_of_another() {
         a.ask(&mut engine, DT, false);
         b.ask(&mut engine, 4.0 * DT, false);
         cloud.energy(&mut engine).unwrap();
-        a.take(&mut engine);
         let mut v = cloud.v.clone();
-        a.find_pairs(&pool, &cloud.bodies(&[1.0]), DT, false).unwrap();
+        a.find_pairs_with(&mut engine, &cloud.bodies(&[1.0]), DT, false).unwrap();
         a.draw(&pool, 1, 1, Stream(0), noise::Law::Gaussian);
         a.act(&pool, Update::Midpoint, &mut v);
         assert!(furthest(&v, &heated(settings, &fluid, &cloud, None)) < 1e-6);
@@ -220,9 +221,7 @@ fn rounds_of_the_thermostat_in_a_wrong_order() {
         thermostat.begin_midpoint(&pool, &mut vectors).unwrap();
         thermostat.ask(&mut engine, DT, false);
         cloud.energy(&mut engine).unwrap();
-        thermostat.take(&mut engine);
-        thermostat.go_on(&pool, [0.0; 3], &mut vectors, &mut v).unwrap_err();
-        thermostat.find_pairs_of_rank(&pool, &rank, DT, false).unwrap();
+        thermostat.find_pairs_of_rank_with(&mut engine, &rank, DT, false).unwrap();
         thermostat.go_on(&pool, [0.0; 3], &mut vectors, &mut v).unwrap_err();
     }
 }

@@ -3,7 +3,6 @@
 use super::counts::PassCounts;
 use super::error::EngineError;
 use super::evaluate::{DevicePath, Evaluate};
-use super::fault::Fault;
 use super::pair_sums::PairSums;
 use super::particles::Particles;
 use super::path::{Path, Reason};
@@ -128,14 +127,6 @@ impl Engine {
         }
         self.replace(plan, settings);
         Ok(())
-    }
-
-    /// Makes the sweep faulty until the engine is renewed, for tests that a check finds the fault.
-    #[doc(hidden)]
-    pub fn falsify(&mut self, fault: Fault) {
-        let mut plan = self.plan().clone();
-        plan.fault = Some(fault);
-        self.replace(plan, self.settings());
     }
 
     fn replace(&mut self, plan: Plan, settings: Settings) {

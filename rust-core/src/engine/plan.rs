@@ -2,7 +2,6 @@
 
 use super::error::EngineError;
 use super::excess::ExcessPlan;
-use super::fault::Fault;
 use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
@@ -39,8 +38,6 @@ pub struct Plan {
     pub(super) thermostat: Option<ThermostatPlan>,
     /// Walls; densities that act as pair potentials act as energies of the walls too.
     pub(super) walls: Vec<WallField>,
-    /// Deliberate fault of the sweep, for tests.
-    pub(super) fault: Option<Fault>,
     title: String,
     /// The species of each of the host's types, negative for particles that do not interact; at first types are species
     /// indices.
@@ -131,7 +128,6 @@ impl Plan {
             cutoff: fluid.cutoff(),
             densities: fluid.densities.clone(),
             passes,
-            fault: None,
             linear,
             excess,
             pairs: fluid.pairs.clone(),

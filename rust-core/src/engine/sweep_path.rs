@@ -20,6 +20,7 @@ pub struct SweepPath {
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
     corrections: Corrections,
+    fault: Option<Fault>,
     /// ψ of owned particles and their densities in the last evaluation, if they have been fetched or summed.
     excess: Vec<f64>,
     pub densities: Vec<f64>,
@@ -32,6 +33,7 @@ impl SweepPath {
             special: Vec::new(),
             excludes_special: true,
             corrections: Corrections::default(),
+            fault: Fault::present(),
             excess: Vec::new(),
             densities: Vec::new(),
         }
@@ -131,8 +133,7 @@ impl Evaluate for SweepPath {
             tally += self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)?;
         }
         self.fetch(request.want);
-        let factor = Fault::factor(Fault::Virial, self.sweep.plan.fault);
-        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= factor);
+        self.fault.into_iter().for_each(|fault| fault.spoil_virial(&mut tally));
         Ok(tally)
     }
 

@@ -1,6 +1,5 @@
 //! A homogeneous fluid in a periodic box, run natively: what an equation of state is measured with.
 
-use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Begin, RunError, Runner};
 use psidpd_dynamics::scene::Scene;
@@ -90,21 +89,14 @@ impl Bulk<'_> {
     }
 
     pub fn run(&self, model_file: &Path, folder: &Path) -> Result<Observed, RunError> {
-        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads, None)
+        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads)
     }
 }
 
-/// Runs a scene in `folder` and reads what it observed; by an engine that is wrong on purpose, if there is a `fault`.
-pub fn run(
-    scene: &Scene,
-    folder: &Path,
-    begin: Begin,
-    threads: NonZeroUsize,
-    fault: Option<Fault>,
-) -> Result<Observed, RunError> {
+/// Runs a scene in `folder` and reads what it observed.
+pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) -> Result<Observed, RunError> {
     let mut runner = Runner::begin(scene, folder, begin)?;
     runner.set_threads(threads)?;
-    fault.into_iter().for_each(|fault| runner.falsify(fault));
     let steps = scene.steps();
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
     runner.run_to_end(&mut |p| bar.set(p.step))?;

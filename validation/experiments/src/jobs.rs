@@ -1,5 +1,6 @@
 //! Several runs at once.
 
+use psidpd_core::engine::Fault;
 use psidpd_report::Progress;
 use std::sync::{Mutex, PoisonError};
 
@@ -18,6 +19,8 @@ pub fn on<I, T: Send>(
             done.lock().unwrap_or_else(PoisonError::into_inner).push((number, result));
         }
     };
+    let fault = Fault::present();
+    let worker = || Fault::during(fault, worker);
     std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(worker))));
     let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(number, _)| *number);

@@ -3,7 +3,7 @@
 use crate::ExperimentError;
 use crate::fluids::Subject;
 use chacha20::ChaCha8Rng;
-use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Want};
+use psidpd_core::engine::{PeriodicBox, Precision, Settings, Want};
 use psidpd_core::model::Model;
 use psidpd_dynamics::particles::maxwell;
 use psidpd_dynamics::run::{Integrator, RunError, Simulation, State};
@@ -37,18 +37,16 @@ pub fn periodic(lengths: [f64; 3]) -> Result<PeriodicBox, ExperimentError> {
     Ok(domain.map_err(|e| RunError::State(e.to_string()))?)
 }
 
-/// These particles in the native runner; with a `fault`, in one that is wrong on purpose.
+/// These particles in the native runner.
 pub fn simulation(
     model: &Model,
     kt: f64,
     state: &State,
     seed: u64,
     precision: Precision,
-    fault: Option<Fault>,
 ) -> Result<Simulation, ExperimentError> {
     let mut simulation = Simulation::new(model, kt, state.clone(), seed)?;
     simulation.set_settings(Settings { precision, ..Settings::default() })?;
-    fault.into_iter().for_each(|fault| simulation.falsify(fault));
     Ok(simulation)
 }
 

@@ -18,9 +18,6 @@ pub struct Arguments {
     /// Only the cases, or groups of cases, whose name contains these words.
     #[arg(long, value_name = "WORDS")]
     only: Option<String>,
-    /// Tests use this fault in the engine.
-    #[arg(skip)]
-    pub(super) fault: Option<Fault>,
 }
 
 pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
@@ -29,7 +26,7 @@ pub fn run(a: &Arguments, told: Told) -> Result<Verdict, Failure> {
         (_, true) => Extent::Full,
         _ => Extent::All,
     };
-    let found = hardcases::run(extent, a.lammps, a.only.as_deref(), a.fault, &Progress::new())?;
+    let found = hardcases::run(extent, a.lammps, a.only.as_deref(), &Progress::new())?;
     say::table(&hardcases::table(&found));
     let wrong: Vec<_> = found.iter().filter(|v| v.wrong.is_some()).collect();
     for v in &wrong {

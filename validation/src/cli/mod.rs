@@ -35,7 +35,6 @@ pub use diagnostic::Failure;
 use error::CliError;
 use inputs::Files;
 use psidpd_core::document::{Document, printable};
-use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_dynamics::checkpoint::Caller;
 use psidpd_experiments::ExperimentError;
@@ -293,13 +292,10 @@ mod tests {
     /// The exit code of a command line. With a fault, a term of the engine is 5 % too strong.
     fn exit_code(line: &str, fault: Option<Fault>) -> u8 {
         let mut arguments = Arguments::try_parse_from(line.split(' ')).unwrap();
-        match &mut arguments.verb {
-            Verb::Validate(a) => (a.only, a.fault) = (Some("trajectories"), fault),
-            Verb::Hardcases(a) => a.fault = fault,
-            Verb::Reproduce(a) => a.fault = fault,
-            other => panic!("{other:?} has no engine to be wrong"),
+        if let Verb::Validate(a) = &mut arguments.verb {
+            a.only = Some("trajectories");
         }
-        carry_out(arguments)
+        Fault::during(fault, || carry_out(arguments))
     }
 
     /// Every verb that compares results exits with 1 for a faulty engine, and with 0 for a correct one.

@@ -26,9 +26,6 @@ pub struct Arguments {
     /// Threads of each run.
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads_at_once)]
     threads: NonZeroUsize,
-    /// Tests use this fault in the engine.
-    #[arg(skip)]
-    pub(super) fault: Option<Fault>,
 }
 
 pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
@@ -52,7 +49,6 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
             folder: folder.clone(),
             threads: arguments.threads,
             made: std::rc::Rc::clone(&made),
-            fault: arguments.fault,
         };
         let begun = std::time::Instant::now();
         let result = match case.run(&context) {

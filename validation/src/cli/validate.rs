@@ -13,9 +13,6 @@ pub struct Arguments {
     /// Tests make only this comparison.
     #[arg(skip)]
     pub(super) only: Option<&'static str>,
-    /// Tests use this fault in the native engine.
-    #[arg(skip)]
-    pub(super) fault: Option<Fault>,
 }
 
 impl Arguments {
@@ -26,8 +23,8 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let progress = Progress::new();
-    let Arguments { full, ref out, only, fault } = *arguments;
-    let options = Options { full, out: out.clone(), existing: told.existing, only, fault };
+    let Arguments { full, ref out, only } = *arguments;
+    let options = Options { full, out: out.clone(), existing: told.existing, only };
     let outcome = validate(&options, &progress)?;
     let results = &outcome.results;
     say::table(&check_table(results));

@@ -8,9 +8,11 @@
 //! - [`region`]: the region of the sweep, and its cells.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through the passes.
 //! - [`pair_lists`]: lists of the pairs in a range, for the thermostat apart from the forces.
+//! - [`listed_pairs`]: pairs that an evaluation lists on its way, for that thermostat.
 //! - [`places`]: double-precision positions for those pairs.
 //! - [`Sweep`]: the interface for hosts.
 
+mod listed_pairs;
 mod pair_lists;
 mod places;
 mod region;
@@ -18,6 +20,7 @@ mod terms;
 mod times;
 mod workspace;
 
+pub(super) use listed_pairs::{ListedFor, ListedPairs};
 pub(super) use pair_lists::{PairLists, PlanePairs};
 pub(super) use places::{Images, MARGIN, Places};
 pub use psidpd_threads::{Pool, ThreadCount, part};
@@ -32,6 +35,7 @@ use super::request::Request;
 use super::surroundings::Around;
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
+use listed_pairs::of_positions;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::{Double, Mixed};
 use psidpd_passes::ground::box_geometry::BoxGeometry;
@@ -77,10 +81,10 @@ pub struct Sweep {
     is_complete: bool,
     /// Whether [`Sweep::second`] may follow.
     ready: bool,
-    /// The pairs that the next evaluation is asked to list, and the number of the thermostat that asks.
-    asked: Option<(ListTerms, u64)>,
-    /// The number of the thermostat for which the last evaluation has listed pairs that it has not taken.
-    has_listed: Option<u64>,
+    /// The pairs that the next evaluation is asked to list.
+    asked: Option<(ListTerms, ListedFor)>,
+    /// What the last evaluation has listed pairs for that nobody has taken, and the number of its positions.
+    listed: Option<(ListedFor, u64)>,
 }
 
 /// A workspace in mixed or in double precision.
@@ -107,6 +111,8 @@ macro_rules! with {
         }
     };
 }
+
+use with;
 
 impl std::fmt::Debug for Sweep {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -146,7 +152,7 @@ impl Sweep {
             is_complete: false,
             ready: false,
             asked: None,
-            has_listed: None,
+            listed: None,
         }
     }
 
@@ -276,8 +282,8 @@ impl Sweep {
             totals: want.energy || want.virial,
         };
         let can_list = input.thermostat.is_none() && self.exclusions.is_empty();
-        let (listed, asker) = self.asked.take().filter(|_| can_list).unzip();
-        self.has_listed = None;
+        let (listed, listed_for) = self.asked.take().filter(|_| can_list).unzip();
+        self.listed = None;
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let mut since = Instant::now();
@@ -295,43 +301,10 @@ impl Sweep {
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.run_all(pool, plan, &input, out, times)?;
-            self.has_listed = asker;
+            self.listed = listed_for.map(|listed_for| (listed_for, of_positions(particles.x)));
         });
         self.is_complete = true;
         Ok(())
-    }
-
-    /// Asks the next evaluation to list pairs for a thermostat, with the geometry that it computes anyway. It lists them
-    /// without excluded pairs, and if drag and noise are not among the forces.
-    pub(super) fn ask_for_pairs(&mut self, terms: Option<(ListTerms, u64)>) {
-        (self.asked, self.has_listed) = (terms, None);
-    }
-
-    /// Takes lists that nobody needs, for the memory of the pairs that the next evaluation lists.
-    pub(super) fn lend_lists(&mut self, planes: &mut [PlanePairs]) {
-        let lists = planes.iter_mut().map(|plane| std::mem::take(&mut plane.lists));
-        with!(&mut self.workspace, m => m.lend_lists(lists));
-    }
-
-    /// Moves the pairs that the last evaluation has listed for a thermostat, once; returns whether it has listed any.
-    /// Particles of a cell are in the order of the host.
-    pub(super) fn take_pairs(
-        &mut self,
-        asker: u64,
-        lists: &mut PairLists,
-        planes: &mut Vec<PlanePairs>,
-    ) -> bool {
-        let has_listed = self.has_listed.take() == Some(asker) && self.is_complete;
-        if has_listed {
-            with!(&mut self.workspace, m => {
-                let cells = &m.order;
-                planes.resize_with(cells.grid.planes, PlanePairs::default);
-                planes.iter_mut().enumerate().for_each(|(k, plane)| plane.lie_in(cells, k));
-                lists.follow(cells);
-                m.move_lists(planes.iter_mut().map(|plane| &mut plane.lists));
-            });
-        }
-        has_listed
     }
 
     /// Copies the slopes of owned particles after [`Sweep::evaluate`], with room for `all`, for the

@@ -1,6 +1,5 @@
 //! The plan of a fluid as tables of numbers in the precision of the pairs.
 
-use crate::engine::fault::Fault;
 use crate::engine::plan::Plan;
 use crate::model::PairTerm;
 use crate::model::kernel::Kernel;
@@ -13,9 +12,8 @@ use psidpd_passes::simd::Scalar;
 pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
     let count = plan.species.len();
     let mut terms = Terms { species: count, ..Terms::default() };
-    let factor = |term: Fault| Fault::factor(term, plan.fault);
     for term in &plan.pairs {
-        add_pair(&mut terms, term, factor(Fault::PairForce));
+        add_pair(&mut terms, term);
     }
     for term in &plan.linear {
         let both = |factor: f64| -> SpeciesPairTable<T> {
@@ -28,7 +26,7 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
             inverse_range: T::of(1.0 / term.kernel.range()),
             force_kernel: term.force_kernel.kind(),
             force_inverse_range: T::of(1.0 / term.force_kernel.range()),
-            force: both(-factor(Fault::ManyBodyForce) * term.force_kernel.slope_factor()),
+            force: both(-term.force_kernel.slope_factor()),
             energy: both(term.kernel.value_factor()),
         });
     }
@@ -48,13 +46,13 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
         .iter()
         .map(|d| {
             let density = &plan.densities[*d];
-            pass(&density.kernel, &density.force_kernel, factor(Fault::ManyBodyForce))
+            pass(&density.kernel, &density.force_kernel)
         })
         .collect();
     terms.full_cache = plan.caches_all_pairs();
     terms.thermostat = plan.thermostat.as_ref().map(|t| ThermostatTables {
-        gamma: SpeciesPairTable::new(t.gamma.iter().map(|x| T::of(factor(Fault::Drag) * x))),
-        sigma: SpeciesPairTable::new(t.sigma.iter().map(|x| T::of(factor(Fault::Noise) * x))),
+        gamma: SpeciesPairTable::new(t.gamma.iter().map(|x| T::of(*x))),
+        sigma: SpeciesPairTable::new(t.sigma.iter().map(|x| T::of(*x))),
         inverse_range: SpeciesPairTable::new(t.range.iter().map(|x| T::of(inverse(*x)))),
         exponent: t.exponent_of_weights(),
     });
@@ -66,7 +64,7 @@ fn inverse(range: f64) -> f64 {
     if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
 }
 
-fn pass<T: Scalar>(kernel: &Kernel, force: &Kernel, factor: f64) -> Pass<T> {
+fn pass<T: Scalar>(kernel: &Kernel, force: &Kernel) -> Pass<T> {
     Pass {
         kernel: kernel.kind(),
         inverse_range: T::of(1.0 / kernel.range()),
@@ -74,7 +72,7 @@ fn pass<T: Scalar>(kernel: &Kernel, force: &Kernel, factor: f64) -> Pass<T> {
         force_kernel: force.kind(),
         force_range: T::of(force.range()),
         force_inverse_range: T::of(1.0 / force.range()),
-        force: T::of(-factor * force.slope_factor()),
+        force: T::of(-force.slope_factor()),
     }
 }
 
@@ -85,7 +83,7 @@ fn no_soft<T: Scalar>(size: usize) -> Soft<T> {
 }
 
 /// Adds a potential to the first table of its form that has no entry for this pair of species.
-fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm, factor: f64) {
+fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm) {
     let [a, b] = term.between;
     let entries = [a * terms.species + b, b * terms.species + a];
     let size = terms.species * terms.species;
@@ -98,7 +96,7 @@ fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm, factor: f64) {
                 terms.soft.len() - 1
             });
             for p in entries {
-                terms.soft[at].strength[p] = T::of(factor * form.strength);
+                terms.soft[at].strength[p] = T::of(form.strength);
                 terms.soft[at].inverse_range[p] = T::of(inverse(form.range()));
                 terms.soft[at].energy[p] = T::of(0.5 * form.strength * form.range());
             }

@@ -22,6 +22,7 @@ pub use input::Input;
 pub use sorted_particles::SortedParticles;
 
 use crate::engine::error::EngineError;
+use crate::engine::fault::Fault;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::terms::terms;
 use crate::engine::sweep::times::Times;
@@ -65,7 +66,8 @@ pub struct Workspace<P: PairPrecision> {
 
 impl<P: PairPrecision> Workspace<P> {
     pub fn new(plan: &Plan, set: InstructionSet, threads: usize) -> Workspace<P> {
-        let terms = terms(plan);
+        let mut terms = terms(plan);
+        Fault::present().into_iter().for_each(|fault| fault.spoil(&mut terms));
         let count = plan.species.len();
         let variables = plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
         let threads = (0..threads).map(|_| ThreadState::new(terms.passes.len(), set)).collect();

@@ -110,7 +110,7 @@ impl PairThermostat {
         let is_first = progress.iterations == 1;
         let rest = if progress.adds_residual() { 1.0 } else { 0.0 };
         if let Some(end) = outcome {
-            self.effort.add(self.iterations(), self.from_forces.are_present, end == End::Inaccurate);
+            self.effort.add(self.iterations(), self.are_of_forces, end == End::Inaccurate);
         }
         self.on_planes(pool, |share, set| {
             match outcome {

@@ -24,7 +24,6 @@ mod encounter;
 mod exchange;
 mod fixed;
 mod forces;
-mod listed;
 mod measure;
 mod midpoint;
 mod of_forces;
@@ -49,10 +48,9 @@ use super::error::EngineError;
 use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
-use super::sweep::{MARGIN, PairLists, PlanePairs, Pool};
+use super::sweep::{ListedPairs, MARGIN, PairLists, PlanePairs, Pool};
 use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
-use listed::{FromForces, Listed};
 use on_fixed::OnFixed;
 use pass::{Sums, fill};
 use psidpd_passes::instruction_set::InstructionSet;
@@ -101,7 +99,8 @@ pub struct PairThermostat {
     effort: Effort,
     /// Whether distances are stored.
     wants_virial: bool,
-    from_forces: FromForces,
+    /// Whether the present pairs are those that an evaluation of forces has listed.
+    are_of_forces: bool,
     on_fixed: OnFixed,
     exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule.
@@ -137,7 +136,7 @@ impl PairThermostat {
             impulses: Vec::new(),
             effort: Effort::default(),
             wants_virial: false,
-            from_forces: FromForces::default(),
+            are_of_forces: false,
             on_fixed: OnFixed::default(),
             exchange: Exchange::default(),
             noise: [PairNoise::default(); 2],
@@ -157,6 +156,17 @@ impl PairThermostat {
         dt: f64,
         virial: bool,
     ) -> Result<(), EngineError> {
+        self.find_pairs_among(None, pool, bodies, dt, virial)
+    }
+
+    fn find_pairs_among(
+        &mut self,
+        listed: Option<ListedPairs>,
+        pool: &Pool,
+        bodies: &Bodies,
+        dt: f64,
+        virial: bool,
+    ) -> Result<(), EngineError> {
         let Bodies { domain, x, tag, species, mass, frozen } = *bodies;
         let particles = Particles { x, tag, kind: species, owned: x.len() };
         let kinds: Vec<i32> = (0..self.plan.gamma.len().isqrt() as i32).collect();
@@ -165,7 +175,7 @@ impl PairThermostat {
                 "`mass` has one entry per species, `frozen` one per particle or none",
             ));
         }
-        self.find(pool, Around { domain, images: &[] }, &particles, &kinds, dt, virial, |k| {
+        self.find(listed, pool, Around { domain, images: &[] }, &particles, &kinds, dt, virial, |k| {
             let rests = frozen.get(k).is_some_and(|frozen| *frozen);
             if rests { f64::INFINITY } else { mass[species[k] as usize] }
         })
@@ -175,6 +185,7 @@ impl PairThermostat {
     #[allow(clippy::too_many_arguments)]
     fn find(
         &mut self,
+        listed: Option<ListedPairs>,
         pool: &Pool,
         around: Around,
         particles: &Particles,
@@ -188,7 +199,8 @@ impl PairThermostat {
         particles.check_images(around.images)?;
         (self.dt, self.wants_virial, self.exchange) = (dt, virial, Exchange::default());
         let mut is_long = false;
-        if !self.from_forces.serve(Listed { dt, virial, particles: particles.x.len() }) {
+        self.take(listed, particles.x, dt, virial);
+        if !self.are_of_forces {
             let range = [self.plan.longest, self.margin()];
             let PairThermostat { plan, lists, planes, .. } = self;
             let terms = |margin| ListTerms::new(weights::weights(plan, dt), margin, virial);

@@ -1,29 +1,29 @@
 //! The pairs that an evaluation of forces lists on its way, where the thermostat acts at the same positions.
 //!
-//! A host asks for them before the evaluation, and gives them to the thermostat before its search, which then takes
-//! them instead. It may do so always: the search finds the pairs itself if the evaluation was of another fluid, no sweep,
-//! with drag and noise among the forces or with excluded pairs, or if it was asked for another time. Listed particles of a cell
-//! are in the order of the host's arrays, instead of that of their tags.
+//! A host asks for them before the evaluation, and lets the thermostat find its pairs with the engine, which hands them out once as
+//! [`ListedPairs`]: a loan that a thermostat of the same plan takes for the same time at the same positions, and no other. So a host
+//! may always ask and always try: where the loan does not fit, or the evaluation could list nothing, for it was no sweep, had drag and
+//! noise among its forces or excluded pairs, the thermostat searches. Listed particles of a cell are in the order of the host's
+//! arrays, instead of that of their tags.
 
-use super::PairThermostat;
-use super::listed::Listed;
+use super::{Bodies, PairThermostat, Rank};
+use crate::engine::error::EngineError;
 use crate::engine::facade::Engine;
 use crate::engine::plan::Plan;
+use crate::engine::sweep::{ListedFor, ListedPairs};
+use std::sync::Arc;
 
 impl PairThermostat {
     /// Asks the next evaluation of `engine` to list the pairs for a time `dt`, if it can: if it computes the same fluid.
     pub fn ask(&mut self, engine: &mut Engine, dt: f64, virial: bool) {
-        self.from_forces.listed = None;
         if !self.is_of(engine.plan()) {
             return;
         }
-        // No search has so many particles: it needs what `take` takes.
-        self.from_forces.listed = Some(Listed { dt, virial, particles: usize::MAX });
         let terms = self.terms(dt, virial);
         let sweep = engine.sweep_mut();
-        sweep.ask_for_pairs(Some((terms, self.from_forces.asker)));
+        sweep.ask_for_pairs(Some((terms, ListedFor { plan: self.plan.clone(), dt, virial })));
         // The memory of lists goes to and fro, so that there is one list of all pairs, not two.
-        if self.from_forces.are_present {
+        if self.are_of_forces {
             self.has_pairs = false;
             sweep.lend_lists(&mut self.planes);
         }
@@ -34,16 +34,41 @@ impl PairThermostat {
         plan.dimensions() == self.dimensions && plan.thermostat.as_ref() == Some(&self.plan)
     }
 
-    /// Takes the pairs that the last evaluation of `engine` has listed, if it has, for the search that follows: at the
-    /// same positions, with the particles in the same order.
-    pub fn take(&mut self, engine: &mut Engine) {
-        // Without listed pairs those of the last search stay.
-        let had_pairs = std::mem::replace(&mut self.has_pairs, false);
-        let asker = self.from_forces.asker;
-        let taken = engine.sweep_mut().take_pairs(asker, &mut self.lists, &mut self.planes);
-        self.has_pairs = had_pairs && !taken;
-        let particles = self.lists.place.len();
-        self.from_forces.listed =
-            self.from_forces.listed.filter(|_| taken).map(|listed| Listed { particles, ..listed });
+    /// As [`PairThermostat::find_pairs`], by the threads of `engine`; the pairs are those that its last evaluation has listed, if it has
+    /// been asked to for this time and was at these positions.
+    ///
+    /// # Errors
+    /// Fails as [`PairThermostat::find_pairs`].
+    pub fn find_pairs_with(
+        &mut self,
+        engine: &mut Engine,
+        bodies: &Bodies,
+        dt: f64,
+        virial: bool,
+    ) -> Result<(), EngineError> {
+        let pool = Arc::clone(engine.pool());
+        self.find_pairs_among(engine.sweep_mut().listed_pairs(), &pool, bodies, dt, virial)
+    }
+
+    /// As [`PairThermostat::find_pairs_of_rank`], with the pairs of `engine` as [`PairThermostat::find_pairs_with`].
+    ///
+    /// # Errors
+    /// Fails as [`PairThermostat::find_pairs_of_rank`].
+    pub fn find_pairs_of_rank_with(
+        &mut self,
+        engine: &mut Engine,
+        rank: &Rank,
+        dt: f64,
+        virial: bool,
+    ) -> Result<(), EngineError> {
+        let pool = Arc::clone(engine.pool());
+        self.find_pairs_of_rank_among(engine.sweep_mut().listed_pairs(), &pool, rank, dt, virial)
+    }
+
+    /// Takes listed pairs, if they are those of this thermostat for a time `dt` between particles at `x`.
+    pub(super) fn take(&mut self, listed: Option<ListedPairs>, x: &[[f64; 3]], dt: f64, virial: bool) {
+        let asked = ListedFor { plan: self.plan.clone(), dt, virial };
+        let PairThermostat { lists, planes, .. } = self;
+        self.are_of_forces = listed.is_some_and(|listed| listed.take(&asked, x, lists, planes));
     }
 }

@@ -10,7 +10,7 @@ use super::pass::{Wide, add_to_host, each_of_host};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
-use crate::engine::sweep::Pool;
+use crate::engine::sweep::{ListedPairs, Pool};
 
 /// The particles of a rank, owned particles first, and their surroundings.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +51,17 @@ impl PairThermostat {
         dt: f64,
         virial: bool,
     ) -> Result<(), EngineError> {
+        self.find_pairs_of_rank_among(None, pool, rank, dt, virial)
+    }
+
+    pub(super) fn find_pairs_of_rank_among(
+        &mut self,
+        listed: Option<ListedPairs>,
+        pool: &Pool,
+        rank: &Rank,
+        dt: f64,
+        virial: bool,
+    ) -> Result<(), EngineError> {
         let Rank { around, particles, species_of_kind, mass } = *rank;
         if mass.len() != particles.owned {
             return Err(EngineError::Host("`mass` must have one entry per owned particle"));
@@ -61,7 +72,7 @@ impl PairThermostat {
         }
         // Ghosts are moved by their owners.
         let mass = |k: usize| mass.get(k).copied().unwrap_or(f64::INFINITY);
-        self.find(pool, around, &particles, species_of_kind, dt, virial, mass)?;
+        self.find(listed, pool, around, &particles, species_of_kind, dt, virial, mass)?;
         self.exchange.owned = particles.owned;
         Ok(())
     }

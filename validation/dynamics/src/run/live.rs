@@ -1,3 +1,4 @@
+use super::simulation::{Course, Task};
 use super::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
@@ -9,7 +10,7 @@ use std::num::NonZeroUsize;
 #[derive(Debug)]
 pub struct Live {
     scene: Scene,
-    simulation: Simulation,
+    course: Course,
     stage: usize,
     /// The steps made in the present stage.
     done: u64,
@@ -22,24 +23,26 @@ impl Live {
         let particles = scene.initial.count();
         memory::check(particles, memory::PARTICLE)?;
         let simulation = scene.simulation_of_run(scene.initial_state(), threads)?;
-        let mut live = Live { scene, simulation, stage: 0, done: 0, begin: 0.0 };
+        let mut live = Live { scene, course: Course::of(simulation), stage: 0, done: 0, begin: 0.0 };
         live.enter()?;
         Ok(live)
     }
 
     fn enter(&mut self) -> Result<(), RunError> {
         let stage = &self.scene.stages[self.stage];
-        self.scene.enter(stage, &mut self.simulation)?;
-        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
-        self.simulation.fetch()
+        // A stage begins with the velocities at the end of the step before it.
+        let simulation = self.course.ended()?;
+        self.scene.enter(stage, simulation)?;
+        simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)
     }
 
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
+    /// The present step, which is complete between runs.
     pub fn simulation(&self) -> &Simulation {
-        &self.simulation
+        self.course.completed()
     }
 
     pub fn stage(&self) -> &Stage {
@@ -52,7 +55,7 @@ impl Live {
 
     pub fn left(&self) -> u64 {
         let all = self.scene.steps();
-        all.saturating_sub(self.simulation.step_number())
+        all.saturating_sub(self.course.number())
     }
 
     /// Makes `steps` steps, with the totals after the last one. Beyond the end of the scene the steps are those of its last
@@ -66,17 +69,13 @@ impl Live {
             let last = stop() || k == steps;
             let want = if last { Want::TOTALS } else { Want::FORCES };
             let (dt, integrator) = (self.stage().dt, self.stage().integrator);
-            self.simulation.set_settling(self.scene.settles(self.stage, self.done));
-            self.simulation.begin_step(dt, integrator, want)?;
+            let task = Task { want, settles: self.scene.settles(self.stage, self.done), ..Task::default() };
+            let made = self.course.make(dt, integrator, task);
+            if last || made.is_err() {
+                let whole = self.course.whole();
+                return made.and(whole.map(|_| self.done += 1));
+            }
             self.done += 1;
-            // A stage begins with the velocities at the end of the step before it.
-            if last || self.done == self.stage().steps {
-                self.simulation.end_step()?;
-                self.simulation.refresh(want)?;
-            }
-            if last {
-                return self.simulation.fetch();
-            }
         }
         Ok(())
     }

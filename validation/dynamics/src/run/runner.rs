@@ -1,6 +1,7 @@
 use super::checkpoints::Checkpoints;
 use super::folder::Folder;
 use super::output::{Output, has_begun, in_the_way, input_among, replaces};
+use super::simulation::Course;
 use super::timing::Clock;
 use super::watch::Watch;
 use super::{Outcome, Progress, RunError, Simulation, Summary, Sums, Thermo, Timing, about, check_memory};
@@ -8,7 +9,7 @@ use crate::checkpoint::{
     BeforeEnd, Checkpoint, CheckpointError, Found, Held, Identity, Position, Store, Written,
 };
 use crate::scene::{Initial, Scene};
-use psidpd_core::engine::{Fault, Settings};
+use psidpd_core::engine::Settings;
 use psidpd_formats::About;
 use psidpd_formats::files::{Protected, open_inside, protect, there};
 use psidpd_observe::Observers;
@@ -70,7 +71,7 @@ pub struct Runner<'a> {
     pub(super) scene: &'a Scene,
     pub(super) folder: Folder,
     _inputs: Protected,
-    pub(super) simulation: Simulation,
+    pub(super) course: Course,
     /// The open files; `None` if the run is finished.
     pub(super) output: Option<Output>,
     pub(super) checkpoints: Checkpoints,
@@ -80,6 +81,8 @@ pub struct Runner<'a> {
     pub(super) last: Option<Thermo>,
     pub(super) before_end: Option<BeforeEnd>,
     pub(super) steps: u64,
+    /// In words, how steps that need forces only are evaluated.
+    evaluation: String,
     pub(super) observers: Observers,
     /// The watch over the present stage since the start of this session.
     pub(super) watch: Watch,
@@ -211,7 +214,8 @@ impl<'a> Runner<'a> {
             scene,
             folder,
             _inputs: inputs,
-            simulation,
+            evaluation: simulation.evaluation(),
+            course: Course::of(simulation),
             output,
             position: good.position,
             sums: good.sums,
@@ -236,22 +240,18 @@ impl<'a> Runner<'a> {
 
     /// Sets the number of threads; the default is one. The output of a run does not depend on it.
     pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
-        let settings = self.simulation.settings();
-        self.simulation.set_settings(Settings { threads, ..settings })
+        let simulation = self.course.ended()?;
+        simulation.set_settings(Settings { threads, ..simulation.settings() })?;
+        self.evaluation = simulation.evaluation();
+        Ok(())
     }
 
-    /// Makes forces wrong; see [`Simulation::falsify`]. Call it last, for a run at one temperature.
-    #[doc(hidden)]
-    pub fn falsify(&mut self, fault: Fault) {
-        self.simulation.falsify(fault);
-    }
-
-    pub fn evaluation(&self) -> String {
-        self.simulation.evaluation()
+    pub fn evaluation(&self) -> &str {
+        &self.evaluation
     }
 
     pub fn particles(&self) -> usize {
-        self.simulation.len()
+        self.course.particles()
     }
 
     /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop` is not 0.
@@ -264,7 +264,7 @@ impl<'a> Runner<'a> {
             // Leftover checkpoints are harmless, and the folder may be read-only, so an error is ignored.
             let _ = self.checkpoints.store.keep_newest();
             return Ok(Outcome::Finished {
-                summary: Box::new(self.summary()),
+                summary: Box::new(self.summary()?),
                 timing: self.clock.earlier.clone(),
                 advice: None,
             });

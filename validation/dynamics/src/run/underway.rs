@@ -1,8 +1,9 @@
 //! The course of a run: its steps, its output and its end.
 
 use super::output::{Output, write_json, write_observations};
+use super::simulation::Task;
 use super::watch::{Deviation, Thermometer, Watch, interval_of_looks};
-use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Thermo, Timing};
+use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
 use crate::scene::{Stage, every};
 use psidpd_core::engine::Want;
@@ -17,7 +18,7 @@ impl Runner<'_> {
         stop: &AtomicUsize,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<Outcome, RunError> {
-        self.clock.restart(self.simulation.step_number());
+        self.clock.restart(self.course.number());
         let scene = self.scene;
         loop {
             let stage = &scene.stages[self.position.stage];
@@ -46,7 +47,7 @@ impl Runner<'_> {
     /// Ends a run on a stop request, with a checkpoint.
     fn interrupted(&mut self, stop: &AtomicUsize) -> Result<Option<Outcome>, RunError> {
         let stop = stop.load(Ordering::Relaxed);
-        let step = self.simulation.step_number();
+        let step = self.course.number();
         // The run ends after its last step anyway.
         if stop == 0 || step >= self.steps {
             return Ok(None);
@@ -62,11 +63,11 @@ impl Runner<'_> {
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         self.sums = Sums::default();
         self.watch = Watch::default();
-        self.scene.enter(stage, &mut self.simulation)?;
-        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
-        self.simulation.fetch()?;
+        let simulation = self.course.ended()?;
+        self.scene.enter(stage, simulation)?;
+        simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
         self.position.entered = true;
-        if self.simulation.step_number() == 0 {
+        if self.course.number() == 0 {
             self.report(stage, true, progress)?;
             // A test of writing a checkpoint before the first step reveals a full or read-only disk early.
             if self.scene.output.checkpoint != Some(0) {
@@ -77,7 +78,7 @@ impl Runner<'_> {
     }
 
     fn step(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
-        let number = self.simulation.step_number() + 1;
+        let number = self.course.number() + 1;
         let totals = self.is_row(number);
         let mut want = self.observers.wants(number, &stage.name);
         if totals {
@@ -87,31 +88,29 @@ impl Runner<'_> {
         let period = stage.integrator.thermostat_every();
         let last = if number.is_multiple_of(period) { number + period - 1 } else { number };
         let virial = |step| self.is_row(step) || self.observers.wants(step, &stage.name).virial;
-        self.simulation.hold_impulses((number + 1..=last).any(virial));
-        let flux = (number..=last).map(|step| self.observers.wants_flux(step, &stage.name)).max();
-        self.simulation.record_flux(flux.unwrap_or_default());
-        self.simulation.set_settling(self.scene.settles(self.position.stage, self.position.done));
-        self.simulation.begin_step(stage.dt, stage.integrator, want)?;
+        let task = Task {
+            want,
+            flux: (number..=last)
+                .map(|step| self.observers.wants_flux(step, &stage.name))
+                .max()
+                .unwrap_or_default(),
+            holds_impulses: (number + 1..=last).any(virial),
+            settles: self.scene.settles(self.position.stage, self.position.done),
+        };
+        self.course.make(stage.dt, stage.integrator, task)?;
         let is_last = self.position.done + 1 == stage.steps;
         let looks = !self.measures_forces(stage, interval_of_looks(stage));
         let watched = Watch::is_due(stage, self.position.done + 1, looks);
         if watched {
-            self.simulation.end_step()?;
-            self.simulation.fetch()?;
-            self.watch.sample(&mut self.simulation, stage, self.position.done + 1, looks)?;
-        }
-        let sampled = self.observers.may_sample(number, &stage.name);
-        if is_last || totals || sampled || self.scene.output.writes_particles(number) {
-            self.simulation.end_step()?;
-            self.simulation.refresh(want)?;
-            if is_last || sampled || self.scene.output.writes_particles(number) {
-                self.simulation.fetch()?;
-            }
+            self.watch.sample(self.course.ended()?, stage, self.position.done + 1, looks)?;
         }
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
-        if sampled {
-            self.observers.sample(self.simulation.view(self.position.time), &stage.name);
+        if self.observers.may_sample(number, &stage.name) {
+            self.observers.sample(self.course.whole()?.view(self.position.time), &stage.name);
+        }
+        if is_last {
+            self.course.whole()?;
         }
         self.report(stage, totals, progress)?;
         let due = match self.scene.output.checkpoint {
@@ -133,8 +132,8 @@ impl Runner<'_> {
         totals: bool,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RunError> {
-        let step = self.simulation.step_number();
-        let thermo = totals.then(|| Thermo::of(&self.simulation, self.position.time));
+        let step = self.course.number();
+        let thermo = totals.then(|| self.course.totals(self.position.time)).transpose()?;
         if step == self.steps && !every(self.scene.output.thermo, step) {
             let rows = self.output.as_ref().and_then(Output::rows);
             self.before_end = Some(BeforeEnd { sums: self.sums, last: self.last, rows });
@@ -148,13 +147,14 @@ impl Runner<'_> {
                 }
             }
             if self.scene.output.writes_particles(step) {
-                let state = self.simulation.state().by_tag();
-                let frame = self.simulation.frame(&state, self.position.time);
+                let simulation = self.course.whole()?;
+                let state = simulation.state().by_tag();
+                let frame = simulation.frame(&state, self.position.time);
                 output.particles(self.scene, &self.folder.path, &frame)?;
             }
         }
         // Totals alone do not bring the particles from a device.
-        if totals && self.simulation.is_here() {
+        if totals && self.course.is_here() {
             self.keep_state()?;
         }
         let deviations = match self.position.done == stage.steps {
@@ -187,23 +187,23 @@ impl Runner<'_> {
         let every = self.observers.interval_of_temperature(&stage.name);
         steady
             && stage.thermostat
-            && !self.simulation.has_body_forces()
+            && !self.course.has_body_forces()
             && every.is_some_and(|every| every <= interval)
     }
 
     /// Keeps the present state as the last good one. The output of this step must be written already.
     fn keep_state(&mut self) -> Result<(), RunError> {
-        self.simulation.fetch()?;
+        let simulation = self.course.ended()?;
         let good = &mut self.checkpoints.good;
         (good.position, good.sums, good.last) = (self.position, self.sums, self.last);
         good.before_end.clone_from(&self.before_end);
-        good.step = self.simulation.step_number();
-        good.state.copy_particles(self.simulation.state());
+        good.step = simulation.step_number();
+        good.state.copy_particles(simulation.state());
         good.forces.clear();
-        good.forces.extend_from_slice(self.simulation.held_forces());
-        good.held = self.simulation.held();
-        good.max_move = self.simulation.max_move();
-        good.out_of_bounds = self.simulation.out_of_bounds();
+        good.forces.extend_from_slice(simulation.held_forces());
+        good.held = simulation.held();
+        good.max_move = simulation.max_move();
+        good.out_of_bounds = simulation.out_of_bounds();
         good.observers = self.observers.to_bytes();
         if let Some(output) = &mut self.output {
             good.files = output.written();
@@ -212,7 +212,6 @@ impl Runner<'_> {
     }
 
     fn checkpoint(&mut self) -> Result<(), RunError> {
-        self.simulation.end_step()?;
         self.keep_state()?;
         self.store_good()
     }
@@ -228,13 +227,13 @@ impl Runner<'_> {
     }
 
     fn timing_until(&self, step: u64) -> Timing {
-        let (run, clock) = (&self.simulation, &self.clock);
-        clock.until(step, run.len(), run.effort(), run.device_name(), run.time_of_one_thread())
+        let (run, clock) = (&self.course, &self.clock);
+        clock.until(step, run.particles(), run.effort(), run.device_name(), run.time_of_one_thread())
     }
 
     /// Saves the last good state of a failed run.
     pub(super) fn stop(&mut self, cause: RunError) -> RunError {
-        let (step, good) = (self.simulation.step_number(), self.checkpoints.good.step);
+        let (step, good) = (self.course.number(), self.checkpoints.good.step);
         if cause.is_output() {
             // A newer checkpoint may fit on the disk; if not, the old one remains.
             if self.checkpoints.stored != Some(good) {
@@ -260,13 +259,14 @@ impl Runner<'_> {
         self.keep_state()?;
         self.write_good("final.data")?;
         write_observations(&self.folder.path, &self.observers.finish())?;
-        let summary = self.summary();
+        let summary = self.summary()?;
         write_json(&self.folder.path.join("summary.json"), &summary)?;
         // From here on the run is finished, even if a later write fails.
         self.checkpoints.good.finished = true;
         self.store_good()?;
         self.checkpoints.store.keep_newest()?;
-        let advice = self.scene.stages.last().and_then(|stage| Advice::of(&mut self.simulation, stage));
+        let simulation = self.course.whole()?;
+        let advice = self.scene.stages.last().and_then(|stage| Advice::of(simulation, stage));
         let timing = self.timing_until(self.steps);
         Ok(Outcome::Finished { summary: Box::new(summary), timing, advice })
     }
@@ -287,14 +287,14 @@ impl Runner<'_> {
         Ok(path)
     }
 
-    pub(super) fn summary(&self) -> Summary {
-        Summary {
+    pub(super) fn summary(&mut self) -> Result<Summary, RunError> {
+        Ok(Summary {
             title: self.scene.title.clone(),
-            particles: self.simulation.len(),
+            particles: self.course.particles(),
             steps: self.steps,
-            out_of_bounds: self.simulation.out_of_bounds(),
-            last: self.last.unwrap_or_else(|| Thermo::of(&self.simulation, self.position.time)),
+            out_of_bounds: self.course.out_of_bounds(),
+            last: self.last.map_or_else(|| self.course.totals(self.position.time), Ok)?,
             means: self.sums.means(),
-        }
+        })
     }
 }

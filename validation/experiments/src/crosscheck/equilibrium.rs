@@ -317,7 +317,7 @@ mod tests {
             ..Setup::new(Code::Native, &SET6, ForceLaw::Conservative)
         };
         let failed = |fault: Option<Fault>| -> Vec<String> {
-            let trace = native(&setup, &state, length, fault, &|_| ()).unwrap();
+            let trace = Fault::during(fault, || native(&setup, &state, length, &|_| ())).unwrap();
             let found = measure(&trace, edge, height).unwrap();
             let mut checks = vec![against_kt(&SET6, Code::Native, ForceLaw::Conservative, &found)];
             checks.extend(against_published(&SET6, &found));

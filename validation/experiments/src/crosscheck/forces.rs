@@ -7,7 +7,7 @@ use crate::code::Code;
 use crate::fluids::{GAMMA, RC, RD, SET6};
 use crate::start::{Filling, equilibrated, simulation};
 use psidpd_core::engine::Precision::{Double, Mixed};
-use psidpd_core::engine::{Fault, PeriodicBox, Step, Want};
+use psidpd_core::engine::{PeriodicBox, Step, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
 use psidpd_core::truth;
@@ -93,8 +93,8 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Expe
 
 /// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these,
 /// were it wrong.
-fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ExperimentError> {
-    let native = |model: &Model, step| point_of(simulation(model, 1.0, state, SEED, Double, fault)?, step);
+fn against_plain(part: &mut Part, state: &State) -> Result<(), ExperimentError> {
+    let native = |model: &Model, step| point_of(simulation(model, 1.0, state, SEED, Double)?, step);
     let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
     for (id, law, gamma, step) in [
         ("conservative", ForceLaw::Conservative, 0.0, None),
@@ -112,13 +112,13 @@ fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result
     let by_stress = virial[2] - 0.5 * (virial[0] + virial[1]);
     let what = "native: W_zz − (W_xx + W_yy)/2, which makes the surface tension, against the change of U as the box is \
                 stretched at constant volume, relative";
-    let apart = by_stress / stretching(&model, state, fault)? - 1.0;
+    let apart = by_stress / stretching(&model, state)? - 1.0;
     part.at_most("forces.native.stretching", what, apart, 1e-4);
     Ok(())
 }
 
 /// dU/d ln A as the faces normal to z are stretched to A at constant volume.
-fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64, ExperimentError> {
+fn stretching(model: &Model, state: &State) -> Result<f64, ExperimentError> {
     let energy = |change: f64| -> Result<f64, ExperimentError> {
         let scale = [(1.0 + change).sqrt(), (1.0 + change).sqrt(), 1.0 / (1.0 + change)];
         let lengths = state.domain.lengths();
@@ -130,7 +130,7 @@ fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64,
         for x in &mut stretched.x {
             *x = stretched.domain.point(state.domain.fraction(*x));
         }
-        Ok(point_of(simulation(model, 1.0, &stretched, SEED, Double, fault)?, None)?.energy)
+        Ok(point_of(simulation(model, 1.0, &stretched, SEED, Double)?, None)?.energy)
     };
     // The second derivative jumps where pairs leave a range: a small step, and rounding is far below.
     const H: f64 = 1e-5;
@@ -204,7 +204,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let setup = |code, law| Setup { seed: SEED, spacing: FINE, ..Setup::new(code, &SET6, law) };
     // These sums go over every pair and its images.
     let small = Filling { lengths: [6.0, 6.0, 9.0], thickness: 4.5 };
-    against_plain(&mut part, &equilibrated(Double, &SET6.fluid, small, 500, SEED)?, context.fault)?;
+    against_plain(&mut part, &equilibrated(Double, &SET6.fluid, small, 500, SEED)?)?;
     use ForceLaw::{Conservative, LucyLammps};
     let native = |model: &Model, step| point_of(context.simulation(model, 1.0, &state, SEED)?, step);
     let truth = native(&SET6.model(Conservative, 0.0)?, None)?;
@@ -218,7 +218,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     let loose = [2e-5, 1e-6, 1e-5];
     compare(&mut part, Setup { precision: Mixed, ..plugin }, "psi-mixed", &truth, loose, "native")?;
     let model = SET6.model(Conservative, 0.0)?;
-    let mixed = point_of(simulation(&model, 1.0, &state, SEED, Mixed, context.fault)?, None)?.against(&truth);
+    let mixed = point_of(simulation(&model, 1.0, &state, SEED, Mixed)?, None)?.against(&truth);
     let of = "native in mixed precision";
     part.bound("forces.native-mixed", of, "double precision", &mixed, loose);
     part.values.push(("forces.native-mixed".into(), json!(mixed)));
@@ -295,6 +295,7 @@ fn smooth_particles(state: &State, margin: f64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use psidpd_core::engine::Fault;
 
     /// An engine one of whose terms is 5 % wrong fails the checks of `psidpd validate`.
     #[test]
@@ -303,7 +304,7 @@ mod tests {
         let state = equilibrated(Double, &SET6.fluid, filling, 100, SEED).unwrap();
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let mut part = Part::default();
-            against_plain(&mut part, &state, fault).unwrap();
+            Fault::during(fault, || against_plain(&mut part, &state)).unwrap();
             part.checks.iter().filter(|c| !c.passed).map(|c| c.id.clone()).collect()
         };
         assert_eq!(failed(None), Vec::<String>::new());

@@ -25,7 +25,7 @@ use crate::ExperimentError;
 use crate::lammps::host::PluginHost;
 use crate::start;
 use forces::Difference;
-use psidpd_core::engine::{Fault, Precision};
+use psidpd_core::engine::Precision;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Simulation, State};
 use psidpd_report::{Check, Progress, Section};
@@ -40,8 +40,6 @@ pub struct Context<'a> {
     pub work: PathBuf,
     pub full: bool,
     pub progress: &'a Progress,
-    /// What is wrong with the native engine: for tests that checks tell of it.
-    pub fault: Option<Fault>,
 }
 
 impl Context<'_> {
@@ -53,7 +51,7 @@ impl Context<'_> {
         state: &State,
         seed: u64,
     ) -> Result<Simulation, ExperimentError> {
-        start::simulation(model, kt, state, seed, Precision::Double, self.fault)
+        start::simulation(model, kt, state, seed, Precision::Double)
     }
 }
 
@@ -94,6 +92,7 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use psidpd_core::engine::Fault;
 
     /// A native engine of which a term is 5 % too strong fails the checks that stand on LAMMPS's own styles alone, and one
     /// that is right passes them; the statistical ones raise a false alarm once in a thousand seeds, and theirs are fixed.
@@ -105,8 +104,9 @@ mod tests {
         let progress = Progress::new();
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let work = folder.path().to_owned();
-            let context = Context { lammps: &lammps, work, full: false, progress: &progress, fault };
-            let mut parts = vec![thermostat::run(&context).unwrap(), mixture::run(&context).unwrap()];
+            let context = Context { lammps: &lammps, work, full: false, progress: &progress };
+            let run = || vec![thermostat::run(&context).unwrap(), mixture::run(&context).unwrap()];
+            let mut parts = Fault::during(fault, run);
             // Configurations of LAMMPS alone.
             parts.extend(fault.is_none().then(|| observables::run(&context).unwrap()));
             let checks = parts.into_iter().flat_map(|part| part.checks);

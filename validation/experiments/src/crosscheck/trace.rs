@@ -7,7 +7,7 @@ use crate::ExperimentError;
 use crate::code::Host;
 use crate::files;
 use crate::start::simulation;
-use psidpd_core::engine::{Fault, Want};
+use psidpd_core::engine::Want;
 use psidpd_dynamics::run::{Integrator, State};
 use psidpd_formats::dump;
 use std::io::{Read, Seek, SeekFrom};
@@ -74,22 +74,21 @@ pub fn run(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
     if setup.code.host() == Host::Native {
-        native(setup, state, length, context.fault, advance)
+        native(setup, state, length, advance)
     } else {
         lammps(context, setup, state, length, &context.work.join(name), advance)
     }
 }
 
-/// A run of the native runner; with a fault, of one that is wrong on purpose.
+/// A run of the native runner.
 pub(super) fn native(
     setup: &Setup,
     state: &State,
     length: Length,
-    fault: Option<Fault>,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ExperimentError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
-    let mut simulation = simulation(&model, 1.0, state, setup.seed, setup.precision, fault)?;
+    let mut simulation = simulation(&model, 1.0, state, setup.seed, setup.precision)?;
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
     simulation.prepare(length.dt, Want::TOTALS)?;
     let (mut sum, mut count) = ([0.0; 16], 0.0);

@@ -5,7 +5,6 @@ use crate::ExperimentError;
 use crate::files;
 use crate::lammps::host::PluginHost;
 use crate::machine::machine;
-use psidpd_core::engine::Fault;
 use psidpd_formats::files::{Existing, write_bytes, write_json};
 use psidpd_report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
@@ -20,8 +19,6 @@ pub struct Options {
     pub existing: Existing,
     /// The one comparison that is made, if not all are: for tests.
     pub only: Option<&'static str>,
-    /// What is wrong with the native engine: for tests that checks tell of it.
-    pub fault: Option<Fault>,
 }
 
 #[derive(Debug)]
@@ -36,13 +33,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Validation, Ex
     let out = files::absolute_folder(&options.out)?;
     let prepared = || PluginHost::prepared(None, &|line| progress.note(line));
     let (lammps, version) = progress.spinner("LAMMPS and the plugin", prepared)?;
-    let context = Context {
-        lammps: &lammps,
-        work: out.join("runs"),
-        full: options.full,
-        progress,
-        fault: options.fault,
-    };
+    let context = Context { lammps: &lammps, work: out.join("runs"), full: options.full, progress };
 
     let mut results = Results::new("psidpd cross-code validation", env!("CARGO_PKG_VERSION"));
     let facts = [

@@ -17,7 +17,7 @@ use crate::jobs;
 use crate::lammps::host::PluginHost;
 use crate::models::SET6;
 use case::{Case, Inputs, Must, cube};
-use psidpd_core::engine::{Fault, Precision};
+use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_formats::files::{remove_work, temporary_folder, work_folder};
 use psidpd_report::{Progress, Table};
@@ -82,12 +82,11 @@ fn settings(extent: Extent) -> Vec<(Integrator, Precision)> {
     found
 }
 
-/// Carries out all cases; in LAMMPS too, if `lammps` is set. With a `fault` the native engine is wrong on purpose.
+/// Carries out all cases; in LAMMPS too, if `lammps` is set.
 pub fn run(
     extent: Extent,
     lammps: bool,
     only: Option<&str>,
-    fault: Option<Fault>,
     progress: &Progress,
 ) -> Result<Vec<Verdict>, ExperimentError> {
     let folder = temporary_folder()?;
@@ -121,7 +120,7 @@ pub fn run(
     let verdicts = jobs::counted(bar, runs, |(case, lammps, integrator, precision, must, place)| {
         work_folder(&place)?;
         let (host, found) = match lammps {
-            None => (Host::Native, native::carry_out(case, integrator, precision, &place, fault)?),
+            None => (Host::Native, native::carry_out(case, integrator, precision, &place)?),
             Some(lammps) => (Host::Plugin, plugin::carry_out(lammps, case, precision, &place)?),
         };
         let _ = remove_work(&place);
@@ -157,7 +156,7 @@ mod tests {
     /// What `psidpd hardcases --quick` does.
     #[test]
     fn every_case_does_what_it_must() {
-        let results = run(Extent::Quick, false, None, None, &Progress::new()).unwrap();
+        let results = run(Extent::Quick, false, None, &Progress::new()).unwrap();
         let wrong: Vec<&Verdict> = results.iter().filter(|r| r.wrong.is_some()).collect();
         assert!(wrong.is_empty(), "{}\n{wrong:#?}", table(&results).to_text_with(false));
         assert!(results.len() > 100);
@@ -165,7 +164,7 @@ mod tests {
 
     #[test]
     fn words_of_no_case_are_an_error() {
-        let error = run(Extent::Quick, false, Some("zzz"), None, &Progress::new()).unwrap_err();
+        let error = run(Extent::Quick, false, Some("zzz"), &Progress::new()).unwrap_err();
         assert!(
             error.to_string().contains("\"zzz\"") && error.to_string().contains("singular formulas"),
             "{error}"

@@ -4,7 +4,7 @@ use super::case::{Case, Found, Inputs, Must};
 use crate::ExperimentError;
 use crate::bulk::Observed;
 use psidpd_core::document::FileError;
-use psidpd_core::engine::{Fault, Precision, Settings, Want};
+use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_core::truth;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::particles::State;
@@ -50,32 +50,30 @@ pub fn scene(
     Ok(Scene::open(&folder.join("scene.toml")))
 }
 
-/// Carries out a case in `folder`, with a wrong engine if there is a `fault`.
+/// Carries out a case in `folder`.
 pub fn carry_out(
     case: &Case,
     integrator: Integrator,
     precision: Precision,
     folder: &Path,
-    fault: Option<Fault>,
 ) -> Result<Found, ExperimentError> {
     let scene = match scene(&case.run, integrator, precision, folder)? {
         Ok(scene) => scene,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
     };
     match case.must {
-        Must::Agrees(_) => forces(&scene, fault),
-        Must::Conserves(_) => conserved(&scene, integrator, fault),
-        _ => go(&scene, &folder.join("out"), fault),
+        Must::Agrees(_) => forces(&scene),
+        Must::Conserves(_) => conserved(&scene, integrator),
+        _ => go(&scene, &folder.join("out")),
     }
 }
 
 /// Runs a scene as `psidpd run` does.
-fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, ExperimentError> {
+fn go(scene: &Scene, out: &Path) -> Result<Found, ExperimentError> {
     let mut runner = match Runner::begin(scene, out, Begin::Overwrite) {
         Ok(runner) => runner,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
     };
-    fault.into_iter().for_each(|fault| runner.falsify(fault));
     let mut warnings = Vec::new();
     // An unusual start may be hot or cold until it has settled.
     let last = scene.stages.last().map_or("", |stage| stage.name.as_str());
@@ -121,8 +119,8 @@ pub fn momentum_of(state: &State) -> f64 {
 }
 
 /// The forces at the start against those of the reference.
-fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, ExperimentError> {
-    let mut run = simulation(scene, scene.initial_state(), fault)?;
+fn forces(scene: &Scene) -> Result<Found, ExperimentError> {
+    let mut run = simulation(scene, scene.initial_state())?;
     run.set_thermostat(false);
     run.prepare(scene.stages[0].dt, Want::FORCES)?;
     let species: Vec<usize> = run.state().species.iter().map(|s| *s as usize).collect();
@@ -135,18 +133,17 @@ fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, ExperimentError>
     Ok(Found::Differs(differs))
 }
 
-fn simulation(scene: &Scene, state: State, fault: Option<Fault>) -> Result<Simulation, RunError> {
+fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
     let mut run = scene.simulation(state)?;
     run.set_settings(Settings { precision: scene.precision(), ..Settings::default() })?;
-    fault.into_iter().for_each(|fault| run.falsify(fault));
     run.set_reordering(true);
     Ok(run)
 }
 
 /// Energy and momentum after the first stage with thermostat and the second without.
-fn conserved(scene: &Scene, integrator: Integrator, fault: Option<Fault>) -> Result<Found, ExperimentError> {
+fn conserved(scene: &Scene, integrator: Integrator) -> Result<Found, ExperimentError> {
     let stopped = |error: RunError| Ok(Found::Stopped(error.to_string()));
-    let mut run = simulation(scene, scene.initial_state(), fault)?;
+    let mut run = simulation(scene, scene.initial_state())?;
     let [settle, measure] = [0, 1].map(|k| &scene.stages[k]);
     run.prepare_for(integrator, settle.dt, Want::FORCES)?;
     if let Err(error) = run.advance(settle.steps, settle.dt, integrator) {
@@ -171,6 +168,7 @@ mod tests {
     use super::super::{Extent, cases};
     use super::*;
     use crate::test_support::IDEAL;
+    use psidpd_core::engine::Fault;
 
     /// Masses of 1 and 3: 3 and −3 cancel, and both along x are the whole of Σ m |v|; at a right angle they are 1/√2 of it.
     #[test]
@@ -198,7 +196,7 @@ mod tests {
             let case = Case::new("drift", run, must);
             let folder = tempfile::tempdir().unwrap();
             let integrator = Integrator::VelocityVerlet;
-            let found = carry_out(&case, integrator, Precision::Double, folder.path(), None).unwrap();
+            let found = carry_out(&case, integrator, Precision::Double, folder.path()).unwrap();
             (super::super::case::judge(must, &found, false), found)
         };
         let (right, found) = judged("");
@@ -225,7 +223,8 @@ mod tests {
             for fault in [None, Some(fault)] {
                 let folder = tempfile::tempdir().unwrap();
                 let integrator = Integrator::VelocityVerlet;
-                let found = carry_out(&case, integrator, Precision::Double, folder.path(), fault).unwrap();
+                let carried = || carry_out(&case, integrator, Precision::Double, folder.path());
+                let found = Fault::during(fault, carried).unwrap();
                 let judged = super::super::case::judge(case.must, &found, false);
                 assert_eq!(judged.is_err(), fault.is_some(), "{words}: {fault:?}: {found:?}");
             }

@@ -1,7 +1,6 @@
 use crate::ExperimentError;
 use crate::bulk::{self, Bulk, Observed, Sampling};
 use crate::papers::case::{Reproduction, curve};
-use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::Begin;
@@ -30,8 +29,6 @@ pub struct Context {
     pub threads: NonZeroUsize,
     /// Folders of runs that were made in this call, which figures of the same runs share.
     pub made: Rc<RefCell<HashSet<PathBuf>>>,
-    /// What is wrong with the forces of its runs: for tests that values tell of it.
-    pub fault: Option<Fault>,
 }
 
 /// A homogeneous fluid of one species that a case measures.
@@ -89,7 +86,7 @@ impl Context {
         };
         let bulk = Bulk { model: &model, kt: fluid.kt, densities, observe: fluid.observe, sampling };
         let folder = self.folder.join(name);
-        Ok(bulk::run(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
+        Ok(bulk::run(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads)?)
     }
 
     /// Pressures of a fluid of one species at several densities, which end the names of the runs.
@@ -110,7 +107,7 @@ impl Context {
         let scene =
             Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
         let folder = self.folder.join(name);
-        Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
+        Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads)?)
     }
 
     /// Runs a scene of `scenes/full`, as it is at full size and with `changes`, each as KEY=VALUE, at quick size.

@@ -76,9 +76,8 @@ mod tests {
             folder: folder.path().join(id),
             threads: NonZeroUsize::MIN,
             made: Default::default(),
-            fault,
         };
-        let outcome = case.run(&context).unwrap();
+        let outcome = Fault::during(fault, || case.run(&context)).unwrap();
         outcome.values.iter().filter(|value| !value.passes()).map(|value| value.name.clone()).collect()
     }
 

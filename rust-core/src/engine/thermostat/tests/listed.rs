@@ -34,9 +34,8 @@ fn act_again(
     let pool = engine.pool().clone();
     thermostat.ask(engine, DT, true);
     compute_forces(engine, cloud);
-    thermostat.take(engine);
-    let listed = thermostat.from_forces.listed.is_some();
-    thermostat.find_pairs(&pool, &cloud.bodies(), DT, true).unwrap();
+    thermostat.find_pairs_with(engine, &cloud.bodies(), DT, true).unwrap();
+    let listed = thermostat.are_of_forces;
     thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
     let mut v = cloud.v.clone();
     let virial = thermostat.act(&pool, Update::Midpoint, &mut v);
@@ -100,22 +99,39 @@ fn only_the_pairs_that_were_asked_for_are_taken() {
     let cloud = clouds().swap_remove(0).1;
     let mut engine = engine(ONE, Precision::Mixed, 1);
     assert!(act_on_listed(ONE, &cloud, &mut engine).2);
+    let mut other = thermostat(ONE, 2.0, Precision::Mixed);
     let mut thermostat = thermostat(ONE, 1.0, Precision::Mixed);
+    let takes = |thermostat: &mut PairThermostat, engine: &mut Engine, cloud: &Cloud, dt, virial| {
+        thermostat.find_pairs_with(engine, &cloud.bodies(), dt, virial).unwrap();
+        thermostat.are_of_forces
+    };
     compute_forces(&mut engine, &cloud);
-    thermostat.take(&mut engine);
-    assert!(thermostat.from_forces.listed.is_none(), "nobody asked");
+    assert!(!takes(&mut thermostat, &mut engine, &cloud, DT, false), "nobody asked");
     thermostat.ask(&mut engine, DT, false);
     compute_forces(&mut engine, &cloud);
     compute_forces(&mut engine, &cloud);
-    thermostat.take(&mut engine);
-    assert!(thermostat.from_forces.listed.is_none(), "another evaluation has followed");
-    for (dt, virial) in [(2.0 * DT, false), (DT, true)] {
+    assert!(!takes(&mut thermostat, &mut engine, &cloud, DT, false), "another evaluation has followed");
+    for (dt, virial, expected) in [(DT, false, true), (2.0 * DT, false, false), (DT, true, false)] {
         thermostat.ask(&mut engine, DT, false);
         compute_forces(&mut engine, &cloud);
-        thermostat.take(&mut engine);
-        let found = thermostat.from_forces.listed.unwrap();
-        assert!(found.serves(Listed { dt: DT, virial: false, particles: cloud.x.len() }));
-        assert!(!found.serves(Listed { dt, virial, particles: cloud.x.len() }));
+        assert_eq!(takes(&mut thermostat, &mut engine, &cloud, dt, virial), expected, "{dt} {virial}");
+        assert!(!takes(&mut thermostat, &mut engine, &cloud, DT, false), "they are taken once");
+    }
+    // Of another thermostat, of the fluid at another temperature, and of particles that have moved or changed places.
+    other.ask(&mut engine, DT, false);
+    compute_forces(&mut engine, &cloud);
+    assert!(!takes(&mut other, &mut engine, &cloud, DT, false), "it has asked an engine of another kT");
+    thermostat.ask(&mut engine, DT, false);
+    compute_forces(&mut engine, &cloud);
+    assert!(!takes(&mut other, &mut engine, &cloud, DT, false), "another thermostat has asked");
+    let mut moved = cloud.clone();
+    moved.x[17][1] += 1e-12;
+    let mut exchanged = cloud.clone();
+    exchanged.x.swap(3, 4);
+    for other in [moved, exchanged] {
+        thermostat.ask(&mut engine, DT, false);
+        compute_forces(&mut engine, &cloud);
+        assert!(!takes(&mut thermostat, &mut engine, &other, DT, false));
     }
     engine.set_special_pairs([SpecialPair { i: 0, j: 1, factor: 0.0 }]);
     assert!(!act_on_listed(ONE, &cloud, &mut engine).2);

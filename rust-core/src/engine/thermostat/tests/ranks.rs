@@ -93,9 +93,11 @@ fn by_ranks(
                 let surroundings = Surroundings::Ghosts(rank.around, Newton::On);
                 let mut force = vec![[0.0; 3]; x.len()];
                 drop(engine.first(surroundings, &request(rank.particles), &mut force).unwrap());
-                thermostat.take(&mut engine);
+                thermostat.find_pairs_of_rank_with(&mut engine, &rank, DT, virial).unwrap();
+                assert_eq!(thermostat.are_of_forces, engine.path() == Some(crate::engine::Path::Sweep));
+            } else {
+                thermostat.find_pairs_of_rank(&pool, &rank, DT, virial).unwrap();
             }
-            thermostat.find_pairs_of_rank(&pool, &rank, DT, virial).unwrap();
             thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
             let mut vectors: Vec<[f64; 3]> = all().map(|(k, _)| cloud.v[k]).collect();
             let v = piece.owned.iter().map(|k| cloud.v[*k]).collect();

@@ -33,14 +33,14 @@ impl Simulation {
 
     /// Copies the particles of the present step from the device into the arrays of the host. Until then the arrays are
     /// those of an earlier step; totals, temperature and pressure are always those of the present one.
-    pub fn fetch(&mut self) -> Result<(), RunError> {
+    pub(super) fn fetch(&mut self) -> Result<(), RunError> {
         #[cfg(feature = "gpu")]
         self.fetch_from_gpu()?;
         Ok(())
     }
 
     /// Whether the arrays of the host are those of the present step.
-    pub(in crate::run) fn is_here(&self) -> bool {
+    pub(super) fn is_here(&self) -> bool {
         #[cfg(feature = "gpu")]
         return self.is_fetched();
         #[cfg(not(feature = "gpu"))]

@@ -2,9 +2,8 @@
 
 use super::particles::Particles;
 use super::{RunError, Simulation};
-use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Fault, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally, Want,
+    self, Engine, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally, Want,
 };
 use psidpd_core::model::Model;
 
@@ -13,8 +12,6 @@ pub(super) struct Forces {
     model: Model,
     pub engine: Engine,
     pub tally: Tally,
-    /// The number of the positions of the last evaluation, [`Particles::moves`].
-    moves: u64,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
     pub earlier_out_of_bounds: [u64; 2],
 }
@@ -26,7 +23,6 @@ impl Forces {
             engine: Engine::new(&model.at(kt)?, settings)?,
             model: model.clone(),
             tally: Tally::default(),
-            moves: 0,
             earlier_out_of_bounds: [0; 2],
         })
     }
@@ -40,7 +36,6 @@ impl Forces {
         step: Option<Step>,
         number: u64,
     ) -> Result<(), RunError> {
-        self.moves = particles.moves();
         let (state, force) = particles.forces_mut();
         if let Some(step) = step {
             if !(step.dt > 0.0 && step.dt.is_finite()) {
@@ -75,13 +70,6 @@ impl Forces {
         (0..6).for_each(|c| self.tally.thermostat_virial[c] += virial[c]);
     }
 
-    /// Gives a thermostat the pairs that the last evaluation has listed, if it was at the positions of `particles`.
-    pub fn give_pairs(&mut self, pairs: &mut PairThermostat, particles: &Particles) {
-        if self.moves == particles.moves() {
-            pairs.take(&mut self.engine);
-        }
-    }
-
     /// Takes another temperature, or other settings.
     pub fn renew(&mut self, kt: f64, settings: Settings) -> Result<(), RunError> {
         let out_of_bounds = self.out_of_bounds();
@@ -97,14 +85,6 @@ impl Forces {
 }
 
 impl Simulation {
-    /// Makes forces wrong until settings or the temperature are set: tests use it to check that errors of
-    /// forces are noticed.
-    #[doc(hidden)]
-    pub fn falsify(&mut self, fault: Fault) {
-        self.forces.earlier_out_of_bounds = self.forces.out_of_bounds();
-        self.forces.engine.falsify(fault);
-    }
-
     /// Sets the settings of later evaluations; the default is double precision on one thread.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
         self.forces.renew(self.kt(), settings)?;

@@ -4,7 +4,7 @@
 //! asked for, or when they take [`BATCH`]. What the device does not compute, the paths of momentum that some observables
 //! sample, comes from a copy of the same step on the host.
 
-use super::{RunError, Simulation};
+use super::{Place, RunError, Simulation};
 use crate::device::{DeviceError, refused_step};
 use crate::integrator::Integrator;
 use crate::particles::BodyForce;
@@ -219,7 +219,7 @@ impl Simulation {
             self.make_collected(false)?;
         }
         self.number += 1;
-        self.stale = false;
+        self.forces_at = Place::End;
         let Some(gpu) = &mut self.gpu else { return Ok(()) };
         gpu.fetched = false;
         let (steps, ..) = gpu.collected.get_or_insert((0, dt, rule));

@@ -4,6 +4,7 @@
 //! the `forces` between them, the `thermostat` where it is not part of these forces, and the `motion`. An
 //! integrator composes a step of the operators in `motion` and `thermostat`.
 
+mod course;
 mod device;
 mod displaced;
 mod external;
@@ -18,6 +19,7 @@ mod thermodynamics;
 mod thermostat;
 mod walls;
 
+pub(super) use course::{Course, Task};
 pub(super) use thermostat::Heat;
 
 use super::{Integrator, RunError, State, reorder};
@@ -50,13 +52,23 @@ pub struct Simulation {
     monte_carlo: MonteCarlo,
     seed: u64,
     pub(crate) number: u64,
-    /// Whether the forces belong to other positions than the present ones.
-    stale: bool,
+    forces_at: Place,
     /// The transport of momentum in the present step; `None` without recording.
     record: Option<Box<Record>>,
     /// The GPU that makes the steps; `None` for the CPU.
     #[cfg(feature = "gpu")]
     gpu: Option<Box<gpu::Gpu>>,
+}
+
+/// Where the present forces belong in the step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// At the positions where it ends.
+    End,
+    /// At positions on its way.
+    Within,
+    /// Nowhere: trial moves need no forces.
+    Nowhere,
 }
 
 impl Simulation {
@@ -77,7 +89,7 @@ impl Simulation {
             monte_carlo: MonteCarlo::default(),
             seed,
             number: 0,
-            stale: false,
+            forces_at: Place::End,
             record: None,
             #[cfg(feature = "gpu")]
             gpu: None,
@@ -116,7 +128,7 @@ impl Simulation {
         self.thermostat.in_forces = None;
         (self.motion.deferred, self.motion.held) = (None, None);
         self.number = number;
-        self.stale = false;
+        self.forces_at = Place::End;
         #[cfg(feature = "gpu")]
         self.forget_gpu(out_of_bounds);
     }
@@ -129,9 +141,15 @@ impl Simulation {
 
     /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
     pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
+        self.compute_first(integrator, dt, want)?;
+        self.fetch()
+    }
+
+    /// Computes the forces of the present step, which steps of `integrator` begin with.
+    fn compute_first(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
         self.forget_impulses();
-        self.stale = false;
+        self.forces_at = Place::End;
         self.motion.held = None;
         #[cfg(feature = "gpu")]
         if self.gpu.is_some() {
@@ -156,32 +174,34 @@ impl Simulation {
         self.forces.compute(&mut self.particles, want, step, self.number)
     }
 
-    /// Makes one step of `dt`. The forces of the previous step must be present: see
-    /// [`Simulation::prepare_for`].
+    /// Makes one step of `dt`. The forces of the previous step must be present: see [`Simulation::prepare_for`]. After it
+    /// all that can be read is that of the end of the step; of the totals, what it `want`s.
     pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         self.begin_step(dt, integrator, want)?;
         self.end_step()?;
-        self.fetch()?;
-        if want == Want::FORCES { Ok(()) } else { self.refresh(want) }
+        self.refresh(want)?;
+        self.fetch()
     }
 
+    /// Makes so many steps, as [`Simulation::step`] without totals.
     pub fn advance(&mut self, steps: u64, dt: f64, integrator: Integrator) -> Result<(), RunError> {
         for _ in 0..steps {
             self.begin_step(dt, integrator, Want::FORCES)?;
         }
         self.end_step()?;
+        self.refresh(Want::FORCES)?;
         self.fetch()
     }
 
     /// Makes a step except for its last kick, which the next step can include with the same bits. Until then,
-    /// or until [`Simulation::end_step`], velocities are not those at the end of the step.
-    pub(super) fn begin_step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
+    /// or until [`Simulation::end_step`], velocities are not those at the end of the step: see [`Course`].
+    fn begin_step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
         }
         if !self.thermostat.fits(integrator.properties().drag_in_forces) {
             // The present forces belong to another integrator.
-            self.prepare_for(integrator, dt, Want::FORCES)?;
+            self.compute_first(integrator, dt, Want::FORCES)?;
         }
         #[cfg(feature = "gpu")]
         if self.gpu.is_some() {
@@ -194,7 +214,6 @@ impl Simulation {
         if self.number.is_multiple_of(integrator.thermostat_every()) {
             self.forget_impulses();
         }
-        self.monte_carlo.at_work = !integrator.has_time();
         self.open_record(dt);
         integrator.step(self, dt, want)?;
         if integrator.has_time() {
@@ -202,7 +221,11 @@ impl Simulation {
         }
         self.close_record(integrator);
         self.add_impulse_virials();
-        self.stale = !integrator.properties().forces_at_end;
+        self.forces_at = match (integrator.has_time(), integrator.properties().forces_at_end) {
+            (_, true) => Place::End,
+            (true, false) => Place::Within,
+            (false, false) => Place::Nowhere,
+        };
         // The order of trials must not depend on positions.
         if reorder::is_due(self.number) && integrator.has_time() {
             self.end_step()?;
@@ -228,7 +251,7 @@ impl Simulation {
 
     /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing. On a GPU it returns the errors of
     /// steps before too.
-    pub(super) fn end_step(&mut self) -> Result<(), RunError> {
+    fn end_step(&mut self) -> Result<(), RunError> {
         #[cfg(feature = "gpu")]
         self.make_collected(false)?;
         self.make_deferred_kick()
@@ -236,20 +259,18 @@ impl Simulation {
 
     /// Computes `want` at the end of the present step, if the integrator has computed forces at other
     /// positions only; trajectories do not depend on it.
-    pub(super) fn refresh(&mut self, want: Want) -> Result<(), RunError> {
-        if !self.stale {
-            return Ok(());
-        }
-        match self.monte_carlo.at_work {
-            true => self.forces_or_infinite(want)?,
-            false => {
+    fn refresh(&mut self, want: Want) -> Result<(), RunError> {
+        match self.forces_at {
+            Place::End => return Ok(()),
+            Place::Nowhere => self.forces_or_infinite(want)?,
+            Place::Within => {
                 // Particles that meet a face in the next step do so under the forces of this one.
                 let held = self.motion.bounds.has_walls().then(|| self.particles.forces().to_vec());
                 self.conservative_forces(want)?;
                 self.motion.held = held;
             }
         }
-        self.stale = false;
+        self.forces_at = Place::End;
         self.add_impulse_virials();
         Ok(())
     }

@@ -20,8 +20,6 @@ pub(super) struct MonteCarlo {
     /// The largest displacement along a direction, as tuned so far.
     found: Option<f64>,
     settling: bool,
-    /// Whether the present step makes trial moves.
-    pub at_work: bool,
     /// Numbers of trials and of accepted trials in the last step.
     trials: [u64; 2],
 }

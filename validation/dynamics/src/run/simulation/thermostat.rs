@@ -78,7 +78,7 @@ impl Thermostat {
         &mut self,
         particles: &Particles,
         external: &External,
-        forces: &Forces,
+        forces: &mut Forces,
         (dt, virial, number): (f64, bool, u64),
     ) -> Result<Option<&mut PairThermostat>, RunError> {
         let Some(pairs) = self.pairs.as_mut().filter(|_| self.on) else { return Ok(None) };
@@ -95,7 +95,7 @@ impl Thermostat {
                 frozen: &external.frozen,
             };
             let failed = |source| RunError::Engine { step: number, source };
-            pairs.find_pairs(forces.engine.pool(), &bodies, dt, virial).map_err(failed)?;
+            pairs.find_pairs_with(&mut forces.engine, &bodies, dt, virial).map_err(failed)?;
             self.found = found;
         }
         Ok(Some(pairs))
@@ -223,9 +223,6 @@ impl Simulation {
         let (want, recording) = (self.wants(want), self.is_recording());
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
         let what = (heat.time, want.virial, *number);
-        if let Some(pairs) = &mut thermostat.pairs {
-            forces.give_pairs(pairs, particles);
-        }
         let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
         let pool = forces.engine.pool();
         pairs.draw(pool, *seed, *number, heat.stream, heat.noise);

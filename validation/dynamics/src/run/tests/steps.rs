@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::checkpoint::Thermo;
+use crate::run::simulation::{Course, Task};
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_observe::Recorded;
@@ -82,14 +83,63 @@ fn steps_in_a_row_are_steps_one_by_one() {
             assert!(single.state() == row.state());
         }
         // A step of another length, or another evaluation of forces, completes a deferred kick.
+        let mut row = Course::of(row);
         for dt in [0.01, 0.02, 0.01] {
             single.step(dt, integrator, Want::FORCES).unwrap();
-            row.begin_step(dt, integrator, Want::FORCES).unwrap();
+            row.make(dt, integrator, Task::default()).unwrap();
         }
-        for run in [&mut single, &mut row] {
+        let row = row.ended().unwrap();
+        for run in [&mut single, &mut *row] {
             run.prepare(0.01, Want::FORCES).unwrap();
         }
         assert!(single.state() == row.state() && single.forces() == row.forces());
+    }
+}
+
+/// Whoever reads a run on its way changes no bit of it, with every integrator, in a periodic box and between faces. What is read is
+/// that of the end of the step: forces are those of the plain sums at the positions that are read.
+#[test]
+fn reading_changes_nothing() {
+    let (model, mut state) = start([1.0, 1.0], Matrix3::from_diagonal_element(4.0));
+    for (periodic, (name, integrator)) in
+        [true, false].into_iter().flat_map(|p| Integrator::ALL.iter().map(move |i| (p, *i)))
+    {
+        state.domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true, true, periodic]).unwrap();
+        let [mut read, mut unread] = [(); 2].map(|()| {
+            let mut run = Simulation::new(&model, 1.0, state.clone(), 7).unwrap();
+            run.set_reordering(true);
+            run.prepare_for(integrator, 0.01, Want::TOTALS).unwrap();
+            Course::of(run)
+        });
+        let mut plain = Simulation::new(&model, 1.0, state.clone(), 7).unwrap();
+        plain.use_pair_sums_only(true);
+        for step in 1..=70 {
+            let want = if step % 3 == 0 { Want::TOTALS } else { Want::FORCES };
+            for run in [&mut read, &mut unread] {
+                run.make(0.01, integrator, Task { want, ..Task::default() }).unwrap();
+            }
+            match step % 5 {
+                0 => assert!(read.whole().unwrap().temperature().is_finite(), "{name}"),
+                1 => assert!(read.ended().unwrap().temperature().is_finite(), "{name}"),
+                2 if want == Want::TOTALS => {
+                    assert!(read.totals(0.0).unwrap().potential.is_finite(), "{name}")
+                }
+                _ => {}
+            }
+            if step % 5 == 0 && !integrator.properties().drag_in_forces {
+                let now = read.whole().unwrap();
+                plain.restore(0, &now.state().clone(), now.forces(), [0; 2]);
+                plain.compute(Want::FORCES, None).unwrap();
+                for (found, expected) in now.forces().iter().flatten().zip(plain.forces().iter().flatten()) {
+                    assert!(
+                        (found - expected).abs() < 1e-9 * (1.0 + expected.abs()),
+                        "{name}: {found} {expected}"
+                    );
+                }
+            }
+        }
+        let (read, unread) = (read.ended().unwrap(), unread.ended().unwrap());
+        assert!(read.state() == unread.state(), "{name}");
     }
 }
 
