@@ -1,8 +1,6 @@
-//! Pairs that an evaluation lists for a thermostat, with the geometry that it computes anyway.
+//! What an evaluation lists pairs for, and where.
 
-use super::{EitherPrecision, PairLists, PlanePairs, Sweep, with};
 use crate::engine::plan::ThermostatPlan;
-use psidpd_passes::plane::list::ListTerms;
 
 /// What pairs are listed for.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,64 +15,13 @@ pub struct ListedFor {
 
 impl ListedFor {
     /// Whether these pairs are those of `asked`, perhaps with distances beside.
-    fn serves(&self, asked: &ListedFor) -> bool {
+    pub fn serves(&self, asked: &ListedFor) -> bool {
         self.dt == asked.dt && (self.virial || !asked.virial) && self.plan == asked.plan
     }
 }
 
-/// The pairs of an evaluation, which a thermostat takes once or not at all.
-#[derive(Debug)]
-pub struct ListedPairs<'a> {
-    sweep: &'a mut Sweep,
-    listed: ListedFor,
-    positions: u64,
-}
-
-impl ListedPairs<'_> {
-    /// Moves the pairs to `lists` and `planes`, if they are those that are `asked` for between particles at `x`; returns whether they
-    /// are. Particles of a cell are in the order of the host.
-    pub fn take(
-        self,
-        asked: &ListedFor,
-        x: &[[f64; 3]],
-        lists: &mut PairLists,
-        planes: &mut Vec<PlanePairs>,
-    ) -> bool {
-        if !self.listed.serves(asked) || self.positions != of_positions(x) {
-            return false;
-        }
-        with!(&mut self.sweep.workspace, m => {
-            let cells = &m.order;
-            planes.resize_with(cells.grid.planes, PlanePairs::default);
-            planes.iter_mut().enumerate().for_each(|(k, plane)| plane.lie_in(cells, k));
-            lists.follow(cells);
-            m.move_lists(planes.iter_mut().map(|plane| &mut plane.lists));
-        });
-        true
-    }
-}
-
-impl Sweep {
-    /// Asks the next evaluation to list pairs. It lists them without excluded pairs, and if drag and noise are not among the forces.
-    pub(in crate::engine) fn ask_for_pairs(&mut self, asked: Option<(ListTerms, ListedFor)>) {
-        (self.asked, self.listed) = (asked, None);
-    }
-
-    /// Takes lists that nobody needs, for the memory of the pairs that the next evaluation lists.
-    pub(in crate::engine) fn lend_lists(&mut self, planes: &mut [PlanePairs]) {
-        let lists = planes.iter_mut().map(|plane| std::mem::take(&mut plane.lists));
-        with!(&mut self.workspace, m => m.lend_lists(lists));
-    }
-
-    /// The pairs that the last evaluation has listed, once.
-    pub(in crate::engine) fn listed_pairs(&mut self) -> Option<ListedPairs<'_>> {
-        let (listed, positions) = self.listed.take().filter(|_| self.is_complete)?;
-        Some(ListedPairs { sweep: self, listed, positions })
-    }
-}
-
 /// A number that is another one for other positions, or for the same in another order, but for one case in 2⁶⁴.
-pub(super) fn of_positions(x: &[[f64; 3]]) -> u64 {
+pub fn of_positions(x: &[[f64; 3]]) -> u64 {
     const LANES: usize = 8;
     const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
     let (chunks, rest) = x.as_flattened().as_chunks::<LANES>();

@@ -8,7 +8,7 @@
 //! - [`region`]: the region of the sweep, and its cells.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through the passes.
 //! - [`pair_lists`]: lists of the pairs in a range, for the thermostat apart from the forces.
-//! - [`listed_pairs`]: pairs that an evaluation lists on its way, for that thermostat.
+//! - [`listed_pairs`]: what an evaluation lists pairs for on its way, and where.
 //! - [`places`]: double-precision positions for those pairs.
 //! - [`Sweep`]: the interface for hosts.
 
@@ -20,7 +20,7 @@ mod terms;
 mod times;
 mod workspace;
 
-pub(super) use listed_pairs::{ListedFor, ListedPairs};
+pub(super) use listed_pairs::ListedFor;
 pub(super) use pair_lists::{PairLists, PlanePairs};
 pub(super) use places::{Images, MARGIN, Places};
 pub use psidpd_threads::{Pool, ThreadCount, part};
@@ -112,7 +112,37 @@ macro_rules! with {
     };
 }
 
-use with;
+/// The pairs that an evaluation has listed, with the geometry that it computes anyway, which a thermostat takes once or not at all.
+#[derive(Debug)]
+pub struct ListedPairs<'a> {
+    sweep: &'a mut Sweep,
+    listed: ListedFor,
+    positions: u64,
+}
+
+impl ListedPairs<'_> {
+    /// Moves the pairs to `lists` and `planes`, if they are those that are `asked` for between particles at `x`; returns whether they
+    /// are. Particles of a cell are in the order of the host.
+    pub fn take(
+        self,
+        asked: &ListedFor,
+        x: &[[f64; 3]],
+        lists: &mut PairLists,
+        planes: &mut Vec<PlanePairs>,
+    ) -> bool {
+        if !self.listed.serves(asked) || self.positions != of_positions(x) {
+            return false;
+        }
+        with!(&mut self.sweep.workspace, m => {
+            let cells = &m.order;
+            planes.resize_with(cells.grid.planes, PlanePairs::default);
+            planes.iter_mut().enumerate().for_each(|(k, plane)| plane.lie_in(cells, k));
+            lists.follow(cells);
+            m.move_lists(planes.iter_mut().map(|plane| &mut plane.lists));
+        });
+        true
+    }
+}
 
 impl std::fmt::Debug for Sweep {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -305,6 +335,23 @@ impl Sweep {
         });
         self.is_complete = true;
         Ok(())
+    }
+
+    /// Asks the next evaluation to list pairs. It lists them without excluded pairs, and if drag and noise are not among the forces.
+    pub(super) fn ask_for_pairs(&mut self, asked: Option<(ListTerms, ListedFor)>) {
+        (self.asked, self.listed) = (asked, None);
+    }
+
+    /// Takes lists that nobody needs, for the memory of the pairs that the next evaluation lists.
+    pub(super) fn lend_lists(&mut self, planes: &mut [PlanePairs]) {
+        let lists = planes.iter_mut().map(|plane| std::mem::take(&mut plane.lists));
+        with!(&mut self.workspace, m => m.lend_lists(lists));
+    }
+
+    /// The pairs that the last evaluation has listed, once.
+    pub(super) fn listed_pairs(&mut self) -> Option<ListedPairs<'_>> {
+        let (listed, positions) = self.listed.take().filter(|_| self.is_complete)?;
+        Some(ListedPairs { sweep: self, listed, positions })
     }
 
     /// Copies the slopes of owned particles after [`Sweep::evaluate`], with room for `all`, for the
