@@ -174,6 +174,11 @@ mod tests {
             let numeric = (form.at(r + h).0 - form.at(r - h).0) / (2.0 * h);
             let scale = form.at(0.3 * range).1.abs();
             assert!((numeric - form.at(r).1).abs() < 1e-7 * scale, "at {r}");
+            let (h, curvature) = (1e-4 * range, form.curvature(r));
+            if !skip.iter().any(|s| (r - s).abs() < 2.0 * h) {
+                let numeric = (form.at(r + h).1 - form.at(r - h).1) / (2.0 * h);
+                assert!((numeric - curvature).abs() < 1e-4 * (scale / range + curvature.abs()), "at {r}");
+            }
         }
     }
 

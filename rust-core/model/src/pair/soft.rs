@@ -57,6 +57,7 @@ impl PairForm for Soft {
         (0.5 * self.strength * self.range * t * t, -self.strength * t)
     }
 
+    #[inline(always)]
     fn curvature(&self, _: f64) -> f64 {
         self.strength / self.range
     }

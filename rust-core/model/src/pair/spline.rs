@@ -93,4 +93,13 @@ impl PairForm for SplineAttractive {
         let (wb, db) = spline_shape(r, self.attraction_range);
         (self.repulsion * wa - self.attraction * wb, self.repulsion * da - self.attraction * db)
     }
+
+    #[inline(always)]
+    fn curvature(&self, r: f64) -> f64 {
+        let of = |range: f64| {
+            let s = r / range;
+            if s < 1.0 { CubicSpline::curvature(s) / (range * range) } else { 0.0 }
+        };
+        self.repulsion * of(self.repulsion_range) - self.attraction * of(self.attraction_range)
+    }
 }

@@ -1,6 +1,7 @@
 //! Forces, energy and virial over the pairs, in blocks: each term of the plan adds to a block's scalars
 //! in a loop of its own, compiled for its kernel, and a last loop adds these to the particles.
 
+use super::closed_forms::subtract_slopes;
 use super::pairs::PairList;
 use crate::engine::particles::Particles;
 use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
@@ -114,10 +115,10 @@ impl<const N: usize> Block<N> {
     /// Computes the conservative forces of some pairs, at most `N`, and their energies if asked for.
     pub fn conserve(&mut self, input: &ForceInput, pairs: Range<usize>, energies: bool) {
         self.conservative.fill(0.0);
+        self.pair.fill(0.0);
         if energies {
             self.excess_i.fill(0.0);
             self.excess_j.fill(0.0);
-            self.pair.fill(0.0);
         }
         for (k, density) in input.plan.passes.iter().enumerate() {
             let kernel = &input.plan.densities[*density].force_kernel;
@@ -252,7 +253,11 @@ fn add_pair_term<const N: usize>(
     energies: bool,
     block: &mut Block<N>,
 ) {
-    let list = input.list;
+    let (list, count) = (input.list, pairs.len());
+    let Block { conservative, pair, .. } = block;
+    if subtract_slopes(term, list, &pairs, &mut conservative[..count], &mut pair[..count]) {
+        return;
+    }
     let [a, b] = term.between.map(|s| s as u8);
     let range = term.potential.range();
     let mut count = 0;

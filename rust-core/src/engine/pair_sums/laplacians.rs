@@ -1,5 +1,6 @@
 //! Second derivatives of the energy by the positions of particles.
 
+use super::closed_forms::add_laplacians;
 use super::evaluation::Evaluation;
 use super::free_energy::Psi;
 use super::plane_list::{BLOCK, PlaneList, merge};
@@ -124,6 +125,9 @@ fn potential_laplacians(plane: &PlaneList, fluid: &Fluid, pairs: Range<usize>) -
     let mut sums = [0.0; BLOCK];
     let (mut r, mut phi, mut slope, mut place) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK], [0; BLOCK]);
     for term in &fluid.pairs {
+        if add_laplacians(term, list, &pairs, rest, &mut sums[..pairs.len()]) {
+            continue;
+        }
         let mut count = 0;
         for k in pairs.clone() {
             let acts = term.acts(list.species_i[k] as usize, list.species_j[k] as usize, list.r[k]);

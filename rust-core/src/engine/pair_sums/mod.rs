@@ -15,6 +15,7 @@
 //! tests: it sums every density, treats no ψ as a pair potential, and returns every pair with its
 //! force. Tests compare both with [`crate::truth`], and all faster code with them.
 
+mod closed_forms;
 mod densities;
 mod evaluation;
 mod forces;
