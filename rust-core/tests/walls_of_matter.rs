@@ -133,7 +133,7 @@ fn every_evaluation_is_the_truth() {
                 for (n, m) in found.iter().zip(&truth.densities) {
                     assert!((n - m).abs() < tolerance * 100.0, "{n} {m}");
                 }
-                on_walls = [0, 1].map(|k| engine.forces_on_walls()[k]);
+                on_walls = [0, 1].map(|k| engine.on_walls()[k].force);
             }
         }
         let evaluator = Evaluator::new(fluid).unwrap();

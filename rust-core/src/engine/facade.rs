@@ -11,7 +11,7 @@ use super::request::{Evaluated, Request, Results};
 use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
 use super::sweep::{Pool, Sweep, Times, UNFIT};
 use super::sweep_path::SweepPath;
-use super::walls;
+use super::walls::{self, OnWall};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use psidpd_passes::cells::excluded::Mark;
@@ -37,8 +37,10 @@ pub struct Engine {
     path: Option<Path>,
     /// Number of the last evaluation, different for all engines.
     number: u64,
-    /// The force on each wall in the last evaluation of totals, away from the fluid.
-    on_walls: Vec<f64>,
+    /// What each wall takes in the last evaluation that added it up.
+    on_walls: Vec<OnWall>,
+    /// Whether every evaluation adds that up, or those of totals.
+    always_sums_walls: bool,
 }
 
 /// The first half of an evaluation, whose second half needs the slopes of ghosts.
@@ -47,6 +49,8 @@ pub struct Engine {
 pub struct Pending {
     slopes: Vec<f64>,
     number: u64,
+    /// The box, if there are walls.
+    walls_in: Option<PeriodicBox>,
 }
 
 /// Times and counts of an engine's work since it was made.
@@ -88,7 +92,11 @@ impl Pending {
         }
         let path = engine.last_mut();
         *path.slopes_mut() = self.slopes;
-        path.second(request, force)
+        let mut tally = path.second(request, force)?;
+        if let Some(domain) = &self.walls_in {
+            tally += engine.add_walls(domain, request, force);
+        }
+        Ok(tally)
     }
 }
 
@@ -103,7 +111,8 @@ impl Engine {
 
     fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
         Engine {
-            on_walls: vec![0.0; plan.walls.len()],
+            on_walls: vec![OnWall::default(); plan.walls.len()],
+            always_sums_walls: false,
             pair_sums: PairSums::of_plan(plan.clone()),
             sweep: SweepPath::new(Sweep::of_plan(plan, settings, pool)),
             device: None,
@@ -134,7 +143,8 @@ impl Engine {
             true => Arc::clone(self.pool()),
             false => Arc::new(Pool::new(settings.threads)),
         };
-        *self = Engine { pair_sums_only: self.pair_sums_only, ..Engine::of_plan(plan, settings, pool) };
+        let Engine { pair_sums_only, always_sums_walls, .. } = *self;
+        *self = Engine { pair_sums_only, always_sums_walls, ..Engine::of_plan(plan, settings, pool) };
     }
 
     /// The plan of the fluid's passes.
@@ -296,6 +306,7 @@ impl Engine {
             done => done?,
         };
         if !self.plan().walls.is_empty() {
+            self.fetch_slopes(request.particles.owned);
             tally += self.add_walls(domain, request, force);
         }
         Ok(tally)
@@ -304,20 +315,26 @@ impl Engine {
     /// Adds the forces of walls, whose densities are among those of the evaluation before.
     fn add_walls(&mut self, domain: &PeriodicBox, request: &Request, force: &mut [[f64; 3]]) -> Tally {
         let Request { particles, want, .. } = request;
-        self.fetch_slopes(particles.owned);
+        let sums = want.energy || want.virial || self.always_sums_walls;
         let mut on_walls = std::mem::take(&mut self.on_walls);
         let slopes = std::mem::take(self.last_mut().slopes_mut());
         let (plan, pool) = (self.plan(), self.pool());
         let faces = walls::faces(&plan.walls, domain, plan.dimensions);
-        let tally = walls::add_forces(pool, plan, (&faces, particles), &slopes, *want, force, &mut on_walls);
+        let tally = walls::add_forces(pool, plan, (&faces, particles), &slopes, sums, force, &mut on_walls);
         *self.last_mut().slopes_mut() = slopes;
         self.on_walls = on_walls;
         tally
     }
 
-    /// The force on each wall in the last evaluation that computed a virial, across it and away from the fluid.
-    pub fn forces_on_walls(&self) -> &[f64] {
+    /// What each wall takes in the last evaluation of totals, or in the last of all with [`Engine::always_sum_walls`]; of a rank, what
+    /// its own particles give.
+    pub fn on_walls(&self) -> &[OnWall] {
         &self.on_walls
+    }
+
+    /// Makes every evaluation add up what walls take.
+    pub fn always_sum_walls(&mut self) {
+        self.always_sums_walls = true;
     }
 
     /// Sums over pairs, for particles that are too far apart for a sweep, which has not begun then.
@@ -354,7 +371,9 @@ impl Engine {
             done => done?,
         }
         let path = self.last_mut();
-        Ok(Pending { slopes: std::mem::take(path.slopes_mut()), number: self.number })
+        let slopes = std::mem::take(path.slopes_mut());
+        let around = surroundings.around().filter(|_| !self.plan().walls.is_empty());
+        Ok(Pending { slopes, number: self.number, walls_in: around.map(|around| around.domain.clone()) })
     }
 
     /// Chooses the path of a new evaluation.
@@ -363,8 +382,8 @@ impl Engine {
         self.number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = self.path_for(surroundings, want);
         let has_walls = !self.plan().walls.is_empty();
-        if has_walls && !matches!(surroundings, Surroundings::Box(_)) {
-            return Err(EngineError::Host("walls need a box without ghosts and listed pairs"));
+        if has_walls && surroundings.around().is_none() {
+            return Err(EngineError::Host("walls need a box, which a list of pairs does not have"));
         }
         if has_walls && path == Path::Device {
             return Err(EngineError::Device("a GPU computes no walls".to_owned()));

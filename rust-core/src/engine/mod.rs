@@ -9,6 +9,7 @@
 //! excess         ψ and its slopes for blocks of particles; excess_pass for all of them
 //! noise          the random number of a pair
 //! walls          what matter behind faces of the box adds to densities, energies and forces
+//! wall_drag      drag and noise of a particle against that matter
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
@@ -42,6 +43,7 @@ mod sweep;
 mod sweep_path;
 pub mod thermostat;
 pub mod vectors;
+mod wall_drag;
 mod walls;
 
 pub use counts::PassCounts;
@@ -66,7 +68,8 @@ pub use request::{Evaluated, Request, Results};
 pub use step::Step;
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, ThreadCount, Times, part};
-pub use walls::{Face, faces};
+pub use wall_drag::WallBath;
+pub use walls::{Face, OnWall, faces};
 
 #[cfg(test)]
 mod tests;

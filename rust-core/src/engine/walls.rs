@@ -6,8 +6,19 @@ use super::particles::Particles;
 use super::plan::Plan;
 use crate::model::wall::{Field, WallField};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::tally::{Tally, Want};
+use psidpd_passes::tally::Tally;
 use psidpd_threads::Pool;
+
+/// What a wall takes in an evaluation.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct OnWall {
+    /// The force on it, away from the fluid.
+    pub force: f64,
+    /// The energy of the particles near it, besides that of their ψ.
+    pub energy: f64,
+    /// The component of its virial across the face, along the line from the particle to the face.
+    pub virial: f64,
+}
 
 /// A wall in a box: its place.
 #[derive(Debug, Clone, Copy)]
@@ -97,19 +108,19 @@ pub fn force_and_energy(field: &Field, z: f64, slope: impl Fn(usize) -> Option<f
     [force, energy]
 }
 
-/// Adds the forces of walls after an evaluation with the `slopes` of ψ, [`Plan::slope_width`] for each particle, to `force`. Returns
-/// energy and virial if they are requested, along the line from the particle to the face, and adds up the forces on the walls, away
-/// from the fluid.
+/// Adds the forces of walls after an evaluation with the `slopes` of ψ, [`Plan::slope_width`] for each particle, to `force`: on owned
+/// particles alone, as a ghost has those of its owner. With `sums` it adds up what each wall takes, and returns energy and virial.
 pub fn add_forces(
     pool: &Pool,
     plan: &Plan,
     (faces, particles): (&[Face], &Particles),
     slopes: &[f64],
-    want: Want,
+    sums: bool,
     force: &mut [[f64; 3]],
-    on_walls: &mut [f64],
+    on_walls: &mut [OnWall],
 ) -> Tally {
-    let Particles { x, kind, .. } = *particles;
+    let Particles { kind, owned, .. } = *particles;
+    let (x, force) = (&particles.x[..owned], &mut force[..owned]);
     let (width, count) = (plan.slope_width(), plan.species().len());
     let species = |k: usize| plan.species_of_type().get(kind[k] as usize).copied().unwrap_or(-1);
     let of = |k: usize, face: &Face, field: &Field, z: f64| {
@@ -127,14 +138,17 @@ pub fn add_forces(
         }
     });
     let mut tally = Tally::default();
-    on_walls.fill(0.0);
-    if want.energy || want.virial {
+    on_walls.fill(OnWall::default());
+    if sums {
         for (k, x) in x.iter().enumerate() {
             for_each_near(faces, x, species(k), |face, field, z| {
                 let [force, energy] = of(k, face, field, z);
                 tally.pair += energy;
                 tally.virial[face.wall.wall.axis] += z * force;
-                on_walls[face.index] += force;
+                let on_wall = &mut on_walls[face.index];
+                on_wall.force += force;
+                on_wall.energy += energy;
+                on_wall.virial += z * force;
             });
         }
     }

@@ -179,7 +179,7 @@ impl PairSums {
     fn find_walls(&mut self, surroundings: Surroundings, particles: &Particles) {
         let PairSums { plan, of_walls, species, .. } = self;
         of_walls.clear();
-        let Surroundings::Box(domain) = surroundings else { return };
+        let Some(Around { domain, .. }) = surroundings.around() else { return };
         let faces = walls::faces(&plan.walls, domain, plan.dimensions);
         if !faces.is_empty() {
             let count = plan.species.len();

@@ -3,7 +3,7 @@
 use super::number::vector;
 use super::{FileError, Initial, Model, PeriodicBox, Section, Value};
 use psidpd_core::model::wall::Wall;
-use psidpd_core::theory::MeanField;
+use psidpd_core::theory::{self, local_densities_of_matter};
 use psidpd_observe::options::FACES;
 
 pub const KINDS: &[(&str, ())] = &[("continuum", ())];
@@ -77,7 +77,9 @@ fn read_one(
     }
     let local_densities = match number("local_density")? {
         Some(n) => vec![n; model.at(kt)?.densities.len()],
-        None => correlated(model, kt, matter).unwrap_or_default(),
+        None => {
+            model.at(kt).ok().and_then(|fluid| local_densities_of_matter(&fluid, matter)).unwrap_or_default()
+        }
     };
     let strength = section.get("strength").map(|value| not_negative(&value)).transpose()?.unwrap_or(1.0);
     let velocity = section.get("velocity");
@@ -121,15 +123,6 @@ fn not_negative(value: &Value) -> Result<f64, FileError> {
     }
 }
 
-/// The mean local densities in matter of this density with correlations to first order, where theory has them: for one species.
-fn correlated(model: &Model, kt: f64, density: f64) -> Option<Vec<f64>> {
-    let fluid = model.at(kt).ok()?;
-    let theory = MeanField::new(&fluid).ok()?;
-    let found = theory.correlations().ok()??.at(density)?;
-    let own = fluid.densities.iter().map(|d| if d.includes_self { d.kernel.value(0.0) } else { 0.0 });
-    Some(found.mean_density.iter().zip(own).map(|(n, own)| n + own).collect())
-}
-
 /// The drag coefficient at which a fluid of the stated viscosity does not slip at the wall.
 fn drag_without_slip(
     viscosity: &Value,
@@ -138,14 +131,8 @@ fn drag_without_slip(
     density: f64,
     [kt, mass]: [f64; 2],
 ) -> Result<f64, FileError> {
-    let of_one = Wall { drag: [Some(1.0), wall.drag[1]], ..wall.clone() };
-    let fluid =
-        model.clone().with_walls(vec![of_one]).at(kt).map_err(|e| viscosity.error(e.kind.to_string()))?;
-    let friction = fluid.walls.iter().flat_map(|wall| &wall.fields).find_map(|field| field.friction.as_ref());
-    let Some(friction) = friction.filter(|_| density > 0.0) else {
-        return Err(
-            viscosity.error("the range of the drag is missing: the model has no forces, `drag_range`")
-        );
-    };
-    Ok(friction.factor_without_slip(viscosity.positive()?, density, [kt, mass]))
+    let found = theory::drag_without_slip(model, wall, kt, viscosity.positive()?, [density, mass]);
+    found.map_err(|e| viscosity.error(e.kind.to_string()))?.ok_or_else(|| {
+        viscosity.error("the range of the drag is missing: the model has no forces, `drag_range`")
+    })
 }

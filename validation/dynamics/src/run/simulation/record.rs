@@ -130,11 +130,11 @@ impl Simulation {
     /// The conservative forces on the walls in the last evaluation.
     fn forces_of_fluid_on_walls(&self) -> Vec<[f64; 3]> {
         let engine = self.engine();
-        let walls = engine.plan().walls().iter().zip(engine.forces_on_walls());
+        let walls = engine.plan().walls().iter().zip(engine.on_walls());
         walls
-            .map(|(wall, force)| {
+            .map(|(wall, taken)| {
                 let mut on_wall = [0.0; 3];
-                on_wall[wall.wall.axis] = if wall.wall.high { *force } else { -force };
+                on_wall[wall.wall.axis] = if wall.wall.high { taken.force } else { -taken.force };
                 on_wall
             })
             .collect()

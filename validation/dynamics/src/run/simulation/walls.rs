@@ -1,71 +1,14 @@
 //! Friction and noise of walls.
 //!
-//! The drag between a particle and the matter of a wall is a tensor of friction that depends on the distance from the face. At
-//! fixed positions it makes the velocity relax to that of the wall: an Ornstein–Uhlenbeck process of each particle by itself, whose
-//! solution
-//!
-//! ```text
-//! v′ = V + c (v − V) + √((1 − c²) kT/m) ξ,    c = exp(−ζ Δt/m)
-//! ```
-//!
-//! along the face and across it is exact and keeps the Maxwell distribution at any Δt. It acts at the end of every step, whatever
-//! the integrator: as it leaves the distribution of positions and velocities as it is, a step behind it, or half of it before and
-//! half behind, have the same errors.
+//! [`WallBath`] relaxes the velocity of each particle to that of the wall, exactly at fixed positions. It acts at the end of every
+//! step, whatever the integrator: as it leaves the distribution of positions and velocities as it is, a step behind it, or half of it
+//! before and half behind, have the same errors.
 
 use super::{RunError, Simulation};
-use psidpd_core::engine::noise::{PairNoise, normal, threefry2x32};
 use psidpd_core::engine::pair_sums::COMPONENTS;
-use psidpd_core::engine::{Face, Want, faces};
+use psidpd_core::engine::{Face, Step, WallBath, Want, faces};
 use psidpd_observe::flux::{Drag, Line};
 use std::sync::Arc;
-
-/// The stream of the noise of walls, which no thermostat of pairs has.
-const STREAM: u16 = 1 << 15;
-
-/// Rounds of the generator, the fewest that pass BigCrush.
-const ROUNDS: usize = 13;
-
-/// The noise and the temperature of an action.
-#[derive(Clone, Copy)]
-struct Bath {
-    key: [u32; 2],
-    kt: f64,
-    dt: f64,
-}
-
-impl Bath {
-    /// The velocity behind the action of a wall on a particle at `x` with the velocity `v`, and the velocity lost by drag alone;
-    /// `None` out of its range.
-    fn act(
-        &self,
-        face: &Face,
-        (x, species, tag): (&[f64; 3], i32, i32),
-        mass: f64,
-        dimensions: usize,
-        v: [f64; 3],
-    ) -> Option<[[f64; 3]; 2]> {
-        let friction = face.wall.fields.get(species as usize)?.friction.as_ref()?;
-        let z = face.distance(x);
-        if z >= friction.range() {
-            return None;
-        }
-        // What is lost along the face and across it, and the width of the noise.
-        let of_axes = friction.at(z).map(|zeta| {
-            let lost = -(-zeta * self.dt / mass).exp_m1();
-            [lost, (lost * (2.0 - lost) * self.kt / mass).sqrt()]
-        });
-        let wall = &face.wall.wall;
-        let (mut after, mut lost) = (v, [0.0; 3]);
-        for c in 0..dimensions {
-            let [part, width] = of_axes[usize::from(c == wall.axis)];
-            let counter = [tag as u32, (3 * face.index + c) as u32];
-            let xi = f64::from(normal(threefry2x32::<ROUNDS>(counter, self.key)));
-            lost[c] = part * (v[c] - wall.velocity[c]);
-            after[c] = v[c] - lost[c] + width * xi;
-        }
-        Some([after, lost])
-    }
-}
 
 impl Simulation {
     /// Lets drag and noise of walls act for a time `dt`, where the thermostat acts at all.
@@ -77,8 +20,8 @@ impl Simulation {
         self.make_deferred_kick()?;
         let (recording, dimensions) = (self.is_recording(), self.dimensions());
         let sums = want.virial || recording;
-        let bath =
-            Bath { key: PairNoise::of_stream(self.seed, self.number, STREAM).key(), kt: self.kt(), dt };
+        let step = Step { seed: self.seed, number: self.number, dt };
+        let bath = WallBath::new(step, self.kt());
         let Simulation { particles, external, forces, .. } = self;
         let mut v = particles.take_velocities();
         let state = particles.now();
