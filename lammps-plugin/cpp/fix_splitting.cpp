@@ -119,15 +119,9 @@ int FixSplitting::setmask()
 
 PairPsi *FixSplitting::find_pair()
 {
-  PairPsi *found = nullptr;
-  for (const char *name : {"dpd/psi", "mdpd/psi", "dpd/spline"}) {
-    // A hybrid may contain a style several times: then its numbers count from 1.
-    Pair *one = force->pair_match(name, 1, 1);
-    if (!one) continue;
-    if (found || force->pair_match(name, 1, 2) != one)
-      stop("uses the thermostat of one pair style, and the hybrid contains several");
-    found = dynamic_cast<PairPsi *>(one);
-  }
+  std::string why;
+  PairPsi *found = PairPsi::only(force, why);
+  if (!why.empty()) stop("uses the thermostat of one pair style" + why);
   if (!found) stop("needs pair_style dpd/psi, mdpd/psi or dpd/spline, whose thermostat it is");
   return found;
 }

@@ -161,24 +161,28 @@ void PairPsi::settings(int narg, char **arg)
 // Builds the engine, or updates it: fix adapt may have changed its coefficients or the temperature.
 void PairPsi::refresh()
 {
-  if (style && !is_stale() && kt() == built_kt) return;
+  if (style && !is_stale() && kt() == built_kt && matter == built_matter) return;
   if (!(given.temperature > 0.0) || !std::isfinite(given.temperature))
     stop("the temperature must be positive, found " + std::to_string(given.temperature));
   special.forget();
   exclusions.forget();
   attempt<true>([&] {
-    if (!style || is_stale())
+    if (!style || is_stale()) {
+      built_matter.clear();
       style.emplace(make_style(kt()));
-    else
+    } else if (kt() != built_kt) {
       (*style)->set_temperature(kt());
+    }
     (*style)->configure(given.mixed, given.threads);
     (*style)->use_device(given.device);
+    set_walls();
   });
   built_kt = kt();
 }
 
 void PairPsi::init_style()
 {
+  wall_fixes = find_walls();
   refresh();
   apart = has_splitting();
   check_host();
@@ -208,6 +212,8 @@ void PairPsi::init_style()
     for (const char *known : {"gcmc", "widom", "charge/regulation"})
       if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
   }
+  if (!why_listed.empty() && !matter.empty())
+    stop("fix dpd/wall cannot act here: pairs come from a neighbor list, because of " + why_listed);
   if (!why_listed.empty()) listed.full = request_list(neighbor, this, instance_me, 0);
   check_device();
   // With newton off a half list contains the pairs of owned atoms with ghosts on both sides, which is sufficient.

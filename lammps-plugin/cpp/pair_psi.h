@@ -67,6 +67,13 @@ class PairPsi : public LAMMPS_NS::Pair {
   std::array<double, 6> heat(const std::vector<double> &masses, const Action &action);
   // Atoms are going to be displaced from the present positions, where ghosts may have been found; or are back there.
   void displace(bool away);
+  // Applies drag and noise of `count` walls from the wall `first` on to the velocities of atoms with these masses, infinite for
+  // those that keep their velocities. Writes the mean force on each wall, and returns the virial of that on the atoms.
+  std::array<double, 6> rub(const std::vector<double> &masses, int first, int count, std::vector<double> &given);
+  // The walls of all fixes dpd/wall.
+  const std::vector<WallOfFix> &walls() const { return matter; }
+  // The only psidpd style of a simulation; null, with a reason to be added to a sentence, if there is none or several.
+  static PairPsi *only(LAMMPS_NS::Force *force, std::string &why);
   // The temperature as an energy.
   double kt() const;
   // The engine, which exists after init_style().
@@ -140,6 +147,11 @@ class PairPsi : public LAMMPS_NS::Pair {
   void tell_left_out(bool owned_alone);
   // Whether a fix applies drag and noise.
   bool has_splitting() const;
+  // Takes the walls of fixes dpd/wall, and returns how many such fixes there are.
+  int find_walls();
+  int count_walls() const;
+  void set_walls();
+  double mean_mass() const;
   void forward();
   void forward_vectors();
   rust::Slice<const bool> left_out(Extent &extent, const Request &request) const;
@@ -185,6 +197,9 @@ class PairPsi : public LAMMPS_NS::Pair {
   bool strained = false;
   // Whether a fix applied drag and noise at setup.
   bool apart = false;
+  // Walls of fixes dpd/wall, those that the engine has, and the number of such fixes at setup.
+  std::vector<WallOfFix> matter, built_matter;
+  int wall_fixes = 0;
   // Numbers of atoms and ghosts of an evaluation without slopes of ghosts; single() computes those that it needs.
   std::array<int, 2> without_slopes{-1, -1};
 

@@ -78,6 +78,7 @@ void PairPsi::check_callers()
 void PairPsi::check_device()
 {
   if (!has_device()) return;
+  if (!matter.empty()) stop("device gpu computes no walls of fix dpd/wall: use device cpu");
   if (special.are_scaled(atom, force))
     stop("device gpu computes all pairs at full strength: use 'special_bonds lj 1 1 1', or device cpu");
   if (!why_listed.empty())

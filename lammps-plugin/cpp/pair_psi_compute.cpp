@@ -142,6 +142,7 @@ void PairPsi::compute(int eflag, int vflag)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
   if (apart != has_splitting())
     stop("fix dpd/splitting was made or removed after the last setup: run without 'pre no'");
+  if (wall_fixes != count_walls()) stop("fix dpd/wall was made or removed after the last setup: run without 'pre no'");
   if (request.thermostat && !(update->dt > 0.0))
     stop("the thermostat needs a timestep greater than 0, found " + std::to_string(update->dt));
   if (num_tally_compute > 0)
@@ -279,7 +280,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (width == 0) return nullptr;
   // Forces may not have needed all densities.
   tell_left_out(false);
-  attempt([&] { (*style)->sum_densities(atoms(atom->nlocal + atom->nghost)); });
+  attempt([&] { (*style)->sum_densities(extent(), atoms(atom->nlocal + atom->nghost)); });
   const auto densities = (*style)->local_densities();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;

@@ -94,6 +94,46 @@ mod ffi {
         above: f64,
     }
 
+    /// A wall of matter at a face of the box, as fix dpd/wall describes it.
+    #[derive(Clone, PartialEq)]
+    struct WallOfFix {
+        axis: usize,
+        high: bool,
+        /// The species of its matter, by name or, if that is empty, by type; type 0 is that of the only species.
+        species: String,
+        kind: i32,
+        density: f64,
+        /// Empty, one for all densities of the model, or one for each.
+        local_densities: Vec<f64>,
+        strength: f64,
+        velocity: [f64; 3],
+        /// Drag coefficient and range; negative if they are those of the model.
+        drag: f64,
+        drag_range: f64,
+        /// The viscosity of the fluid, which determines the drag; 0 if it is not given.
+        viscosity: f64,
+        fluid_density: f64,
+    }
+
+    /// What a wall takes from the atoms of a rank.
+    struct OnWall {
+        /// The force across it and away from the fluid, without drag and noise.
+        force: f64,
+        energy: f64,
+        /// The component of the virial across it.
+        virial: f64,
+    }
+
+    /// Input of drag and noise of walls in one timestep.
+    struct Rub {
+        seed: u64,
+        step: u64,
+        time: f64,
+        /// The walls that act: the index of the first one, and their number.
+        first: usize,
+        count: usize,
+    }
+
     /// Input of the thermostat in one step.
     struct Heat {
         seed: u64,
@@ -224,7 +264,7 @@ mod ffi {
         /// Virials, six numbers for each particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Sums all densities at the positions of the last evaluation.
-        fn sum_densities(self: &mut Style, atoms: &Atoms) -> Result<()>;
+        fn sum_densities(self: &mut Style, extent: &Extent, atoms: &Atoms) -> Result<()>;
         /// Densities of owned particles, a row of `Facts::variables` for each.
         fn local_densities(self: &mut Style) -> &[f64];
         /// ψ of owned particles.
@@ -241,6 +281,21 @@ mod ffi {
         fn shift(self: &Style, shifts: &[f64], x: &mut [f64]);
         fn copy(self: &Style, from: &[f64], to: &mut [f64]);
         fn find_masses(self: &Style, unit: f64, movers: &Movers, held: &[u8], masses: &mut [f64]);
+
+        /// Puts walls around the fluid, in place of those before; `mass` is the mean mass of atoms in energy over squared velocity.
+        fn set_walls(self: &mut Style, walls: &[WallOfFix], mass: f64) -> Result<()>;
+        fn on_walls(self: &Style) -> Vec<OnWall>;
+        /// Lets drag and noise of walls act on the velocities of owned atoms. Writes the mean force on each wall, and returns the
+        /// virial of that on the atoms.
+        fn rub(
+            self: &mut Style,
+            extent: &Extent,
+            atoms: &Atoms,
+            mass: &[f64],
+            rub: &Rub,
+            given: &mut [f64],
+            v: &mut [f64],
+        ) -> Result<[f64; 6]>;
 
         /// Announces that the thermostat will act for a time where the next forces are computed.
         fn expect_thermostat(self: &mut Style, time: f64, virial: bool) -> Result<()>;
@@ -273,7 +328,9 @@ mod ffi {
     }
 }
 
-pub use ffi::{Atoms, Effort, Extent, Heat, Listed, Movers, Request, Round, Totals, Wants};
+pub use ffi::{
+    Atoms, Effort, Extent, Heat, Listed, Movers, OnWall, Request, Round, Rub, Totals, WallOfFix, Wants,
+};
 
 pub fn read_model(path: &[u8]) -> Result<String, StyleError> {
     guard(|| Ok(Document::open(OsStr::from_bytes(path).as_ref())?.source.text().to_owned()))

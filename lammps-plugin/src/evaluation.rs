@@ -122,12 +122,14 @@ impl Style {
     }
 
     /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
-    pub fn sum_densities(&mut self, atoms: &Atoms) -> Result<(), StyleError> {
+    pub fn sum_densities(&mut self, extent: &Extent, atoms: &Atoms) -> Result<(), StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
+            // LAMMPS has ghosts on all sides of its atoms, also across periods; walls are at faces of the box.
+            let around =
+                Around { domain: &scale.domain(&Extent { closed: [false; 3], ..*extent })?, images: &[] };
             let (request, _) = converted.take(scale, atoms, None);
-            // LAMMPS has ghosts on all sides of its atoms, also across periods.
-            engine.sum_densities(Surroundings::ghosts(Newton::On), &request.particles)?;
+            engine.sum_densities(Surroundings::Ghosts(around, Newton::On), &request.particles)?;
             Ok(())
         })
     }
@@ -168,9 +170,14 @@ impl Style {
         })
     }
 
+    /// The totals of the pair style, without what a fix reports of its walls.
     fn totals(&self, tally: &Tally) -> Totals {
         let [below, above] = self.engine.statistics().out_of_bounds.map(|n| n as f64);
-        let unit = self.scale.energy;
+        let (unit, mut tally) = (self.scale.energy, *tally);
+        for (wall, taken) in self.engine.plan().walls().iter().zip(self.engine.on_walls()) {
+            tally.pair -= taken.energy;
+            tally.virial[wall.wall.axis] -= taken.virial;
+        }
         let virial = std::array::from_fn(|k| unit * tally.virial[k] + unit * tally.thermostat_virial[k]);
         Totals { excess: unit * tally.excess, pair: unit * tally.pair, virial, below, above }
     }

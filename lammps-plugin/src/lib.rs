@@ -1,8 +1,9 @@
-//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix style `dpd/splitting`. LAMMPS
-//! loads the entry, in `entry/`, which loads this.
+//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix styles `dpd/splitting` and
+//! `dpd/wall`. LAMMPS loads the entry, in `entry/`, which loads this.
 //!
 //! - [`style`]: one pair style's engine, in safe Rust; `evaluation`: its forces, in the units of LAMMPS;
 //! - [`thermostat`]: drag and noise for the fix; `motion`: its loops over atoms;
+//! - `walls`: walls of matter, of the fix `dpd/wall`;
 //! - [`units`]: one unit of a model in those of LAMMPS; `converted`: conversion of positions,
 //!   velocities and forces;
 //! - [`bridge`]: the interface to C++, by cxx: slices, strings and exceptions, checked at compile time;
@@ -20,6 +21,7 @@ mod motion;
 pub mod style;
 pub mod thermostat;
 pub mod units;
+mod walls;
 
 #[cfg(lammps_host)]
 mod table;

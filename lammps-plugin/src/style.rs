@@ -89,7 +89,7 @@ impl Style {
         guard(|| self.rebuild(kt / self.scale.energy, self.engine.settings()))
     }
 
-    fn rebuild(&mut self, kt: f64, settings: Settings) -> Result<(), StyleError> {
+    pub(crate) fn rebuild(&mut self, kt: f64, settings: Settings) -> Result<(), StyleError> {
         self.effort_before = self.effort_so_far();
         let fluid = self.model.at(kt)?;
         let device = self.engine.use_device(None);

@@ -16,6 +16,7 @@ unsafe extern "C-unwind" {
     fn psidpd_create_mdpd_psi(lmp: *mut c_void) -> *mut c_void;
     fn psidpd_create_dpd_spline(lmp: *mut c_void) -> *mut c_void;
     fn psidpd_create_dpd_splitting(lmp: *mut c_void, narg: c_int, arg: *mut *mut c_char) -> *mut c_void;
+    fn psidpd_create_dpd_wall(lmp: *mut c_void, narg: c_int, arg: *mut *mut c_char) -> *mut c_void;
     fn psidpd_insert_style(lmp: *mut c_void, kind: *const c_char, name: *const c_char, creator: Creator);
 }
 
@@ -31,7 +32,7 @@ const fn fix(name: &'static CStr, info: &'static CStr, creator: MakeFix) -> Styl
     Style { kind: c"fix".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
 }
 
-static STYLES: [Style; 4] = [
+static STYLES: [Style; 5] = [
     style(c"dpd/psi", c"many-body DPD of any excess free energy", psidpd_create_dpd_psi),
     style(
         c"mdpd/psi",
@@ -44,6 +45,7 @@ static STYLES: [Style; 4] = [
         c"time integration with drag and noise apart from the forces",
         psidpd_create_dpd_splitting,
     ),
+    fix(c"dpd/wall", c"walls of matter at faces of the box", psidpd_create_dpd_wall),
 ];
 
 static TABLE: Styles = Styles {

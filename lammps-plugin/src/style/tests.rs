@@ -64,12 +64,12 @@ fn densities_of_one_step_leave_later_steps_to_the_sweep() {
     let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
     let pair = atoms(2, &x, &[], &[1, 2], &[1, 1]);
     let w = 3.0 / std::f64::consts::PI * 0.5;
-    s.sum_densities(&pair).unwrap();
+    s.sum_densities(&cube(1.0, false), &pair).unwrap();
     assert_eq!(s.engine.results().densities, [0.0; 4]);
     for _ in 0..2 {
         s.evaluate(&cube(1.0, false), &pair, &request(false), &mut [0.0; 6]).unwrap();
         assert_eq!(s.engine.path(), Some(EnginePath::Sweep));
-        s.sum_densities(&pair).unwrap();
+        s.sum_densities(&cube(1.0, false), &pair).unwrap();
         let densities = s.engine.results().densities;
         assert_eq!(densities.len(), 4);
         assert!((densities[1] - w).abs() < 1e-14 && densities[0] > 0.0, "{densities:?}");
