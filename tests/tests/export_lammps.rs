@@ -212,6 +212,56 @@ thermo = 5
 dump   = 5
 "#;
 
+/// Two species between walls of matter, one of them moving, in stages with and without drag and noise. Nothing reaches the faces, where
+/// the native run bounces on the exact path.
+const MATTER: &str = r#"
+title = "matter"
+model = "mixture.toml"
+kT    = 1.0
+seed  = 16
+precision = "double"
+dt    = 0.005
+[box]
+lengths  = [5.0, 5.0, 6.0]
+boundary = ["periodic", "periodic", "reflecting"]
+[masses]
+B = 2.0
+[[part]]
+shape   = "box"
+low     = [0.0, 0.0, 0.5]
+high    = [5.0, 5.0, 5.5]
+density = 3.0
+[[wall]]
+kind     = "continuum"
+faces    = ["zhi"]
+species  = "B"
+density  = 4.0
+strength = 0.7
+velocity = [1.5, -0.7, 0.0]
+[[wall]]
+kind          = "continuum"
+faces         = ["zlo"]
+species       = "A"
+density       = 3.0
+local_density = 2.5
+drag          = 20.0
+drag_range    = 0.9
+[[stage]]
+name  = "warm"
+steps = 15
+[[stage]]
+name  = "alone"
+steps = 5
+thermostat = false
+[[stage]]
+name  = "hot"
+steps = 15
+kT    = 2.0
+[output]
+thermo = 5
+dump   = 5
+"#;
+
 /// Opposite flows in a slab between two walls in two dimensions.
 const CHANNELS: &str = r#"
 title = "channels"
@@ -491,6 +541,48 @@ fn splittings_between_walls() {
     for integrator in ["two-stage", "force-gradient", "aboba"] {
         compare(&with_integrator(&scene, &format!("integrator = \"{integrator}\"")));
     }
+}
+
+/// Forces, energies, pressures, drag and noise of walls, with velocity Verlet and with drag and noise of pairs apart.
+#[test]
+fn walls_of_matter() {
+    compare(MATTER);
+    for integrator in ["two-stage", "force-gradient", "aboba"] {
+        compare(&with_integrator(MATTER, &format!("integrator = \"{integrator}\"")));
+    }
+}
+
+/// Walls around one species whose local density theory knows, with the drag on which a flow does not slip, in space and in the plane.
+#[test]
+fn walls_of_one_species() {
+    let wall = |faces: &str| {
+        format!("[[wall]]\nkind = \"continuum\"\nfaces = {faces}\ndensity = 5.0\nviscosity = 7.0\n[[stage]]")
+    };
+    let part = |low: &str, high: &str, rest: &str| {
+        format!("[[part]]\nshape = \"box\"\nlow = {low}\nhigh = {high}\n{rest}\n")
+    };
+    let space = ONE_SPECIES
+        .replace(
+            "lengths = [5.0, 6.0, 7.0]",
+            "lengths = [5.0, 6.0, 7.0]\nboundary = [\"periodic\", \"reflecting\", \"periodic\"]",
+        )
+        .replace("[initial]\nkind    = \"random\"\n", &part("[0.0, 0.6, 0.0]", "[5.0, 5.4, 7.0]", ""))
+        .replace("steps = 50", "steps = 15")
+        .replace("dump   = 25", "dump   = 5")
+        .replace("thermo = 10", "thermo = 3")
+        .replace("[[stage]]", &wall("[\"ylo\", \"yhi\"]"));
+    compare(&space);
+    let plane = FLAT
+        .replace("lengths = [7.0, 9.0]", "lengths = [7.0, 9.0]\nboundary = [\"reflecting\", \"periodic\"]")
+        .replace(
+            "[initial]\nkind    = \"lattice\"\n",
+            &part("[0.6, 0.0]", "[6.4, 9.0]", "lattice = \"square\""),
+        )
+        .replace("steps = 50", "steps = 15")
+        .replace("dump   = 10", "dump   = 5")
+        .replace("thermo = 10", "thermo = 3")
+        .replace("[[stage]]", &wall("[\"xhi\"]"));
+    compare(&plane);
 }
 
 #[test]

@@ -120,7 +120,9 @@ pub enum LammpsError {
     Seed(u64),
     #[error("stage \"{stage}\": {steps} steps are more than one run of LAMMPS takes, {most}")]
     Steps { stage: String, steps: u64, most: u64 },
-    #[error("LAMMPS has no walls of matter, [[wall]]: freeze layers of particles instead")]
+    #[error(
+        "pair styles other than those of psidpd have no walls of matter, [[wall]]: freeze layers of particles instead"
+    )]
     Walls,
     #[error("reversed_along has no counterpart in a deck for a box with tilt")]
     Tilt,

@@ -120,9 +120,6 @@ fn check(scene: &Scene) -> Result<(), LammpsError> {
     if scene.seed == 0 {
         return Err(LammpsError::Seed(scene.seed));
     }
-    if !scene.model.walls().is_empty() {
-        return Err(LammpsError::Walls);
-    }
     let reversed = scene.body_forces.iter().any(|b| b.reversed_along.is_some());
     let orthogonal = (0..3).all(|k| (0..3).all(|c| c == k || scene.domain.edge(k)[c] == 0.0));
     if reversed && !orthogonal {
@@ -259,6 +256,9 @@ fn write_start(scene: &Scene, state: &State, path: &Path, existing: Existing) ->
 
 pub fn script_of(scene: &Scene, script: Script) -> Result<String, LammpsError> {
     check(scene)?;
+    if script.style.is_some() && !scene.model.walls().is_empty() {
+        return Err(LammpsError::Walls);
+    }
     let mut s = String::new();
     // Writing to a String cannot fail.
     let _ = write_script(scene, script, &mut s);
@@ -325,6 +325,9 @@ fn write_script(scene: &Scene, script: Script, s: &mut String) -> std::fmt::Resu
                 writeln!(s, "unfix         move")?;
             }
             writeln!(s, "fix           move {} {}", physics.mobile, motion(&stage.integrator))?;
+        }
+        if before.is_none_or(|b| b.thermostat != stage.thermostat) {
+            physics.write_matter(s, stage, before.is_some())?;
         }
         match (before.is_some_and(|b| b.body_forces), stage.body_forces) {
             (false, true) => physics.write_body_forces(s)?,

@@ -1,7 +1,7 @@
 //! Walls, frozen particles and body forces of a deck.
 
 use psidpd_dynamics::run::{BodyForce, Tags};
-use psidpd_dynamics::scene::Scene;
+use psidpd_dynamics::scene::{Scene, Stage};
 use std::fmt::{Result, Write};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -64,13 +64,60 @@ impl<'a> Physics<'a> {
             return Ok(());
         }
         let conserved = match self.mobile {
-            "all" => (0..self.dimensions).filter(|k| !self.walls[*k]).count(),
+            "all" if !self.rubs() => (0..self.dimensions).filter(|k| !self.walls[*k]).count(),
             _ => 0,
         };
         writeln!(s, "# momentum is conserved along {conserved} directions only")?;
         writeln!(s, "compute       warmth {} temp", self.mobile)?;
         writeln!(s, "compute_modify warmth extra/dof {conserved}")?;
         writeln!(s, "thermo_modify temp warmth")
+    }
+
+    /// Whether walls of matter have friction, which conserves no momentum.
+    fn rubs(&self) -> bool {
+        let stages = self.scene.stages.iter().filter_map(|stage| self.scene.model.at(stage.kt).ok());
+        let mut fields = stages.flat_map(|fluid| fluid.walls).flat_map(|wall| wall.fields);
+        fields.any(|field| field.friction.is_some())
+    }
+
+    /// Writes the walls of matter for a stage, in place of those of the stage before if there is one.
+    pub fn write_matter(&self, s: &mut impl Write, stage: &Stage, again: bool) -> Result {
+        let model = &self.scene.model;
+        let names = model.species();
+        for (k, wall) in model.walls().iter().enumerate() {
+            let name = format!("matter{}", k + 1);
+            if again {
+                writeln!(s, "unfix         {name}")?;
+            }
+            let face = format!("{}{}", AXES[wall.axis], if wall.high { "hi" } else { "lo" });
+            write!(
+                s,
+                "fix           {name} {} dpd/wall {face} density {:?} species {} strength {:?}",
+                self.mobile, wall.density, names[wall.species], wall.strength
+            )?;
+            let local = match (&wall.local_densities[..], model.at(stage.kt)) {
+                ([], Ok(fluid)) => {
+                    let own = |includes: bool, w: f64| wall.density + if includes { w } else { 0.0 };
+                    fluid.densities.iter().map(|d| own(d.includes_self, d.kernel.value(0.0))).collect()
+                }
+                (given, _) => given.to_vec(),
+            };
+            if !local.is_empty() {
+                write!(s, " local/density")?;
+                local.iter().try_for_each(|n| write!(s, " {n:?}"))?;
+            }
+            if wall.velocity != [0.0; 3] {
+                let [x, y, z] = wall.velocity;
+                write!(s, " velocity {x:?} {y:?} {z:?}")?;
+            }
+            // Without a thermostat walls have no drag either.
+            let [drag, range] = if stage.thermostat { wall.drag } else { [Some(0.0), None] };
+            for (key, value) in [("drag", drag), ("drag/range", range)] {
+                value.map_or(Ok(()), |value| write!(s, " {key} {value:?}"))?;
+            }
+            writeln!(s, "\nfix_modify    {name} energy yes virial yes")?;
+        }
+        Ok(())
     }
 
     pub fn write_body_forces(&self, s: &mut impl Write) -> Result {
