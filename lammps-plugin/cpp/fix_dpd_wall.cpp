@@ -66,6 +66,7 @@ FixDPDWall::FixDPDWall(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)
   check_faces();
   size_vector = size_array_rows = static_cast<int>(matter.size());
   size_array_cols = 3;
+  taken.assign(matter.size(), OnWall{});
 }
 
 void FixDPDWall::stop(const std::string &text, const char *file, int line)
@@ -175,6 +176,7 @@ void FixDPDWall::init()
   check_faces();
   check_others();
   given.assign(3 * pair->walls().size(), 0.0);
+  taken.assign(matter.size(), OnWall{});
   friction = {};
   std::fill_n(virial, 6, 0.0);
 }
@@ -222,20 +224,18 @@ void FixDPDWall::setup(int vflag)
 void FixDPDWall::post_force(int vflag)
 {
   v_init(vflag);
+  // Kept for what asks for it between runs, when the pair style may be another.
+  const auto all = pair->engine().on_walls();
+  const size_t end = std::min(all.size(), first + matter.size());
+  taken.assign(all.begin() + std::min<size_t>(first, end), all.begin() + end);
+  taken.resize(matter.size());
   show_virial();
-}
-
-OnWall FixDPDWall::on_wall(int wall)
-{
-  const auto all = pair ? pair->engine().on_walls() : rust::Vec<OnWall>{};
-  const size_t k = static_cast<size_t>(first + wall);
-  return k < all.size() ? all[k] : OnWall{};
 }
 
 void FixDPDWall::show_virial()
 {
   std::copy(friction.begin(), friction.end(), virial);
-  for (size_t k = 0; k < matter.size(); k++) virial[matter[k].axis] += on_wall(static_cast<int>(k)).virial;
+  for (size_t k = 0; k < taken.size(); k++) virial[matter[k].axis] += taken[k].virial;
 }
 
 void FixDPDWall::end_of_step()
@@ -252,14 +252,14 @@ void FixDPDWall::end_of_step()
 double FixDPDWall::compute_scalar()
 {
   double mine = 0.0, all = 0.0;
-  for (size_t k = 0; k < matter.size(); k++) mine += on_wall(static_cast<int>(k)).energy;
+  for (const OnWall &wall : taken) mine += wall.energy;
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   return all;
 }
 
 double FixDPDWall::compute_vector(int n)
 {
-  const double mine = (matter[n].high ? 1.0 : -1.0) * on_wall(n).force;
+  const double mine = (matter[n].high ? 1.0 : -1.0) * taken[n].force;
   double all = 0.0;
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   return all;

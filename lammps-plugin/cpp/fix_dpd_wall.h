@@ -50,12 +50,12 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   void check_faces();
   void check_others();
   void show_virial();
-  // What this rank's atoms give to a wall, without drag and noise.
-  OnWall on_wall(int wall);
 
   std::vector<WallOfFix> matter;
   PairPsi *pair = nullptr;
   bool warned = false;
+  // What this rank's atoms give to each wall in the last evaluation, without drag and noise.
+  std::vector<OnWall> taken;
   // The mean force of drag and noise in the last timestep on each wall of all fixes, and the virial of that on the atoms.
   std::vector<double> given;
   std::array<double, 6> friction{};

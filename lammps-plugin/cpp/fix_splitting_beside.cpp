@@ -36,8 +36,8 @@ constexpr const char *ONE_EVALUATION[] = {
 constexpr const char *ONE_PACKAGE[] = {"package_omp", "package_intel"};
 
 constexpr const char *TRIED[] = {
-    "accelerate/cos", "adapt", "addforce", "addtorque", "ave", "balance", "bond/", "deform", "deposit", "dpd/wall", "drag", "dt/reset",
-    "efield", "ehex", "evaporate", "external", "flow/gauss", "freeze", "gcmc", "gravity", "GROUP", "halt", "heat", "indent",
+    "accelerate/cos", "adapt", "addforce", "addtorque", "ave", "balance", "bond/", "deform", "deposit", "dpd/wall", "drag",
+    "dt/reset", "efield", "ehex", "evaporate", "external", "flow/gauss", "freeze", "gcmc", "gravity", "GROUP", "halt", "heat", "indent",
     "lineforce", "manifoldforce", "momentum", "oneway", "pair", "planeforce", "press/berendsen", "print", "propel/self",
     "property/atom", "recenter", "restrain", "rhok", "setforce", "spring", "SRP", "STORE", "store", "temp/berendsen", "temp/csvr",
     "temp/rescale", "thermal/conductivity", "ti/spring", "vector", "viscosity", "viscous", "wall/"};

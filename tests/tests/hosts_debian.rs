@@ -113,6 +113,12 @@ fn splittings_are_the_native_ones() {
     assert_eq!(listed.unwrap().matches("fix style plugin dpd/splitting").count(), 1);
 }
 
+#[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
+fn walls_are_the_native_ones() {
+    host_common::walls_are_the_native_ones(&debian().runs());
+}
+
 /// Weakened and excluded pairs need LAMMPS's list. The headers of this version cannot request a full one: the
 /// half list has all pairs with newton off, which the styles then require.
 #[test]

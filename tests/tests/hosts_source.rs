@@ -48,6 +48,12 @@ fn splittings_are_the_native_ones() {
     host_common::splittings_are_the_native_ones(&source().runs());
 }
 
+#[test]
+#[ignore = "needs a LAMMPS built from source, in PSIDPD_LAMMPS_SOURCE"]
+fn walls_are_the_native_ones() {
+    host_common::walls_are_the_native_ones(&source().runs());
+}
+
 /// Weakened or excluded pairs, with newton on and off.
 #[test]
 #[ignore = "needs a LAMMPS built from source, in PSIDPD_LAMMPS_SOURCE"]
