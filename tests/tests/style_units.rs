@@ -106,7 +106,7 @@ fn outcome(units: &Units, style: &str, fix: &str, ranks: usize) -> (Frame, Vec<f
     let [length, energy, time] = units.of_model();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fluid.data"), data(units)).unwrap();
-    let name = style.split_whitespace().nth(1).unwrap();
+    let name = style.split("pair_style ").nth(1).unwrap().split_whitespace().next().unwrap();
     let script = format!(
         "units {}\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\nneighbor {:.17e} bin\n\
          read_data fluid.data\n{}{style}fix 1 all {fix}\ntimestep {:.17e}\nfix n all pair 1 {name} density 0\n\
@@ -186,6 +186,39 @@ fn coefficients_are_in_the_units_of_the_simulation() {
     for fix in FIXES {
         let expected = outcome(&ALL[0], &style(&ALL[0]), fix, 1);
         for units in &ALL[1..3] {
+            agree(&outcome(units, &style(units), fix, 2), &expected, &format!("{}, {fix}", units.name));
+        }
+    }
+}
+
+/// So are walls of matter: densities, velocity, drag and viscosity are converted.
+#[test]
+fn walls_are_the_same_in_all_units() {
+    let (_folder, model) =
+        file(&format!("{WIDE}[units]\nlength = {LENGTH:e}\nmass = {MASS:e}\nenergy = {ENERGY:e}\n"));
+    let style = |units: &Units| {
+        let [length, energy, time] = units.of_model();
+        let (volume, velocity) = (length.powi(3), length / time);
+        let (kt, drag, eta) = (energy / units.boltzmann, energy / length / velocity, energy * time / volume);
+        format!(
+            "change_box all boundary p p f\npair_style dpd/psi {kt:.17e} {SEED}\npair_coeff * * \"{model}\" A B\n\
+             fix lo all dpd/wall zlo density {:.17e} type 2 local/density {:.17e} viscosity {:.17e} fluid/density {:.17e}\n\
+             fix hi all dpd/wall zhi density {:.17e} species A velocity {:.17e} 0 0 drag {:.17e} drag/range {:.17e}\n\
+             fix_modify lo energy yes virial yes\nfix_modify hi energy yes virial yes\n\
+             fix r all wall/reflect zlo EDGE zhi EDGE\n",
+            4.0 / volume,
+            3.0 / volume,
+            0.9 * eta,
+            2.0 / volume,
+            3.0 / volume,
+            0.7 * velocity,
+            30.0 * drag,
+            0.8 * length
+        )
+    };
+    for fix in FIXES {
+        let expected = outcome(&ALL[0], &style(&ALL[0]), fix, 1);
+        for units in &ALL[1..] {
             agree(&outcome(units, &style(units), fix, 2), &expected, &format!("{}, {fix}", units.name));
         }
     }
