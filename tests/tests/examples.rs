@@ -45,7 +45,7 @@ fn energies(script: &Path, output: &str) -> [f64; 2] {
 fn examples_run_on_one_rank_and_on_two() {
     let (host, plugin) = lammps();
     let scripts = examples();
-    assert_eq!(scripts.len(), 9);
+    assert_eq!(scripts.len(), 10);
     let arguments = ["-log", "none", "-var", "plugin", "./psidpdplugin.so", "-var", "models", "models"];
     let arguments = [&arguments[..], &["-var", "steps", "50"]].concat();
     for script in scripts {
@@ -102,7 +102,7 @@ fn examples_of_the_manual_pages_are_accepted() {
     let (host, plugin) = lammps();
     let models = root().join("validation/models");
     let mut count = 0;
-    for page in ["pair_dpd_psi", "pair_mdpd_psi", "pair_dpd_spline", "fix_dpd_splitting"] {
+    for page in ["pair_dpd_psi", "pair_mdpd_psi", "pair_dpd_spline", "fix_dpd_splitting", "fix_dpd_wall"] {
         let text = std::fs::read_to_string(root().join(format!("lammps-plugin/doc/{page}.md"))).unwrap();
         let (_, examples) = text.split_once("## Examples\n\n```text\n").unwrap();
         let (examples, _) = examples.split_once("```").unwrap();
@@ -110,13 +110,14 @@ fn examples_of_the_manual_pages_are_accepted() {
         let (first, styles) = examples.split_once("\n\n").unwrap();
         let pair: Vec<&str> = first.lines().filter(|l| l.starts_with("pair_")).collect();
         let pair = pair.join("\n");
+        let boundary = first.lines().find(|l| l.starts_with("boundary ")).unwrap_or_default();
         let load = first.lines().find(|l| l.starts_with("plugin ")).unwrap();
         for style in styles.split("\n\n") {
             let types = if style.contains(" A B") || style.contains("1 2") { 2 } else { 1 };
             let flat = style.contains("-2d");
             let (dimension, edge) = if flat { (2, "-0.5 0.5") } else { (3, "0 5") };
             let script = format!(
-                "units lj\ndimension {dimension}\ncomm_modify vel yes\nregion b block 0 5 0 5 {edge}\n\
+                "units lj\ndimension {dimension}\n{boundary}\ncomm_modify vel yes\nregion b block 0 5 0 5 {edge}\n\
                  create_box {types} b\ncreate_atoms 1 random 50 1 b\ncreate_atoms {types} random 50 2 b\n\
                  mass * 1\n{load}\n{pair}\n{style}\nrun 0\n",
             );
@@ -132,5 +133,5 @@ fn examples_of_the_manual_pages_are_accepted() {
             count += 1;
         }
     }
-    assert_eq!(count, 14);
+    assert_eq!(count, 16);
 }
