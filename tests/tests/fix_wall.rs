@@ -259,7 +259,7 @@ fn walls_take_the_momentum_that_the_gas_loses() {
 }
 
 /// Beside strong drag a gas has its temperature, with both integrators: mean of 20 blocks, of which Student's t exceeds 6 less than
-/// once in 10^5 seeds. Each block has 12 samples of some 100 particles, twice the relaxation of the drag apart.
+/// once in 10^5 seeds. Each block has 12 samples of some 60 particles.
 #[test]
 fn a_gas_beside_walls_has_its_temperature() {
     let (_folder, path) = file(&gas(1.0));
@@ -297,7 +297,9 @@ fn a_gas_beside_walls_has_its_temperature() {
 }
 
 /// Standard DPD between walls that move against each other has their velocities at their faces: a straight line through the profile
-/// reaches them within 0.3 of the faces. Blocks have errors of some 0.03 there, and without drag the fluid would not flow at all.
+/// reaches them within 0.4 of the faces, and the forces on the walls are the stress of that flow. In eight seeds the places were 0.03
+/// and 0.06 from the faces, into the fluid, with a scatter of 0.07, and the stress 0.97 of that of the viscosity, with a scatter of 2 %: five of those are exceeded less
+/// than once in 10^5 seeds. Without drag the fluid would not flow at all.
 #[test]
 fn a_shear_flow_does_not_slip() {
     let folder = tempfile::tempdir().unwrap();
@@ -329,9 +331,7 @@ fn a_shear_flow_does_not_slip() {
         / inner.iter().map(|row| (row[0] - z).powi(2)).sum::<f64>();
     // The heights at which the line has the velocities of the walls.
     let [low, high] = [-1.0, 1.0].map(|wall| z + (wall - v) / slope);
-    println!("slope {slope}, planes {low} {high}, rows {rows:?}, forces {}", read("forces"));
-    assert!(low.abs() < 0.3 && (high - 6.0).abs() < 0.3, "{low} {high} {rows:?}");
-    // The force along the walls is the stress of that flow; its error is some 2 %.
+    assert!(low.abs() < 0.4 && (high - 6.0).abs() < 0.4, "{low} {high} {rows:?}");
     let forces = read("forces");
     let last: Vec<f64> =
         forces.lines().last().unwrap().split_whitespace().map(|n| n.parse().unwrap()).collect();
