@@ -188,3 +188,33 @@ def test_other_integrators_are_those_of_a_run():
         last = result.thermo.iloc[-1]
         assert simulation.temperature == last["temperature"] and simulation.pressure[0] == last["pxx"]
         assert simulation.potential_energy == pytest.approx(last["potential"], rel=1e-12)
+
+
+def test_a_leaning_box_of_two_species_is_told_as_it_is(tmp_path):
+    """Edges are rows; energies follow from masses, velocities and types, which follow the tags: every fourth is of the other
+    species and three times as heavy."""
+    edges = numpy.array([[4.0, 0.0, 0.0], [1.0, 5.0, 0.0], [-0.5, 0.75, 6.0]])
+    grid = numpy.stack(numpy.meshgrid(*[numpy.arange(n) for n in (6, 7, 8)], indexing="ij"), -1).reshape(-1, 3)
+    places = (grid + 0.5) / (6, 7, 8) @ edges
+    rows = [f"{k + 1} {2 if k % 4 == 0 else 1} {x} {y} {z}" for k, (x, y, z) in enumerate(places.tolist())]
+    head = "a box that leans\n\n336 atoms\n2 atom types\n\n0 4 xlo xhi\n0 5 ylo yhi\n0 6 zlo zhi\n1 -0.5 0.75 xy xz yz\n"
+    (tmp_path / "start.data").write_text(head + "\nMasses\n\n1 1.0\n2 3.0\n\nAtoms # atomic\n\n" + "\n".join(rows) + "\n")
+    scene = {
+        "model": MODELS / "huggins.toml",
+        "kT": 0.7,
+        "initial": {"kind": "data", "file": "start.data", "velocities": "thermal"},
+        "seed": 3,
+        "dt": 0.005,
+        "steps": 8,
+    }
+    simulation = psidpd.Simulation(scene, base=tmp_path)
+    assert numpy.allclose(simulation.positions, places, atol=1e-8)
+    simulation.run(5)
+    assert simulation._steps.left == 3 and simulation.kT == 0.7 and simulation.time == pytest.approx(0.025)
+    assert numpy.array_equal(simulation.box, edges) and simulation.species == ["A", "B"]
+    assert [kind == 1 for kind in simulation.types] == [k % 4 == 0 for k in range(336)]
+    mass = numpy.array([1.0, 3.0])[simulation.types]
+    kinetic = 0.5 * (mass * (simulation.velocities**2).sum(axis=1)).sum()
+    assert simulation.kinetic_energy == pytest.approx(kinetic, rel=1e-12)
+    # Momentum is conserved along three directions.
+    assert simulation.temperature == pytest.approx(2 * kinetic / (3 * 335), rel=1e-12)
