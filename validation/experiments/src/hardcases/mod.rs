@@ -162,6 +162,21 @@ mod tests {
         assert!(results.len() > 100);
     }
 
+    /// The page names the groups with their files, and how many rows the quick extent has.
+    #[test]
+    fn the_page_has_the_groups_and_the_rows() {
+        let page = include_str!("../../../../docs/hardcases.md");
+        let all = cases(Extent::Quick);
+        for case in &all {
+            assert!(page.contains(&format!("| {} (`", case.group)), "{}", case.group);
+        }
+        let quick = settings(Extent::Quick);
+        let alone = quick.iter().filter(|(integrator, _)| *integrator == Integrator::VelocityVerlet).count();
+        let rows = |case: &Case| if matches!(case.must, Must::Agrees(_)) { alone } else { quick.len() };
+        let count: usize = all.iter().map(rows).sum();
+        assert!(page.contains(&format!(": {count} rows.")), "{count}");
+    }
+
     #[test]
     fn words_of_no_case_are_an_error() {
         let error = run(Extent::Quick, false, Some("zzz"), &Progress::new()).unwrap_err();

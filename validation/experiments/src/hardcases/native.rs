@@ -184,15 +184,15 @@ mod tests {
         assert_eq!(of([0.0; 3], [0.0; 3]), 0.0);
     }
 
-    /// A gas that drifts at a velocity of 0.05 has its temperature, which that raises by 0.05²/3; what gives it away is the
-    /// momentum alone: of ⟨|v|⟩ = √(8/π) and the drift it is 0.031, in any frame of 192 particles within a tenth.
+    /// A gas at kT = 4 that drifts at a velocity of 0.1 has its temperature, which that raises by 0.1²/3; what gives it away is the
+    /// momentum alone: of ⟨|v|⟩ = √(8 kT/π) and the drift it is 0.031, in any frame of 192 particles within a tenth.
     #[test]
     fn a_gas_that_drifts_is_not_right() {
         let part =
             "[[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.0]\nhigh = [4.0, 4.0, 4.0]\ndensity = 3.0\n";
         let must = super::super::case::Must::Right(0.04);
         let judged = |drift: &str| {
-            let run = Inputs::new(IDEAL, 1.0, format!("box = 4.0\n{part}{drift}"), 0.02, [200, 2000]);
+            let run = Inputs::new(IDEAL, 4.0, format!("box = 4.0\n{part}{drift}"), 0.02, [200, 2000]);
             let case = Case::new("drift", run, must);
             let folder = tempfile::tempdir().unwrap();
             let integrator = Integrator::VelocityVerlet;
@@ -201,7 +201,7 @@ mod tests {
         };
         let (right, found) = judged("");
         assert_eq!(right, Ok(()), "{found:?}");
-        let (wrong, found) = judged("velocity = [0.05, 0.0, 0.0]\n");
+        let (wrong, found) = judged("velocity = [0.1, 0.0, 0.0]\n");
         assert!(wrong.unwrap_err().starts_with("momentum"), "{found:?}");
         let Found::Ended { momentum, .. } = found else { panic!("{found:?}") };
         assert!((momentum / 0.0313 - 1.0).abs() < 0.1, "{momentum}");
@@ -227,7 +227,31 @@ mod tests {
                 let found = Fault::during(fault, carried).unwrap();
                 let judged = super::super::case::judge(case.must, &found, false);
                 assert_eq!(judged.is_err(), fault.is_some(), "{words}: {fault:?}: {found:?}");
+                // As a part of the largest force, which is not 1 here.
+                if let (Some(_), Found::Differs(part)) = (fault, &found) {
+                    assert!((0.04..0.06).contains(part), "{words}: {part}");
+                }
             }
         }
+    }
+
+    /// A force that is no gradient heats a liquid without thermostat, and the case of long runs says so.
+    #[test]
+    fn energy_that_is_made_shows() {
+        let case = cases(Extent::Quick).into_iter().find(|case| case.group == "long runs").unwrap();
+        let judged = |model: String| {
+            let case = Case { run: Inputs { model, ..case.run.clone() }, ..case.clone() };
+            let folder = tempfile::tempdir().unwrap();
+            let integrator = Integrator::VelocityVerlet;
+            let found = carry_out(&case, integrator, Precision::Double, folder.path()).unwrap();
+            let Found::Changed { energy, .. } = found else { panic!("{found:?}") };
+            (super::super::case::judge(case.must, &found, false).is_ok(), energy)
+        };
+        let model = case.run.model.clone();
+        let lucy = model.replace("kernel = \"quadratic\"", "kernel = \"lucy\"\nforce_kernel = \"quadratic\"");
+        assert_ne!(model, lucy);
+        let ((kept, small), (made, large)) = (judged(model), judged(lucy));
+        assert!(kept && small.abs() < 0.02, "{small}");
+        assert!(!made && large > 0.02, "{large}");
     }
 }
