@@ -141,7 +141,7 @@ fn plot_of_worst(outcome: &Comparison) -> Option<Plot> {
 }
 
 /// Error against cost for one kind of quantity. The pressure that LAMMPS prints, which is too noisy, is not judged unless it was asked for.
-fn plot_of(outcome: &Comparison, class: Class) -> Option<Plot> {
+pub(super) fn plot_of(outcome: &Comparison, class: Class) -> Option<Plot> {
     let is_judged = |d: &&Deviation| {
         d.class == class && (d.name != "p_total" || outcome.tolerances.iter().any(|t| t.name == d.name))
     };

@@ -454,3 +454,141 @@ fn more_time_is_for_what_is_open() {
         assert_eq!(grew, [true, dynamics, false, true, false]);
     }
 }
+
+/// Particles with an energy of 3 each, wherever they are: so much is u, and the time is that of all steps between samples, of which
+/// there are 24 of the shortest.
+#[test]
+fn samples_have_their_energy_and_their_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[excess_free_energy]\n\
+                 F = \"3.0 + 0*n\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+    std::fs::write(folder.path().join("m.toml"), model).unwrap();
+    let text = "model = \"m.toml\"\nkT = 2.0\nseed = 3\nbox = 4.0\ndensity = 3.0\nsteps = 50\ndt = 0.01\n";
+    let scene = Scene::parse("constant", text, folder.path()).unwrap();
+    let origin = Origin::of(&scene, Duration::from_millis(50), NonZeroUsize::MIN).unwrap();
+    for (physics, steps) in [(setting::physics(Choice::Few)[1], 6.0), (Physics::reference(), 1.0)] {
+        let run = Sampler::settled(&origin, physics, Effort::Samples(1)).unwrap().more(Effort::Samples(30));
+        let made = run.sampled().unwrap();
+        let u = made.quantities.get("u").unwrap();
+        assert!((u.value - 3.0).abs() < 1e-9, "{u:?}");
+        assert!(made.samples >= 16, "{}", made.samples);
+        let expected = steps * origin.dt(&physics) * made.samples as f64;
+        assert!(
+            (made.time / expected - 1.0).abs() < 1e-9,
+            "{}: {} and not {expected}",
+            physics.multiple,
+            made.time
+        );
+        let kinetic = made.quantities.get("T_kin").unwrap();
+        assert!((kinetic.value / 2.0 - 1.0).abs() < 0.3, "{kinetic:?}");
+    }
+}
+
+/// What is recommended is read back as it was: every setting, with noise of either law and thermostats that wait.
+#[test]
+fn lines_of_a_scene_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), crate::models::STANDARD).unwrap();
+    let mut all = setting::physics(Choice::Full);
+    for physics in all.clone() {
+        let mut integrator = physics.integrator;
+        if let Some(coupling) = integrator.settings().coupling {
+            (coupling.every, coupling.noise) = (3, psidpd_core::engine::noise::Law::Uniform);
+            all.push(Physics { integrator, ..physics });
+        }
+    }
+    assert!(all.len() > 100);
+    for physics in all.into_iter().filter(|physics| physics.integrator.has_time()) {
+        let setting = Setting { host: Host::Native, physics, threads: NonZeroUsize::MIN };
+        let lines = recommend::scene_lines(0.0375, &setting);
+        let text = format!("model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 3.0\nsteps = 5\n{lines}");
+        let scene = Scene::parse("again", &text, folder.path()).unwrap_or_else(|e| panic!("{e}\n{lines}"));
+        assert_eq!((scene.stages[0].integrator, scene.stages[0].dt), (physics.integrator, 0.0375), "{lines}");
+        assert_eq!(scene.precision(), physics.precision, "{lines}");
+    }
+}
+
+/// Units do not matter: energies four times as large at half the step are the same run, to the last bits, and what it gains is a part
+/// of kT, in half the time.
+#[test]
+fn drifts_are_parts_of_kt() {
+    let of = |energy: f64, time: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let model = crate::models::STANDARD
+            .replace("a  = 25.0", &format!("a  = {:?}", 25.0 * energy))
+            .replace("gamma = 4.5", &format!("gamma = {:?}", 4.5 * energy * time));
+        std::fs::write(folder.path().join("m.toml"), model).unwrap();
+        let text = format!(
+            "model = \"m.toml\"\nkT = {energy:?}\nseed = 3\nbox = 4.0\ndensity = 3.0\nequilibrate = 100\nsteps = 200\ndt = {:?}\n",
+            0.015625 * time
+        );
+        let scene = Scene::parse("drift", &text, folder.path()).unwrap();
+        let origin = Origin::of(&scene, Duration::from_secs(60), NonZeroUsize::MIN).unwrap();
+        let physics = setting::physics(Choice::Few)[0];
+        let unit = origin.unit;
+        let origin = Origin { unit: 0.015625 * time, ..origin };
+        assert!(unit > 0.0);
+        drift::drift(&origin, &physics, Effort::Samples(40)).unwrap()
+    };
+    let (one, four) = (of(1.0, 1.0), of(4.0, 0.5));
+    let [a, b] = [&one, &four].map(|d| d.largest.unwrap());
+    assert!(a > 1e-4 && (b / a - 1.0).abs() < 1e-3, "{one:?} {four:?}");
+    let slopes = [&one, &four].map(|d| d.slope.unwrap());
+    assert!((0.5 * slopes[1] / slopes[0] - 1.0).abs() < 1e-3, "{one:?} {four:?}");
+}
+
+/// A model with Warren's parameters and another energy is not LAMMPS's style, though it differs by a hundredth alone.
+#[test]
+fn only_the_same_forces_are_a_style_of_lammps() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |model: &str| {
+        let scene = tiny(folder.path());
+        std::fs::write(folder.path().join("m.toml"), model).unwrap();
+        let scene = Scene::parse("tiny", scene.source.text(), folder.path()).unwrap();
+        let origin = Origin::of(&scene, Duration::from_millis(50), NonZeroUsize::MIN).unwrap();
+        own_style::own_style(&origin).unwrap().is_some()
+    };
+    let other = crate::models::SET6.replace("pi/30 *", "1.01*pi/30 *");
+    assert!(other != crate::models::SET6 && of(crate::models::SET6) && !of(&other));
+}
+
+/// Plots are in percent: an error of 3 % of kT, its bar of 0.1, and a tolerance of 2 % as a line; of an error that is not resolved its
+/// upper limit, 0.3 %.
+#[test]
+fn plots_are_in_percent() {
+    let points = vec![
+        fake(Host::Native, 1.0, [0.03, 0.001], [1.0; 3]),
+        fake(Host::Native, 2.0, [0.001, 0.001], [2.0; 3]),
+    ];
+    let reference =
+        Reference { what: "small steps".into(), dt: None, samples: 1, time: 1.0, values: Vec::new() };
+    let outcome = Comparison {
+        format: 2,
+        version: "",
+        machine: String::new(),
+        scene: String::new(),
+        stage: String::new(),
+        particles: 1,
+        kt: 2.0,
+        dt: 0.01,
+        temperature_is_known: true,
+        reference,
+        reference_of_dynamics: None,
+        lammps_reference: None,
+        left_out: Vec::new(),
+        points,
+        drifts: Vec::new(),
+        tolerances: vec!["u=2%".parse().unwrap()],
+        unresolved: Vec::new(),
+        margin: 2.0,
+        undecided: Vec::new(),
+        recommended: None,
+    };
+    let plot = page::plot_of(&outcome, quantity::Class::Energy).unwrap();
+    assert_eq!(plot.levels, [(2.0, "tolerance".to_owned())]);
+    let drawn: Vec<f64> = plot.series.iter().flat_map(|s| &s.points).flat_map(|(x, y)| [*x, *y]).collect();
+    for (found, expected) in drawn.iter().zip([1.0, 3.0, 2.0, 0.3]) {
+        assert!((found - expected).abs() < 1e-9, "{drawn:?}");
+    }
+    assert_eq!(drawn.len(), 4);
+}
