@@ -143,3 +143,35 @@ impl Observed {
         self.scalar("pressure", "configurational")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many particles as were asked for, at the density and in the shares that were, in two and three dimensions; a box that would
+    /// be narrower than three ranges has more.
+    #[test]
+    fn boxes_have_the_particles_that_were_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("m.toml");
+        for dimensions in [2, 3] {
+            let text = format!(
+                "title = \"two\"\nspecies = [\"A\", \"B\"]\ndimensions = {dimensions}\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n"
+            );
+            std::fs::write(&file, text).unwrap();
+            let model = Model::open(&file).unwrap();
+            let of = |particles: usize| {
+                let sampling = Sampling { particles, ..Sampling::SHORT };
+                let bulk = Bulk { model: &model, kt: 0.7, densities: &[1.0, 3.0], observe: "", sampling };
+                bulk.scene(&file).unwrap()
+            };
+            let scene = of(4000);
+            let (count, volume) = (scene.initial.count() as f64, scene.domain.volume(dimensions));
+            assert!((count / 4000.0 - 1.0).abs() < 0.02, "{dimensions}-D: {count}");
+            assert!((count / volume - 4.0).abs() < 0.05 && scene.kt == 0.7, "{dimensions}-D: {count}");
+            let second = scene.initial_state().species.iter().filter(|s| **s == 1).count() as f64;
+            assert!((second / count - 0.75).abs() < 0.01, "{dimensions}-D: {second}");
+            assert!((of(5).domain.lengths()[0] - 3.0).abs() < 1e-12);
+        }
+    }
+}

@@ -102,3 +102,23 @@ pub fn line(points: &[Point], goal: f64) -> Option<(f64, f64)> {
     let strength = x0 + (goal - y0) / slope;
     Some((strength, (1.0 / weight + (strength - x0) * (strength - x0) / xx).sqrt()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a straight line with errors of 0.05, by hand: at a distance d from their middle the line's error is
+    /// √(σ²/3 + d² σ²/0.02).
+    #[test]
+    fn lines_have_the_error_of_their_points() {
+        let at = |strength: f64| Point { strength, value: Some([strength - 0.5, 0.05].into()) };
+        for (goal, place) in [(0.5, 1.0), (0.58, 1.08), (0.43, 0.93)] {
+            let (strength, error) = line(&[0.9, 1.0, 1.1].map(at), goal).unwrap();
+            let expected = 0.05 * (1.0f64 / 3.0 + (place - 1.0f64).powi(2) / 0.02).sqrt();
+            assert!((strength - place).abs() < 1e-9, "{goal}: {strength}");
+            assert!((error / expected - 1.0).abs() < 0.03, "{goal}: {error} and not {expected}");
+        }
+        // On one side alone there is none.
+        assert_eq!(line(&[0.9, 1.0, 1.1].map(at), 0.7), None);
+    }
+}

@@ -122,7 +122,44 @@ fn one_density_fixes_the_offset() {
     let point = made.point(16.0, &Polynomial::identity());
     let fit = fit_density(&[point], 0, 1).unwrap();
     assert!((fit.coefficients[0] - 1.57).abs() < 1e-12 && fit.coefficients[1] == 1.0);
-    assert_eq!(fit.errors[1], None);
+    // The offset is as uncertain as the density that was measured.
+    assert_eq!(fit.errors, [Some(1e-6), None]);
+    let middle = fit.halfway(&Polynomial(vec![0.57, 2.0]));
+    assert!((middle.coefficients[0] - 1.07).abs() < 1e-12 && middle.coefficients[1] == 1.5, "{middle:?}");
+    assert_eq!(middle.errors, [Some(5e-7), None]);
+}
+
+/// Two species at ρ and 2ρ: around each, the density of the other counts with its own hole. Pairs are told in the order of the model,
+/// of which species at which, and one round finds all four lines.
+#[test]
+fn pairs_of_two_species_are_fitted_each() {
+    const SHARES: [f64; 4] = [0.8, 0.9, 0.7, 0.95];
+    let names = ["A", "B"].map(str::to_owned);
+    let point = |rho: f64| {
+        let both = [rho, 2.0 * rho];
+        let known = |value| Measured { value, error: 1e-6 };
+        let observe = |name: &str| Observation::new(name, name, Kind::Scalar, &Series::new(1));
+        let pairs = ["A_A", "A_B", "B_A", "B_B"].into_iter().zip(SHARES).enumerate();
+        let means = pairs.fold(observe("local_density_means"), |of, (k, (pair, share))| {
+            of.column(&format!("mean_{pair}"), "1", [known(share * both[k % 2])])
+        });
+        let temperature = observe("temperature").column("kinetic", "energy", [known(1.0)]);
+        let pressure = observe("pressure").column("conservative", "energy", [known(3.0 * rho)]);
+        Point::of(&Observed(vec![means, temperature, pressure]), &names, &both)
+    };
+    let densities = [2.0, 3.0, 5.0];
+    let batch = || Batch { points: densities.map(point).to_vec(), of: vec![0, 1, 2], failed: Vec::new() };
+    let first = &batch().points[0];
+    assert_eq!((first.total, &first.own[..]), (6.0, &[2.0, 4.0, 2.0, 4.0][..]));
+    let targets = densities.map(|rho| Target { wanted: 3.0 * rho, base: 0.0, scale: 3.0 * rho });
+    let wish = Wish { targets: &targets, slope: None, tolerance: 0.001 };
+    let measure = &mut |_: Trial| -> Result<_, Infallible> { Ok(batch()) };
+    let Ok(rounds) = search(batch(), &wish, measure, &mut |_| {});
+    assert!(rounds.len() == 1 && rounds[0].meets(0.001), "{rounds:?}");
+    for (fit, share) in rounds[0].fits.iter().zip(SHARES) {
+        let c = &fit.coefficients;
+        assert!(c[0].abs() < 1e-9 && (c[1] * share - 1.0).abs() < 1e-9, "{share}: {c:?}");
+    }
 }
 
 /// A density that always stops is left out of fits and residuals, and named; the others are fitted to their own targets.
