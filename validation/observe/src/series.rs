@@ -428,6 +428,23 @@ mod tests {
     }
 
     /// Errors of independent values add up as squares. A quotient of two series in one proportion has no error, however large theirs.
+    /// 131 rows are 65 stretches of two, and one, the first. A row that stands out says as much about the error in a short stretch as
+    /// in a long one.
+    #[test]
+    fn short_stretches_count_with_their_rows() {
+        let error = |outlier: usize| {
+            let mut series = Series::new(1);
+            for k in 0..131 {
+                series.push(&[if k == outlier { 1.0 } else { 0.0 }]);
+            }
+            jackknife(&series, |m| m[0]).error
+        };
+        let [short, long] = [0, 65].map(error);
+        assert!((short / long - 1.0).abs() < 0.1, "{short} {long}");
+        // Of one row in n the error of the mean is 1/n.
+        assert!((131.0 * long - 1.0).abs() < 0.1, "{long}");
+    }
+
     #[test]
     fn errors_of_two_values() {
         let (a, b) = (Measured { value: 6.0, error: 3.0 }, Measured { value: 2.0, error: 4.0 });
@@ -435,6 +452,7 @@ mod tests {
         {
             assert_eq!((found.value, found.error), (value, error));
         }
+        assert_eq!((b.times(-2.0).value, b.times(-2.0).error), (-4.0, 8.0));
         let quotient = a.over(b);
         assert!(quotient.value == 3.0 && (quotient.error - 3.0 * 0.5f64.hypot(2.0)).abs() < 1e-14);
         let mut rng = StdRng::seed_from_u64(84);

@@ -340,6 +340,37 @@ mod tests {
         );
     }
 
+    /// The first number behind some words.
+    fn number_after(text: &str, words: &str) -> f64 {
+        let rest = text.split_once(words).unwrap_or_else(|| panic!("{text}")).1;
+        let end = rest.find(|c: char| !(c.is_ascii_digit() || ".-+".contains(c))).unwrap_or(rest.len());
+        rest[..end].parse().unwrap_or_else(|_| panic!("{rest}"))
+    }
+
+    /// Of n independent values an error is uncertain by 1/√(2n); a line that rises by 0.01 a row rises by 3.99 over 400.
+    #[test]
+    fn notes_have_their_numbers() {
+        let short: Vec<f64> = (0..9).map(noise).collect();
+        let note = notes(&short);
+        let [values, part] = ["has about ", "itself uncertain by "].map(|words| number_after(&note, words));
+        assert!((part - 100.0 / (2.0 * values).sqrt()).abs() < 2.0, "{values} {part}");
+        let rising: Vec<f64> = (0..400).map(|k| 0.01 * noise(k) + 0.01 * k as f64).collect();
+        let by = number_after(&notes(&rising), "changes by ");
+        assert!((by - 3.99).abs() < 0.01, "{by}");
+    }
+
+    /// Of 400 independent numbers between 0 and 3, whose variance is 3/4, the error of the mean is √(3/4/400), to a few percent.
+    #[test]
+    fn means_of_rows_have_the_error_of_the_mean() {
+        let mut table = table(&(0..400).map(noise).collect::<Vec<f64>>());
+        table.columns[1] = (0..400).map(|k| 3.0 * noise(k + 1000)).collect();
+        let found = gather(None, None, Some(&table), &[]);
+        let temperature = found.get("temperature").unwrap();
+        let error = temperature.error.unwrap();
+        assert!((temperature.value - 1.5).abs() < 4.0 * error, "{temperature:?}");
+        assert!((error / (0.75f64 / 400.0).sqrt() - 1.0).abs() < 0.25, "{temperature:?}");
+    }
+
     fn drop(radius: f64) -> Observation {
         let column = |name: &str, value: f64| serde_json::json!({"name": name, "unit": "length", "values": [value], "errors": [0.1]});
         serde_json::from_value(serde_json::json!({
