@@ -213,3 +213,46 @@ fn relative_velocities_are_drawn_anew_at_the_rate_of_drag() {
     assert!((drawn / count - share).abs() < 6.0 * error, "{} drawn, not {share}", drawn / count);
     assert!((square / drawn - 1.0).abs() < 6.0 * (2.0 / drawn).sqrt(), "variance {}", square / drawn);
 }
+
+/// The virial of drag and noise is that of the momentum that they exchange: of the forces at the end of a step where they are among
+/// them, or else of what a step gave to velocities, over the time that the thermostat acted for. Other particles are out of reach, and
+/// distances do not change.
+#[test]
+fn the_pressure_of_drag_and_noise_is_that_of_their_impulses() {
+    let every_third = [Update::Midpoint, Update::OrnsteinUhlenbeck].map(|update| with(update, 3));
+    let all = Integrator::ALL.into_iter().map(|(_, it)| it).filter(Integrator::has_time);
+    for integrator in all.chain(every_third) {
+        let mut run = pairs(3, 1e-20);
+        run.prepare_for(integrator, DT, Want::TOTALS).unwrap();
+        let mut it = integrator;
+        let every = it.settings().coupling.map_or(1, |coupling| coupling.every);
+        for step in 1..=12 {
+            let before = run.state().v.clone();
+            run.step(DT, integrator, Want::TOTALS).unwrap();
+            if step % every != 0 {
+                continue;
+            }
+            let (state, in_forces) = (run.state(), integrator.properties().drag_in_forces);
+            let mut expected = [0.0; 6];
+            for k in 0..run.len() {
+                let (v, m) = (state.v[k], MASS[k % 2]);
+                let given: [f64; 3] = match in_forces {
+                    true => run.forces()[k],
+                    false => std::array::from_fn(|c| m * (v[c] - before[k][c]) / (every as f64 * DT)),
+                };
+                // Half of the distance of the pair is each particle's.
+                let d = ALONG.map(|c| if k % 2 == 0 { 0.25 * c } else { -0.25 * c });
+                for (sum, (a, b)) in expected.iter_mut().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)])
+                {
+                    *sum += m * v[a] * v[b] + d[a] * given[b];
+                }
+            }
+            let found = run.pressure_tensor().map(|p| p * 216.0);
+            let size = expected.iter().fold(0.0, |most: f64, p| most.max(p.abs()));
+            for (found, expected) in found.iter().zip(expected) {
+                let off = (found - expected).abs() / size;
+                assert!(off < 1e-6, "{integrator}, step {step}: {found} and not {expected}");
+            }
+        }
+    }
+}
