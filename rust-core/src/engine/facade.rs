@@ -50,7 +50,7 @@ pub struct Pending {
     slopes: Vec<f64>,
     number: u64,
     /// The box, if there are walls.
-    walls_in: Option<PeriodicBox>,
+    walls_in: Option<Box<PeriodicBox>>,
 }
 
 /// Times and counts of an engine's work since it was made.
@@ -373,7 +373,11 @@ impl Engine {
         let path = self.last_mut();
         let slopes = std::mem::take(path.slopes_mut());
         let around = surroundings.around().filter(|_| !self.plan().walls.is_empty());
-        Ok(Pending { slopes, number: self.number, walls_in: around.map(|around| around.domain.clone()) })
+        Ok(Pending {
+            slopes,
+            number: self.number,
+            walls_in: around.map(|around| Box::new(around.domain.clone())),
+        })
     }
 
     /// Chooses the path of a new evaluation.
