@@ -199,6 +199,13 @@ fn fluids_are_compared_when_lammps_runs() {
             format!("{both}pair_coeff 2 2 mdpd -40 20 18 1 0.75\nrun 5\n{both}run 5\n"),
             Some("B differs between pairs of types (25 and 20)"),
         ),
+        // One B with two ranges has no potential either.
+        (
+            "pair_coeff * * mdpd/rhosum 0.75\npair_coeff 2 2 mdpd/rhosum 0.5\npair_coeff * * mdpd -40 25 18 1 0.75\n\
+             pair_coeff 2 2 mdpd -40 25 18 1 0.5\nrun 5\n"
+                .into(),
+            Some("differs between pairs of types"),
+        ),
         // B rd^4 is the same: the force has a potential.
         (
             "pair_coeff * * mdpd/rhosum 0.75\npair_coeff 2 2 mdpd/rhosum 0.5\npair_coeff * * mdpd -40 16 18 1 0.75\n\

@@ -193,6 +193,33 @@ mod tests {
         }
     }
 
+    /// The line of an element has the mass of its species.
+    #[test]
+    fn elements_have_the_masses_of_their_species() {
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Grid { spacing: 0.1, largest_density: 40.0, densities: 5 };
+        let pair = |a: &str, b: &str| {
+            format!("[[pair]]\nbetween = ['{a}', '{b}']\nform = 'soft'\nstrength = 10\nrange = 1\n")
+        };
+        let text = format!(
+            "title = 't'\nspecies = ['F', 'G']\n{}{}{}",
+            pair("F", "F"),
+            pair("F", "G"),
+            pair("G", "G")
+        );
+        let fluid = Model::parse("m.toml", &text).unwrap().at(1.0).unwrap();
+        let path = folder.path().join("t.eam.alloy");
+        write(&fluid, &[2.5, 0.75], grid, &path, Existing::Replace).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let masses: Vec<f64> = text
+            .lines()
+            .map(|line| line.split_whitespace().collect::<Vec<_>>())
+            .filter(|words| words.len() == 4 && words[3].starts_with(char::is_alphabetic))
+            .map(|words| words[1].parse().unwrap())
+            .collect();
+        assert_eq!(masses, [2.5, 0.75], "{text}");
+    }
+
     /// ψ = 3n is a pair energy of 2 · 3 w(r), with w = 15/(2π)(1 − r)², beside φ = 5(1 − r)²; the table has r times their sum.
     #[test]
     fn a_linear_excess_free_energy_is_a_pair_energy_of_the_table() {

@@ -400,6 +400,63 @@ mod tests {
         assert_eq!(motion(&Integrator::VelocityVerlet), "nve");
     }
 
+    /// A scene in two dimensions that starts from a file, in a box that begins at (1, −3) and leans by `tilt`.
+    fn flat(folder: &Path, tilt: f64, more: &str) -> Scene {
+        let model = "title = \"t\"\ndimensions = 2\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+        std::fs::write(folder.join("m.toml"), model).unwrap();
+        let rows: String = (0..40)
+            .map(|k| {
+                format!(
+                    "{} {} {} {} 0.0\n",
+                    k + 1,
+                    1 + k % 2,
+                    1.5 + 0.6 * f64::from(k % 8),
+                    f64::from(k / 8) - 2.5
+                )
+            })
+            .collect();
+        let lean = if tilt == 0.0 { String::new() } else { format!("{tilt} 0 0 xy xz yz\n") };
+        let data = format!(
+            "flat\n\n40 atoms\n2 atom types\n\n1 7 xlo xhi\n-3 5 ylo yhi\n-0.5 0.5 zlo zhi\n{lean}\nMasses\n\n1 1.0\n2 3.0\n\n\
+             Atoms # atomic\n\n{rows}"
+        );
+        std::fs::write(folder.join("start.data"), data).unwrap();
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 3\ndt = 0.01\nsteps = 5\n[initial]\nkind = \"data\"\n\
+             file = \"start.data\"\nvelocities = \"thermal\"\n{more}"
+        );
+        Scene::parse("flat.toml", &text, folder).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The half of the box in which a force is reversed is counted from where the box begins, and types from 1.
+    #[test]
+    fn forces_are_reversed_in_the_upper_half_of_the_box() {
+        let folder = tempfile::tempdir().unwrap();
+        let force = "[[body_force]]\nacceleration = [0.25, 0.0]\nreversed_along = \"y\"\nspecies = [\"B\"]\n";
+        let script = script_of(&flat(folder.path(), 0.0, force), Script::default()).unwrap();
+        for line in [
+            "variable      body1x atom mass*(0.25)*(1-2*((y-(-3.0))/8.0-floor((y-(-3.0))/8.0)>=0.5))\n",
+            "group         body1types type 2\n",
+            "fix           body1 body1group addforce v_body1x v_body1y 0.0\n",
+        ] {
+            assert!(script.contains(line), "{line}{script}");
+        }
+    }
+
+    /// A box in the plane keeps its tilt, and has a thickness of 1.
+    #[test]
+    fn boxes_in_the_plane_keep_their_tilt() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = flat(folder.path(), 1.5, "");
+        write_inputs(&scene, &scene.initial_state(), &folder.path().join("out"), Existing::Keep).unwrap();
+        let data = psidpd_formats::DataFile::read(&folder.path().join("out").join(START)).unwrap();
+        assert_eq!(
+            (data.tilt, data.boxlo, data.boxhi),
+            (Some([1.5, 0.0, 0.0]), [1.0, -3.0, -0.5], [7.0, 5.0, 0.5])
+        );
+        assert!(data.atoms.len() == 40 && data.atoms.iter().all(|atom| atom.x[2] == 0.0));
+    }
+
     #[test]
     fn the_thermostat_is_cut_out_and_what_follows_stays() {
         let text = "title = \"t\"\n[[ thermostat ]] # one\ngamma = 1\n[[thermostat]]\ngamma = 2\n[[pair]]\nrange = 1\n";
