@@ -204,6 +204,20 @@ fn what_no_mixture_has_is_refused_with_the_nearest() {
     assert!(!found.good && found.refusal.unwrap().contains("not within"));
 }
 
+/// Tensions are in the unit of the models, energy over length²: what is 8 in it is found as 8 of it.
+#[test]
+fn tensions_have_the_unit_of_the_models() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("{SOFTER}[units]\nlength = 2e-9\nmass = 2e-25\nenergy = 4e-21\n");
+    let of = |name: &str| liquid(folder.path(), name, &text).unwrap();
+    let sought = Sought { liquids: [of("a"), of("b")], kt: 1.0, densities: None, tension: 8e-3, seed: 1 };
+    let found = mixture_by(&sought, &mut Known::new(CURVES[0], 1), &mut |_| ()).unwrap();
+    assert!((found.unit - 1e-3).abs() < 1e-15 && found.good, "{found:?}");
+    assert!(
+        (CURVES[0](found.cross) / 8.0 - 1.0).abs() < 0.075 && (found.tension().value - 8e-3).abs() < 1e-3
+    );
+}
+
 /// A spreading coefficient and a verdict by hand.
 #[test]
 fn verdicts_are_those_of_the_tension() {
@@ -219,4 +233,11 @@ fn verdicts_are_those_of_the_tension() {
     let (_, (below, coefficient)) = set(8.0, 0.2);
     assert_eq!(below, 0);
     assert!((coefficient.value - 0.7).abs() < 1e-12 && (coefficient.error - 0.2).abs() < 1e-12);
+    // All of them in a unit of 0.01 N/m: only the tension that is wanted is in it before.
+    let mut found = Found { unit: 0.01, wanted: 0.08, ..found };
+    let tension = Measured { value: 8.0, error: 0.2 };
+    found.layers = Some(Layers { tension, dissolved: [Measured::from(0.0); 2] });
+    let (_, coefficient) = found.spreading();
+    assert!(found.meets() && (coefficient.value - 0.007).abs() < 1e-12, "{coefficient:?}");
+    assert!((coefficient.error - 0.002).abs() < 1e-12, "{coefficient:?}");
 }
