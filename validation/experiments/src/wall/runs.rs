@@ -106,6 +106,16 @@ pub fn split(
     Film { liquid: touches.then_some(liquid), vapour, surface: if touches { surface } else { 0.0 } }
 }
 
+/// The mean of two films; without a liquid if one has left the wall.
+pub fn both(films: [Film; 2]) -> Film {
+    let liquid = match films.map(|film| film.liquid) {
+        [Some(a), Some(b)] => Some(mean([a, b])),
+        _ => None,
+    };
+    let surface = 0.5 * (films[0].surface + films[1].surface);
+    Film { liquid, vapour: mean(films.map(|film| film.vapour)), surface }
+}
+
 impl Instrument for Runs<'_> {
     fn units(&self) -> Units {
         self.units
@@ -141,12 +151,38 @@ impl Instrument for Runs<'_> {
             (Setting::ridge(self.sought.angle, surface, &lines, &self.units), seed(2)),
         ])?;
         let films = [0, 1].map(|k| self.tensions(&found[k]));
-        let liquid = match films.map(|film| film.liquid) {
-            [Some(a), Some(b)] => Some(mean([a, b])),
-            _ => None,
-        };
-        let surface = 0.5 * (films[0].surface + films[1].surface);
-        let film = Film { liquid, vapour: mean(films.map(|film| film.vapour)), surface };
-        Ok((film, found[2].scalar("contact_angle", "angle")))
+        Ok((both(films), found[2].scalar("contact_angle", "angle")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_observe::{Kind, Observation, Series};
+
+    /// A film of a liquid of density 6 at kT = 0.7 on the lower wall, of ranges of 2: its particles have a pressure of 4.2, which is
+    /// that of the liquid, so it touches; the tensions are those of the integral on either side of its surface.
+    #[test]
+    fn films_of_known_stress_are_read() {
+        let model = psidpd_core::model::Model::parse("m.toml", crate::models::SET6).unwrap();
+        let sought =
+            Sought { model_file: "m.toml".into(), model, kt: 0.7, density: None, angle: 60.0, seed: 1 };
+        let units = Units { kt: 0.7, range: 2.0, density: 6.0, dt: 0.1 };
+        let runs = Runs { sought: &sought, folder: Path::new(""), units };
+        let places: Vec<f64> = (0..110).map(|k| 0.2 * f64::from(k) + 0.1).collect();
+        let film =
+            |pressure: f64| {
+                let profile = Observation::new("stress_profile", "", Kind::Profile, &Series::new(1))
+                    .against("z", "length", places.clone())
+                    .exact("integral", "", places.iter().map(|z| if *z < 10.0 { -3.0 } else { 4.0 }))
+                    .exact("ideal", "", places.iter().map(|z| if *z < 10.0 { pressure } else { 0.0 }));
+                let whole = Observation::new("stress_profile_integral", "", Kind::Scalar, &Series::new(1))
+                    .exact("integral", "", [4.5]);
+                runs.tensions(&Observed(vec![profile, whole]))
+            };
+        let found = film(4.2);
+        assert_eq!((found.liquid.map(|l| l.value), found.vapour.value), (Some(-3.0), 0.5));
+        // Less than three quarters of the liquid's: a film that has left.
+        assert!(film(3.2).liquid.is_some() && film(3.1).liquid.is_none());
     }
 }

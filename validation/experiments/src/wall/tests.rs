@@ -1,6 +1,6 @@
 //! Walls whose answer is known, in place of runs; profiles and scenes by hand.
 
-use super::runs::split;
+use super::runs::{both, split};
 use super::search::{angle, attracts};
 use super::*;
 use crate::models::{SET6, SPLINE, STANDARD};
@@ -173,6 +173,43 @@ fn tensions_are_split_between_the_film_and_the_vapour() {
         assert!((found.cosine(&slab).unwrap().value - 0.5).abs() < 1e-9);
     }
     assert_eq!(film(integral(&lower), ideal(3.0, 8.0)).liquid, None);
+}
+
+/// Two films on either side of a cosine, whose line has an error of 0.01 there: within a degree of 90, where a degree is 0.017, and not
+/// of 160, where it is 0.006.
+#[test]
+fn a_degree_is_less_of_a_cosine_near_its_ends() {
+    let asked = |wanted: f64| {
+        let goal = wanted.to_radians().cos();
+        let at = |strength: f64, off: f64| Trial {
+            strength,
+            cosine: Some(Measured { value: goal + off, error: 0.014 }),
+            surface: 0.3,
+        };
+        let mut trials = vec![at(0.8, -0.02), at(0.82, 0.02)];
+        let mut known = Known::new(|s| -1.4 + 0.9 * s, 1);
+        let slab = known.slab().unwrap();
+        let _ = search::search(wanted, &slab, &mut known, &mut trials, &mut |_| ()).unwrap();
+        known.asked.len()
+    };
+    assert_eq!(asked(90.0), 0);
+    assert!(asked(160.0) > 0);
+}
+
+/// Means have the error of two, and a film that left the wall leaves no tension.
+#[test]
+fn two_films_are_averaged() {
+    let film = |liquid: f64, surface: f64| Film {
+        liquid: Some(Measured { value: liquid, error: 0.3 }),
+        vapour: Measured { value: 0.5 * liquid, error: 0.4 },
+        surface,
+    };
+    let found = both([film(-3.0, 0.2), film(-5.0, 0.3)]);
+    let liquid = found.liquid.unwrap();
+    assert!((liquid.value + 4.0).abs() < 1e-12 && (found.vapour.value + 2.0).abs() < 1e-12, "{found:?}");
+    assert!((liquid.error - 0.3 / 2f64.sqrt()).abs() < 1e-12 && (found.surface - 0.25).abs() < 1e-12);
+    assert!((found.vapour.error - 0.4 / 2f64.sqrt()).abs() < 1e-12, "{found:?}");
+    assert_eq!(both([film(-3.0, 0.2), Film { liquid: None, ..film(-5.0, 0.3) }]).liquid, None);
 }
 
 fn known_film() -> Film {
