@@ -161,6 +161,63 @@ fn correlations_of_few_particles_count_pairs_and_not_squares() {
     }
 }
 
+/// A slab of layers, of a density of 50 beside one of 6.25, is 6 thick.
+#[test]
+fn a_slab_is_as_thick_as_it_is() {
+    let at =
+        |z: f64, count: usize| (0..count).map(move |k| [0.25 * (k % 8) as f64, 0.25 * (k / 8) as f64, z]);
+    let layers = (0..60).map(|k| 0.2 * f64::from(k) + 0.1);
+    let x: Vec<[f64; 3]> = layers.flat_map(|z| at(z, if (3.0..9.0).contains(&z) { 40 } else { 5 })).collect();
+    let mut shown = Shown::new(IDEAL, 1.0, &[2.0, 2.0, 12.0], &x, "interface_width = { bins = 60 }");
+    (0..10).for_each(|_| shown.sample(|view| view));
+    let out = shown.finish();
+    assert!((value(&out[0], "thickness") - 6.0).abs() < 0.1, "{out:?}");
+    assert!(
+        (value(&out[0], "liquid") - 50.0).abs() < 0.5 && (value(&out[0], "vapour") - 6.25).abs() < 0.1,
+        "{out:?}"
+    );
+}
+
+/// Masses of 1 and 3 in turns that flow with one parabola: the fluid has their mean density of mass, 2 ρ, and the viscosity that the
+/// parabola has with it.
+#[test]
+fn the_viscosity_of_a_flow_knows_masses() {
+    let x: Vec<[f64; 3]> = (0..480).map(|k| [0.5, 0.5, 0.0125 * (k as f64 + 0.5)]).collect();
+    let observe = "poiseuille = { axis = \"z\", flow = \"x\", acceleration = 0.1, bins = 60 }";
+    let mut shown = Shown::new(IDEAL_MIXTURE, 1.0, &[4.0, 2.0, 6.0], &x, observe);
+    // z (3 − z) in the lower half, and against it in the upper.
+    let along = |z: f64| if z < 3.0 { z * (3.0 - z) } else { -(z - 3.0) * (6.0 - z) };
+    let v: Vec<[f64; 3]> = x.iter().map(|x| [0.2 * along(x[2]), 1.0, -1.0]).collect();
+    let species: Vec<i32> = (0..480).map(|k| k % 2).collect();
+    for _ in 0..10 {
+        shown.sample(|view| View { v: &v, species: &species, masses: &[1.0, 3.0], ..view });
+    }
+    let out = shown.finish();
+    // ρ a/(2 · 0.2), with 480 particles of mass 2 in 48.
+    let expected = 20.0 * 0.1 / 0.4;
+    assert!((value(&out[0], "viscosity") / expected - 1.0).abs() < 0.01, "{out:?}");
+    assert!(value(&out[0], "deviation") < 0.01, "{out:?}");
+}
+
+/// One particle of A with one of two of B within the range of a density of neither: around the one of A there is w, around those of B
+/// w and nothing.
+#[test]
+fn local_densities_are_those_of_one_species_at_another() {
+    let model = "title = \"t\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
+                 [excess_free_energy]\nA = \"(n_A + n_B)^2\"\nB = \"(n_A + n_B)^2\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+    let x = [[1.0, 1.0, 1.0], [1.4, 1.0, 1.0], [3.5, 3.5, 3.5]];
+    let mut shown = Shown::new(model, 1.0, &[5.0; 3], &x, "local_density = true");
+    shown.sample(|view| View { species: &[0, 1, 1], ..view });
+    let means = &shown.finish()[1];
+    let w = 15.0 / (2.0 * PI) * 0.36;
+    for (column, expected) in [("mean_A_B", w), ("mean_B_A", 0.5 * w), ("mean_A_A", 0.0), ("mean_B_B", 0.0)] {
+        assert!((value(means, column) - expected).abs() < 1e-12, "{column}: {means:?}");
+    }
+    // Of the mean density of the others in the box.
+    assert!((value(means, "relative_A_B") - w * 125.0 / 2.0).abs() < 1e-9, "{means:?}");
+    assert!((value(means, "relative_B_A") - 0.5 * w * 125.0).abs() < 1e-9, "{means:?}");
+}
+
 /// A particle that went round the box along its second edge is displaced by that edge, tilt included.
 #[test]
 fn a_displacement_round_a_tilted_box_is_its_edge() {
