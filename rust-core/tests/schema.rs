@@ -168,6 +168,25 @@ fn schema_and_reference_are_current() {
     assert_current("../docs/model-file.md", &reference());
 }
 
+/// The page of the theory has each kernel once, with its factor in three dimensions: a number over another times π, of a kernel
+/// that is 1 in the middle.
+#[test]
+fn the_page_of_the_theory_has_the_kernels() {
+    use psidpd_core::model::kernel::{Kernel, KernelKind};
+    let page = std::fs::read_to_string(root().join("../docs/theory.md")).unwrap();
+    for kind in KernelKind::ALL.iter().copied() {
+        let mut rows = page.lines().filter(|line| line.starts_with(&format!("| `{}` |", kind.name())));
+        let row = rows.next().unwrap_or_else(|| panic!("{}", kind.name()));
+        assert!(rows.next().is_none());
+        let factor = row.rsplit("$`").next().unwrap().split("R^3)").next().unwrap();
+        let (top, bottom) = factor.split_once("/(").unwrap_or_else(|| panic!("{row}"));
+        let count = bottom.replace("\\pi", "").trim().parse().unwrap_or(1.0);
+        let told = top.parse::<f64>().unwrap() / (count * std::f64::consts::PI);
+        let kernel = Kernel::new(kind, 2.0, 3);
+        assert!((8.0 * kernel.value(0.0) / told - 1.0).abs() < 1e-12, "{row}");
+    }
+}
+
 /// Checks a value by the part of JSON Schema (draft 7) that the schema uses; panics at an unknown keyword.
 fn validate(value: &Value, schema: &Value, root: &Value) -> Result<(), String> {
     let rules = match schema {
