@@ -235,7 +235,7 @@ mod tests {
         }
     }
 
-    /// A force that is no gradient heats a liquid without thermostat, and the case of long runs says so.
+    /// A force that is not a gradient heats a liquid without thermostat, and the case of long runs says so.
     #[test]
     fn energy_that_is_made_shows() {
         let case = cases(Extent::Quick).into_iter().find(|case| case.group == "long runs").unwrap();

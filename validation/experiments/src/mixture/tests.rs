@@ -233,7 +233,7 @@ fn verdicts_are_those_of_the_tension() {
     let (_, (below, coefficient)) = set(8.0, 0.2);
     assert_eq!(below, 0);
     assert!((coefficient.value - 0.7).abs() < 1e-12 && (coefficient.error - 0.2).abs() < 1e-12);
-    // All of them in a unit of 0.01 N/m: only the tension that is wanted is in it before.
+    // All of them in a unit of 0.01 N/m: only the tension that is sought is in it before.
     let mut found = Found { unit: 0.01, wanted: 0.08, ..found };
     let tension = Measured { value: 8.0, error: 0.2 };
     found.layers = Some(Layers { tension, dissolved: [Measured::from(0.0); 2] });
