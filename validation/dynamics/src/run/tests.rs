@@ -13,6 +13,7 @@ mod force_gradient;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod held;
+mod hot;
 mod integrators;
 mod live;
 mod monte_carlo;

@@ -467,3 +467,29 @@ fn walls_are_read_and_refused() {
         assert!(error.contains(message), "{wall}: {error}");
     }
 }
+
+/// A particle of mass 3 that meets one of two walls without forces gives it 2 m v, and the other nothing.
+#[test]
+fn the_wall_that_is_met_takes_the_momentum() {
+    let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 0.7\nseed = 5\ndensity = 1.0\nsteps = 5\ndt = 0.02\n[masses]\nA = 3.0\n\
+                [box]\nlengths = [3.0, 4.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+                [[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\ndensity = 3.0\nstrength = 0.0\ndrag = 0.0\n";
+    let scene = support::scene(IDEAL, text).unwrap();
+    for (z, v, wall) in [(0.01, -2.0, 0), (4.99, 2.0, 1)] {
+        let domain = scene.initial_state().domain;
+        let mut state = State::at_rest(domain, vec![3.0], vec![[1.0, 1.0, z]]);
+        state.v = vec![[0.5, 0.0, v]];
+        let mut run = scene.simulation(state).unwrap();
+        scene.enter(&scene.stages[0], &mut run).unwrap();
+        let integrator = scene.stages[0].integrator;
+        run.prepare_for(integrator, 0.02, Want::TOTALS).unwrap();
+        run.record_flux(Recorded::Sum);
+        run.step(0.02, integrator, Want::TOTALS).unwrap();
+        let taken = run.flux().unwrap().on_walls(2);
+        for (k, force) in taken.iter().enumerate() {
+            let expected = if k == wall { 2.0 * 3.0 * v / 0.02 } else { 0.0 };
+            assert!((force[2] - expected).abs() < 1e-6 && force[0].abs() < 1e-9, "{wall}: {taken:?}");
+        }
+        assert!((run.state().v[0][2] + v).abs() < 1e-9);
+    }
+}

@@ -47,7 +47,7 @@ fn particles(data: &DataFile) -> Vec<([f64; 3], [i32; 3], [f64; 3])> {
 fn pieces_of_a_run_end_as_the_run() {
     let scene = scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, STAGES).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    finished(&scene, folder.path(), Begin::New);
+    let last = finished(&scene, folder.path(), Begin::New).last;
     let expected = particles(&DataFile::read(&folder.path().join("final.data")).unwrap());
     for piece in [1, 4, 25] {
         let mut live = Live::new(scene.clone(), NonZeroUsize::MIN).unwrap();
@@ -63,6 +63,15 @@ fn pieces_of_a_run_end_as_the_run() {
         }
         let found = particles(&live.simulation().state().to_data_by_tag("t"));
         assert!(found == expected, "pieces of {piece}");
+        // Energies and the pressure are those of the present step.
+        let run = live.simulation();
+        assert_eq!(
+            (run.temperature(), run.pressure_tensor()),
+            (last.temperature, last.tensor),
+            "pieces of {piece}"
+        );
+        let potential = run.potential_energy() / last.potential;
+        assert!((potential - 1.0).abs() < 1e-12, "pieces of {piece}: {potential}");
         // Beyond its end the last stage goes on.
         live.run(2, || false).unwrap();
         assert_eq!((live.stage().name.as_str(), live.left()), ("d", 0));

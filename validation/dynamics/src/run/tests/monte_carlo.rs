@@ -376,3 +376,38 @@ fn starts_without_energy() {
     let error = run.step(1.0, trials(1, None), Want::FORCES).unwrap_err().to_string();
     assert!(error.contains("step 1") && error.contains("particle 1"), "{error}");
 }
+
+/// Without forces a particle goes where it likes, by at most the furthest move in a sweep, with the boxes that it crosses counted; what
+/// is frozen stays; and before faces a quarter of moves up to half of the box is turned away, and counts as a trial.
+#[test]
+fn moves_are_counted_across_faces_and_before_walls() {
+    let model = Model::parse("m.toml", IDEAL).unwrap();
+    let most = 0.5 * EDGE;
+    let mut run = Simulation::new(&model, 0.7, pair([true; 3], [[0.3; 3], [1.0; 3]]), 3).unwrap();
+    run.set_frozen(&Tags::Ranges(vec![2..=2]));
+    let unwrapped = |run: &Simulation, k: usize| -> [f64; 3] {
+        let state = run.state();
+        std::array::from_fn(|c| state.x[k][c] + EDGE * f64::from(state.image[k][c]))
+    };
+    let (mut before, mut farthest) = (unwrapped(&run, 0), 0.0f64);
+    for _ in 0..500 {
+        run.step(1.0, trials(1, Some(most)), Want::FORCES).unwrap();
+        let now = unwrapped(&run, 0);
+        for c in 0..3 {
+            assert!((now[c] - before[c]).abs() <= most * (1.0 + 1e-9), "{before:?} {now:?}");
+            farthest = farthest.max(now[c].abs());
+        }
+        before = now;
+        assert_eq!((run.state().x[1], run.state().image[1]), ([1.0; 3], [0; 3]));
+        assert_eq!(run.acceptance(), 1.0);
+    }
+    assert!(farthest > 2.0 * EDGE, "{farthest}");
+    let mut run = Simulation::new(&model, 0.7, pair([true, true, false], [[0.3; 3], [1.0; 3]]), 3).unwrap();
+    let mut accepted = 0.0;
+    for _ in 0..400 {
+        run.step(1.0, trials(50, Some(most)), Want::FORCES).unwrap();
+        accepted += run.acceptance() / 400.0;
+    }
+    // 40 000 trials, with a standard error below 0.005.
+    assert!((accepted - 0.75).abs() < 0.02, "{accepted}");
+}
