@@ -201,6 +201,9 @@ mod tests {
         };
         let (right, found) = judged("");
         assert_eq!(right, Ok(()), "{found:?}");
+        // Not for want of a temperature: of a gas there is the kinetic one.
+        let Found::Ended { temperatures, .. } = &found else { panic!("{found:?}") };
+        assert!(temperatures.len() == 1 && (temperatures[0][0] - 1.0).abs() < 0.1, "{found:?}");
         let (wrong, found) = judged("velocity = [0.1, 0.0, 0.0]\n");
         assert!(wrong.unwrap_err().starts_with("momentum"), "{found:?}");
         let Found::Ended { momentum, .. } = found else { panic!("{found:?}") };
