@@ -611,3 +611,42 @@ fn another_instruction_set_is_told() {
         assert_eq!(*instructions, told);
     }
 }
+
+/// The means of a run are those of the rows of its last stage, without the start; its time is that of all stages.
+#[test]
+fn means_are_those_of_the_rows_of_the_last_stage() {
+    for (stages, steps, time) in [
+        ("[[stage]]\nname = \"only\"\nsteps = 12\ndt = 0.01\n", 12, 0.12),
+        (
+            "[[stage]]\nname = \"first\"\nsteps = 6\ndt = 0.02\n[[stage]]\nname = \"last\"\nsteps = 9\ndt = 0.01\n",
+            15,
+            0.21,
+        ),
+    ] {
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 0.7\nseed = 1\nbox = 4.0\ndensity = 3.0\n{stages}[output]\nthermo = 3\n"
+        );
+        let scene = support::scene(support::SOFT, &text).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let mut runner = Runner::begin(&scene, folder.path(), Begin::New).unwrap();
+        let mut rows = Vec::new();
+        let first = steps - scene.stages.last().unwrap().steps;
+        let summary = runner
+            .run_to_end(&mut |p| rows.extend(p.thermo.filter(|row| row.step > first).copied()))
+            .unwrap();
+        let (last, means) = (summary.last, summary.means.unwrap());
+        assert!((last.time - time).abs() < 1e-12 && last.step == steps, "{last:?}");
+        assert_eq!((means.rows, rows.len() as u64), ((steps - first) / 3, (steps - first) / 3));
+        let mean =
+            |of: fn(&crate::checkpoint::Thermo) -> f64| rows.iter().map(of).sum::<f64>() / rows.len() as f64;
+        for (found, expected) in [
+            (means.temperature, mean(|row| row.temperature)),
+            (means.potential, mean(|row| row.potential)),
+            (means.pressure, mean(|row| row.pressure)),
+            (means.conservative_pressure, mean(|row| row.conservative_pressure)),
+        ] {
+            assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} {expected}");
+        }
+        assert!((means.pressure - means.conservative_pressure).abs() > 1e-3, "{means:?}");
+    }
+}
