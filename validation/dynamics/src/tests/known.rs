@@ -231,6 +231,12 @@ fn a_displacement_round_a_tilted_box_is_its_edge() {
     }
     let found = &shown.finish()[0].get("msd").unwrap().values.clone();
     assert_eq!(found, &[1.5 * 1.5 + 36.0, 9.5 * 9.5 + 4.0 + 49.0]);
+    // From 4.5 across the face to 0.5 of the next box is a way of 1.
+    let mut shown =
+        Shown::new(IDEAL, 1.0, &[5.0; 3], &[[4.5, 1.0, 1.0]], "msd = { length = 2, spacing = 5 }");
+    shown.sample(|view| view);
+    shown.sample(|view| View { x: &[[0.5, 1.0, 1.0]], images: &[[1, 0, 0]], ..view });
+    assert_eq!(shown.finish()[0].get("msd").unwrap().values, [1.0]);
 }
 
 /// Mean square displacements of 1, 2, 3, 4 at intervals of half a time unit: D is their slope 2 over 2d.
