@@ -572,6 +572,10 @@ mod tests {
             assert!((found.mean - 0.5).abs() < 1e-12 && (found.error - expected).abs() < 1e-12, "{found:?}");
             assert_eq!(found.samples, samples);
         }
+        // About a ratio that is not the mean they scatter as much.
+        for ratio in [0.3, 1.7] {
+            assert!((one.variance(ratio) - 0.2 * 4.0 / 3.0).abs() < 1e-12, "{}", one.variance(ratio));
+        }
         // Blocks of another ratio that all agree have no scatter about it, and no error is known.
         let alike = Configurational::of(&[[2.0, 1.0], [4.0, 2.0], [6.0, 3.0]]);
         assert!(alike.variance(2.0).abs() < 1e-12 && estimate_configurational(&[alike], 2.0).is_none());

@@ -69,3 +69,18 @@ pub fn lammps(context: &Context, code: Code, law: ForceLaw) -> Result<Work, Expe
         Ok([f[6], f[7], f[8]])
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force that turns, `k (−y, x)` about the centre, does the work `2πkR²`; a uniform force none, whatever its direction.
+    #[test]
+    fn the_work_of_known_forces() {
+        let turning = around(|a| Ok([-3.0 * RADIUS * a.sin(), 3.0 * RADIUS * a.cos(), 0.0])).unwrap();
+        assert!((turning.work / (3.0 * TAU * RADIUS * RADIUS) - 1.0).abs() < 1e-12, "{turning:?}");
+        assert!((turning.scale - turning.work).abs() < 1e-12, "{turning:?}");
+        let uniform = around(|_| Ok([2.0, -1.5, 0.0])).unwrap();
+        assert!(uniform.work.abs() < 1e-12 && (uniform.scale / (2.5 * TAU * RADIUS) - 1.0).abs() < 1e-12);
+    }
+}

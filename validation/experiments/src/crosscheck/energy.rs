@@ -2,7 +2,7 @@
 
 use super::closed_loop;
 use super::setup::Setup;
-use super::trace::{Length, run as run_code};
+use super::trace::{Length, Trace, run as run_code};
 use super::{Context, Part};
 use crate::ExperimentError;
 use crate::code::Code;
@@ -54,20 +54,18 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     for (setup, trace) in setups.iter().zip(&traces) {
         let (label, slug) = (setup.label(), setup.slug());
         let per_particle = trace.energy_per_particle();
-        let found = drift(&trace.time, &per_particle)?;
         let duration = trace.time.last().copied().unwrap_or(0.0);
-        let net = found.slope * duration;
-        let ends = ends(&trace.temperature);
-        let energies = [net, found.largest].map(|x| format!("{x:.1e}"));
+        let Change { net, largest, ends, heating } = change(trace)?;
+        let energies = [net, largest].map(|x| format!("{x:.1e}"));
         let temperatures = ends.map(|t| format!("{t:.3}"));
         table.push([label.clone()].into_iter().chain(energies).chain(temperatures));
         part.values.push((
             format!("nve.{slug}"),
-            json!({"drift": net, "largest": found.largest, "temperature_start": ends[0], "temperature_end": ends[1]}),
+            json!({"drift": net, "largest": largest, "temperature_start": ends[0], "temperature_end": ends[1]}),
         ));
         if setup.code == Code::Mdpd {
             let what = "LAMMPS mdpd heats without thermostat (what the conservative law is there to avoid): rise of T";
-            part.at_least("nve.mdpd.heating", what, ends[1] - ends[0], HEATING);
+            part.at_least("nve.mdpd.heating", what, heating, HEATING);
         } else {
             let what = format!("{label}: drift of U + K over {duration} time units, kT per particle");
             part.at_most(format!("nve.{slug}.drift"), what, net, LARGEST_DRIFT);
@@ -97,6 +95,23 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
     part.section = Section::new("Energy without thermostat", items);
     add_loop(context, &mut part)?;
     Ok(part)
+}
+
+/// How the energy of a particle and the temperature have changed in a run.
+struct Change {
+    /// The drift of the energy from the start to the end, and the largest excursion.
+    net: f64,
+    largest: f64,
+    /// The temperatures at the start and at the end, and the rise.
+    ends: [f64; 2],
+    heating: f64,
+}
+
+fn change(trace: &Trace) -> Result<Change, ExperimentError> {
+    let found = drift(&trace.time, &trace.energy_per_particle())?;
+    let duration = trace.time.last().copied().unwrap_or(0.0);
+    let ends = ends(&trace.temperature);
+    Ok(Change { net: found.slope * duration, largest: found.largest, ends, heating: ends[1] - ends[0] })
 }
 
 /// Means of the first and the last twentieth of a series.
@@ -139,4 +154,28 @@ fn add_loop(context: &Context, part: &mut Part) -> Result<(), ExperimentError> {
     ));
     part.section.items.push(Item::Table(table));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten particles whose energy rises by 0.02 per unit of time, for 40 units, and whose temperature rises from 0.7 by 0.01 a sample.
+    #[test]
+    fn changes_of_a_made_up_run() {
+        let samples = 0..=100;
+        let trace = Trace {
+            particles: 10,
+            time: samples.clone().map(|k| 0.4 * f64::from(k)).collect(),
+            potential: samples.clone().map(|k| -30.0 + 0.05 * f64::from(k)).collect(),
+            kinetic: samples.clone().map(|k| 15.0 + 0.03 * f64::from(k)).collect(),
+            temperature: samples.map(|k| 0.7 + 0.01 * f64::from(k)).collect(),
+            ..Trace::default()
+        };
+        let Change { net, largest, ends, heating } = change(&trace).unwrap();
+        assert!((net - 0.8).abs() < 1e-9 && largest.abs() >= net - 1e-9, "{net} {largest}");
+        // The first and the last five samples.
+        assert!((ends[0] - 0.72).abs() < 1e-12 && (ends[1] - 1.68).abs() < 1e-12, "{ends:?}");
+        assert!((heating - 0.96).abs() < 1e-12, "{heating}");
+    }
 }
