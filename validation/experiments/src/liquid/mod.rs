@@ -227,7 +227,8 @@ fn equilibrium(
                 found.trials.push(Trial { fluid: best.fluid, found: again });
             }
             End::Met => break,
-            End::Missed | End::Blocked(_) if met => break,
+            // What the table calls met is not refused, though chance may have kept the search from its end.
+            End::Missed | End::Blocked(_) if met || all_met(liquid, &again) => break,
             End::Missed => {
                 found.refusals.push(conflict(liquid, &again, None));
                 break;
@@ -239,6 +240,12 @@ fn equilibrium(
         }
     }
     Ok(result)
+}
+
+/// Whether the goals of a liquid at rest are met as the table says.
+fn all_met(liquid: &Liquid, found: &Equilibrium) -> bool {
+    let rows = rows(liquid, Some(found), None);
+    rows.iter().filter(|row| row.name != "viscosity").all(Row::is_met)
 }
 
 /// The two goals that were not met together.

@@ -279,6 +279,28 @@ fn the_answer_of_a_known_fluid_is_found() {
     }
 }
 
+/// A liquid whose table has all goals met is never refused, wherever chance has left the search.
+#[test]
+fn what_the_table_calls_met_is_not_refused() {
+    let (mut met, mut refused) = (0, 0);
+    for k in 0..300 {
+        // Goals about the edge of what the fluid with its freezing point has.
+        let tension = 1.0 + 0.0005 * f64::from(k);
+        let mut known = Known { calls: 0.37 * f64::from(k), freezes: -46.5, ..Known::new() };
+        let liquid = known.sheet(tension, 6.0);
+        let found = model_by(&liquid, &mut known, &mut |_| ()).unwrap();
+        let goals = || found.rows.iter().filter(|row| row.name != "viscosity");
+        if goals().all(Row::is_met) {
+            met += 1;
+            assert!(found.refusals.is_empty(), "{k}: {found:#?}");
+        } else {
+            refused += 1;
+            assert!(!found.good);
+        }
+    }
+    assert!(met > 20 && refused > 20, "{met} {refused}");
+}
+
 #[test]
 fn what_is_free_is_left_alone_and_reported() {
     let mut known = Known::new();
