@@ -14,9 +14,9 @@ pub struct ListedFor {
 }
 
 impl ListedFor {
-    /// Whether these pairs are those of `asked`, perhaps with distances beside.
-    pub fn serves(&self, asked: &ListedFor) -> bool {
-        self.dt == asked.dt && (self.virial || !asked.virial) && self.plan == asked.plan
+    /// Whether these pairs are those of a thermostat for a time `dt`, perhaps with distances beside.
+    pub fn serves(&self, plan: &ThermostatPlan, dt: f64, virial: bool) -> bool {
+        self.dt == dt && (self.virial || !virial) && self.plan == *plan
     }
 }
 

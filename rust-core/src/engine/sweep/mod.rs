@@ -30,7 +30,7 @@ use super::counts::PassCounts;
 use super::error::EngineError;
 use super::exclusions::Exclusions;
 use super::particles::Particles;
-use super::plan::Plan;
+use super::plan::{Plan, ThermostatPlan};
 use super::request::Request;
 use super::surroundings::Around;
 use crate::model::Fluid;
@@ -121,18 +121,13 @@ pub struct ListedPairs<'a> {
 }
 
 impl ListedPairs<'_> {
-    /// Moves the pairs to `lists` and `planes`, if they are those that are `asked` for between particles at `x`; returns whether they
-    /// are. Particles of a cell are in the order of the host.
-    pub fn take(
-        self,
-        asked: &ListedFor,
-        x: &[[f64; 3]],
-        lists: &mut PairLists,
-        planes: &mut Vec<PlanePairs>,
-    ) -> bool {
-        if !self.listed.serves(asked) || self.positions != of_positions(x) {
-            return false;
-        }
+    /// Whether the pairs are those of a thermostat for a time `dt` between particles at `x`, perhaps with distances beside.
+    pub fn serve(&self, plan: &ThermostatPlan, dt: f64, virial: bool, x: &[[f64; 3]]) -> bool {
+        self.listed.serves(plan, dt, virial) && self.positions == of_positions(x)
+    }
+
+    /// Moves the pairs to `lists` and `planes`. Particles of a cell are in the order of the host.
+    pub fn give(self, lists: &mut PairLists, planes: &mut Vec<PlanePairs>) {
         with!(&mut self.sweep.workspace, m => {
             let cells = &m.order;
             planes.resize_with(cells.grid.planes, PlanePairs::default);
@@ -140,7 +135,6 @@ impl ListedPairs<'_> {
             lists.follow(cells);
             m.move_lists(planes.iter_mut().map(|plane| &mut plane.lists));
         });
-        true
     }
 }
 

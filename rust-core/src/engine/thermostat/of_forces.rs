@@ -67,8 +67,10 @@ impl PairThermostat {
 
     /// Takes listed pairs, if they are those of this thermostat for a time `dt` between particles at `x`.
     pub(super) fn take(&mut self, listed: Option<ListedPairs>, x: &[[f64; 3]], dt: f64, virial: bool) {
-        let asked = ListedFor { plan: self.plan.clone(), dt, virial };
-        let PairThermostat { lists, planes, .. } = self;
-        self.are_of_forces = listed.is_some_and(|listed| listed.take(&asked, x, lists, planes));
+        let listed = listed.filter(|listed| listed.serve(&self.plan, dt, virial, x));
+        self.are_of_forces = listed.is_some();
+        if let Some(listed) = listed {
+            listed.give(&mut self.lists, &mut self.planes);
+        }
     }
 }
