@@ -5,8 +5,8 @@ import json
 import os
 import pathlib
 import random
-import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -51,85 +51,89 @@ def copy():
             shutil.copy(ROOT / name, to)
 
 
-def compile_once(package):
-    """What no change touches; the first time this takes a quarter of an hour."""
-    command = ["cargo", "test", "--release", "--lib", "--no-run", "--quiet", "--package", package]
-    subprocess.run(command, check=True, cwd=COPY, env=os.environ | ENVIRONMENT)
-
-
-def mutants(*arguments, timeout=None):
-    command = ["cargo", "mutants", "--dir", str(COPY), "--config", str(ROOT / ".ci" / "mutants.toml"), *arguments]
-    with subprocess.Popen(command, env=os.environ | ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
-        try:
-            said = run.communicate(timeout=timeout)[0]
-        except subprocess.TimeoutExpired:
-            run.send_signal(subprocess.signal.SIGINT)
-            return run.communicate()[0], 124
-        return said, run.returncode
-
-
 def listed():
-    """All changes, by group."""
-    of = [word for group in GROUPS for word in ("--file", f"validation/{group}" + ("" if group.endswith(".rs") else "/**"))]
-    of += [f"--exclude-re={words}" for words in WORDS]
-    said, code = mutants("--list", "--json", "--workspace", *of)
-    if code:
-        sys.exit(said)
-    names = sorted(one["name"] for one in json.loads(said[said.index("[") :]))
-    return [name for name in names if "/tests" not in name.split(":")[0]]
+    """All changes, with what they do to which file."""
+    command = ["cargo", "mutants", "--dir", str(COPY), "--config", str(ROOT / ".ci" / "mutants.toml"), "--list", "--json", "--workspace"]
+    command += [word for group in GROUPS for word in ("--file", f"validation/{group}" + ("" if group.endswith(".rs") else "/**"))]
+    command += [f"--exclude-re={words}" for words in WORDS]
+    said = subprocess.run(command, env=os.environ | ENVIRONMENT, stdout=subprocess.PIPE, text=True, check=True).stdout
+    changes = sorted(json.loads(said), key=lambda change: change["name"])
+    return [change for change in changes if "/tests" not in change["file"]]
 
 
-def group_of(name):
-    return next(group for group in GROUPS if name.startswith(f"validation/{group}"))
+def group_of(change):
+    return next(group for group in GROUPS if change["file"].startswith(f"validation/{group}"))
 
 
 def package_of(group):
     return "psidpd-" + group.split("/")[0]
 
 
+def cargo_test(package, *arguments, timeout=None):
+    """The exit status; `None` for a test that did not end."""
+    command = ["cargo", "test", "--release", "--lib", "--quiet", "--package", package, *arguments]
+    settings = {"cwd": COPY, "env": os.environ | ENVIRONMENT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, start_new_session=True, **settings) as run:
+        try:
+            return run.wait(timeout)
+        except subprocess.TimeoutExpired:
+            # The test is a child of cargo.
+            os.killpg(run.pid, signal.SIGKILL)
+            return None
+
+
+def attempt(change):
+    """What becomes of a change: it does not compile, a test catches it, or none does."""
+    group = group_of(change)
+    run, without = GROUPS[group]
+    names = ["--", *run, *(word for name in without for word in ("--skip", name))]
+    path = COPY / change["file"]
+    before = path.read_bytes()
+    # cargo-mutants can be told which changes to try by a pattern, but tries all that leave out a field of a struct beside them.
+    subprocess.run(["patch", "--silent", "--no-backup-if-mismatch", str(path)], input=change["diff"], text=True, check=True)
+    try:
+        if cargo_test(package_of(group), "--no-run") != 0:
+            return "unviable"
+        return "missed" if cargo_test(package_of(group), *names, timeout=120) == 0 else "caught"
+    finally:
+        path.write_bytes(before)
+
+
 def main(seed, most):
     copy()
-    names = listed()
+    changes = listed()
     by_group = collections.defaultdict(list)
-    for name in names:
-        by_group[group_of(name)].append(name)
-    # As many of each instrument.
+    for change in changes:
+        by_group[group_of(change)].append(change)
+    # As many of each instrument, one of each in turn.
+    drawn = []
     for group, all_of in by_group.items():
-        by_group[group] = random.Random(f"{seed} {group}").sample(all_of, min(max(1, most // len(GROUPS)), len(all_of)))
-    drawn = sum(len(chosen) for chosen in by_group.values())
-    print(f"{drawn} of {len(names)} changes", file=sys.stderr, flush=True)
+        chosen = random.Random(f"{seed} {group}").sample(all_of, min(max(1, most // len(GROUPS)), len(all_of)))
+        drawn += [(number, group, change) for number, change in enumerate(chosen)]
+    drawn.sort(key=lambda one: one[:2])
+    print(f"{len(drawn)} of {len(changes)} changes", file=sys.stderr, flush=True)
+    # What no change touches; the first time this takes a quarter of an hour.
     for package in sorted({package_of(group) for group in by_group}):
-        compile_once(package)
+        if cargo_test(package, "--no-run") != 0:
+            sys.exit(f"{package} does not compile without a change")
     begin = time.monotonic()
-    found = collections.defaultdict(list)
-    groups = [group for group in GROUPS if by_group[group]]
-    for number, group in enumerate(groups):
-        out = WORK / "out"
-        shutil.rmtree(out, ignore_errors=True)
-        run, without = GROUPS[group]
-        tests = [*run, "--", *(word for name in without for word in ("--skip", name))]
-        choice = ["--re=^" + re.sub(r"([^\w ])", r"\\\1", name) + "$" for name in by_group[group]]
-        # An even share of the time that is left.
-        left = max(1.0, 60 * MINUTES - (time.monotonic() - begin)) / (len(groups) - number)
-        settings = ["--in-place", "--profile", "release", "--timeout", "120", "--baseline", "skip", "--no-times", "--output", str(out)]
-        said, code = mutants(
-            *settings, "--package", package_of(group), *choice, "--cargo-arg=--lib", *(f"--cargo-test-arg={word}" for word in tests), timeout=left
-        )
-        if code not in (0, 2, 3, 124):
-            sys.exit(said)
-        for kind in ("caught", "missed", "timeout", "unviable"):
-            path = out / "mutants.out" / f"{kind}.txt"
-            found[kind] += path.read_text().splitlines() if path.exists() else []
+    found = collections.Counter()
     by_file = collections.defaultdict(list)
-    for line in found["missed"]:
-        by_file[line.split(":")[0]].append(line.split(":", 1)[1])
+    for _, _, change in drawn:
+        if time.monotonic() - begin > 60 * MINUTES:
+            break
+        outcome = attempt(change)
+        found[outcome] += 1
+        print(f"{outcome} {change['name']}", file=sys.stderr, flush=True)
+        if outcome == "missed":
+            by_file[change["file"]].append(change["name"].split(":", 1)[1])
     for name in sorted(by_file):
         print(name, *("  " + line for line in by_file[name]), sep="\n")
-    caught, missed = len(found["caught"]) + len(found["timeout"]), len(found["missed"])
-    share = f", {100 * missed / (caught + missed):.0f} %" if caught + missed else ""
-    tried = caught + missed + len(found["unviable"])
-    rest = f"; {drawn - tried} were not tried in {MINUTES} minutes" if tried < drawn else ""
-    print(f"{missed} of {caught + missed} survive{share}; {len(found['unviable'])} do not compile{rest}")
+    judged = found["caught"] + found["missed"]
+    share = f", {100 * found['missed'] / judged:.0f} %" if judged else ""
+    rest = len(drawn) - found.total()
+    not_tried = f"; {rest} were not tried in {MINUTES} minutes" if rest else ""
+    print(f"{found['missed']} of {judged} survive{share}; {found['unviable']} do not compile{not_tried}")
 
 
 main(int(sys.argv[1]), int(sys.argv[2]))

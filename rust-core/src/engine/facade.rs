@@ -149,7 +149,7 @@ impl Engine {
 
     /// The plan of the fluid's passes.
     pub fn plan(&self) -> &Plan {
-        &self.sweep.sweep.plan
+        &self.sweep.plan
     }
 
     /// The sweep, which lists pairs for a thermostat.
@@ -189,7 +189,7 @@ impl Engine {
         if let Some(device) = &mut self.device {
             device.map_kinds(kinds);
         }
-        self.sweep.sweep.plan.map_kinds(kinds)
+        self.sweep.map_kinds(kinds)
     }
 
     /// Makes later evaluations on a GPU, or on none, and returns the one before.
@@ -234,6 +234,12 @@ impl Engine {
         self.path
     }
 
+    /// Number of pair potentials that the sweep leaves to a search around particles of rare species, as their ranges are longer than those of
+    /// the rest of the fluid; decided anew in every evaluation without ghosts.
+    pub fn potentials_apart(&self) -> usize {
+        self.sweep.long.as_ref().map_or(0, |long| long.which.len())
+    }
+
     /// The path that an evaluation of `want` would take.
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
         let Some(Around { domain, .. }) = surroundings.around() else {
@@ -241,7 +247,7 @@ impl Engine {
         };
         let fits = match &self.device {
             Some(device) => device.fits(domain),
-            None => self.sweep.sweep.fits(domain),
+            None => self.sweep.fits(domain),
         };
         if self.pair_sums_only {
             Path::PairSums(Reason::Asked)

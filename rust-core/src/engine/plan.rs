@@ -5,6 +5,7 @@ use super::excess::ExcessPlan;
 use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
+use crate::model::pair::PairForm;
 use crate::model::wall::{Wall, WallField};
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SPARSE;
@@ -158,6 +159,25 @@ impl Plan {
     /// Longest range of all forces; particles further apart do not interact.
     pub fn cutoff(&self) -> f64 {
         self.cutoff
+    }
+
+    /// The longest range of densities, drag and noise.
+    pub(super) fn range_without_pairs(&self) -> f64 {
+        let densities = self.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
+        densities.fold(self.noise_range().unwrap_or(0.0), f64::max)
+    }
+
+    /// Whether a pair potential of the longest range is between species of which one may be rare, and all else is shorter.
+    pub(super) fn has_long_pairs(&self) -> bool {
+        self.species.len() > 1 && self.range_without_pairs() < self.cutoff
+    }
+
+    /// The plan without the pair potentials `out`, by their indices, and with the range of what is left.
+    pub(super) fn without_pairs(&self, out: &[usize]) -> Plan {
+        let left = self.pairs.iter().enumerate().filter(|(k, _)| !out.contains(k));
+        let pairs: Vec<PairTerm> = left.map(|(_, term)| term.clone()).collect();
+        let ranges = pairs.iter().map(|term| term.potential.range());
+        Plan { cutoff: ranges.fold(self.range_without_pairs(), f64::max), pairs, ..self.clone() }
     }
 
     /// Indices of the densities in which some ψ is not linear; their order is that of the variables of ψ.

@@ -1,10 +1,12 @@
-//! The sweep, and the special pairs, which it leaves out and sums over a list of pairs add.
+//! The sweep, and what it leaves out: special pairs, which sums over a list of pairs add, and long pairs of rare species.
 
 use super::error::EngineError;
 use super::evaluate::Evaluate;
 use super::fault::Fault;
+use super::long_pairs::{LongPairs, faster_apart};
 use super::pair_sums::Corrections;
 use super::particles::Particles;
+use super::plan::Plan;
 use super::request::Request;
 use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::Sweep;
@@ -12,10 +14,14 @@ use super::walls;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
 
-/// The forces of one fluid by a sweep, with special pairs.
+/// The forces of one fluid by a sweep, with special pairs and long pairs.
 #[derive(Debug)]
 pub struct SweepPath {
+    /// The plan of the whole fluid.
+    pub plan: Plan,
+    /// The sweep of this plan, or of what it is without long pairs.
     pub sweep: Sweep,
+    pub long: Option<LongPairs>,
     pub special: Vec<SpecialPair>,
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
@@ -29,7 +35,9 @@ pub struct SweepPath {
 impl SweepPath {
     pub fn new(sweep: Sweep) -> SweepPath {
         SweepPath {
+            plan: sweep.plan.clone(),
             sweep,
+            long: None,
             special: Vec::new(),
             excludes_special: true,
             corrections: Corrections::default(),
@@ -44,6 +52,40 @@ impl SweepPath {
         self.special.clear();
         self.special.extend(pairs.into_iter().filter(|pair| pair.factor != 1.0));
         self.excludes_special = false;
+    }
+
+    /// Whether all particles in a box are near one image of each other: see [`Sweep::fits`].
+    pub fn fits(&self, domain: &PeriodicBox) -> bool {
+        self.sweep.fits(domain)
+            && self.long.as_ref().is_none_or(|long| long.fit(self.plan.dimensions, domain))
+    }
+
+    /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
+    pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
+        self.plan.map_kinds(kinds)?;
+        self.sweep.plan.map_kinds(kinds)
+    }
+
+    /// Decides which pair potentials are apart from the sweep among `particles`; with `None` the sweep has all.
+    fn part(&mut self, particles: Option<&Particles>) {
+        let mut count = vec![0; self.plan.species.len()];
+        let which = match particles.filter(|_| self.plan.has_long_pairs() && !self.leaves_out()) {
+            None => Vec::new(),
+            Some(particles) => {
+                for kind in particles.kind {
+                    let species = self.plan.species_of_type.get(*kind as usize);
+                    if let Some(count) = species.and_then(|s| count.get_mut(*s as usize)) {
+                        *count += 1;
+                    }
+                }
+                faster_apart(&self.plan, &count)
+            }
+        };
+        if self.long.as_ref().map_or(&[][..], |long| &long.which) == which {
+            return;
+        }
+        self.sweep.exchange(self.plan.without_pairs(&which));
+        self.long = (!which.is_empty()).then(|| LongPairs::new(&self.plan, which, &count));
     }
 
     /// Whether special or excluded pairs are set.
@@ -114,7 +156,8 @@ impl SweepPath {
     pub fn memory(&self) -> usize {
         let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.pairs.bytes();
         let numbers = self.excess.capacity() + self.densities.capacity();
-        self.sweep.memory() + special + numbers * size_of::<f64>()
+        let long = self.long.as_ref().map_or(0, LongPairs::memory);
+        self.sweep.memory() + special + long + numbers * size_of::<f64>()
     }
 }
 
@@ -126,8 +169,13 @@ impl Evaluate for SweepPath {
         force: &mut [[f64; 3]],
         add: bool,
     ) -> Result<Tally, EngineError> {
+        self.part(Some(&request.particles));
         self.begin(Around { domain, images: &[] }, request)?;
         let mut tally = self.sweep.evaluate(domain, request, force, add)?;
+        if let Some(long) = &mut self.long {
+            let of = (&**self.sweep.pool(), &self.plan);
+            tally += long.add_forces(of, domain, &request.particles, request.want, force)?;
+        }
         if self.corrections.pairs.len() > 0 {
             self.sweep.fetch_slopes(request.particles.owned);
             tally += self.corrections.add_forces(&self.sweep.plan, &self.sweep.slopes, request, force)?;
@@ -144,6 +192,8 @@ impl Evaluate for SweepPath {
         force: &mut [[f64; 3]],
     ) -> Result<(), EngineError> {
         let around = surroundings.around().ok_or(EngineError::Host("a sweep finds its pairs itself"))?;
+        // Ranks would have to agree on what is rare.
+        self.part(None);
         self.begin(around, request)?;
         self.sweep.first(around, request, force)
     }

@@ -38,6 +38,7 @@ pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
     let kinds = if frame.names.len() > 1 { frame.names.len() } else { 0 };
     let mut values = vec![vec![0.0; size.iter().product()]; 1 + kinds];
     let periodic = frame.periodic();
+    let square_of_range = kernel.range() * kernel.range();
     for (x, species) in frame.x.iter().zip(frame.species) {
         // For each direction the distances of the points in range, and their numbers in the grid. The last point of a
         // periodic direction is the first of the next box, so that each point has its own share of images.
@@ -62,12 +63,16 @@ pub fn density_grid(frame: &Frame, kernel: Option<Kernel>) -> Option<Grid> {
         });
         for (dz, k) in &near[2] {
             for (dy, j) in &near[1] {
-                for (dx, i) in &near[0] {
-                    let w = kernel.value((dx * dx + dy * dy + dz * dz).sqrt());
-                    let at = (k * size[1] + j) * size[0] + i;
-                    values[0][at] += w;
+                let aside = dy * dy + dz * dz;
+                let row = (k * size[1] + j) * size[0];
+                // A ball fills half of the cube around it.
+                for (square, i) in
+                    near[0].iter().map(|(dx, i)| (dx * dx + aside, i)).filter(|(s, _)| *s < square_of_range)
+                {
+                    let w = kernel.value(square.sqrt());
+                    values[0][row + i] += w;
                     if kinds > 0 {
-                        values[1 + *species as usize][at] += w;
+                        values[1 + *species as usize][row + i] += w;
                     }
                 }
             }

@@ -180,6 +180,14 @@ impl Sweep {
         }
     }
 
+    /// Takes another plan of the same species and thermostat, and keeps what it is asked for. Counts begin anew.
+    pub(super) fn exchange(&mut self, plan: Plan) {
+        let Sweep { settings, times, .. } = *self;
+        let (asked, pool) = (self.asked.take(), Arc::clone(&self.pool));
+        let exclusions = std::mem::take(&mut self.exclusions);
+        *self = Sweep { asked, times, exclusions, ..Sweep::of_plan(plan, settings, pool) };
+    }
+
     /// The plan of the fluid's passes.
     pub fn plan(&self) -> &Plan {
         &self.plan
