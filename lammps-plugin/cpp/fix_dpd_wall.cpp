@@ -173,12 +173,23 @@ void FixDPDWall::init()
   std::string why;
   pair = PairPsi::only(force, why);
   if (!pair) stop("needs pair_style dpd/psi, mdpd/psi or dpd/spline, whose atoms feel the wall" + why);
+  if (force->pair_style && strcmp(force->pair_style, "hybrid/scaled") == 0)
+    stop("pair_style hybrid/scaled scales the forces of walls too, and not what this fix reports: use hybrid or hybrid/overlay");
   check_faces();
   check_others();
   given.assign(3 * pair->walls().size(), 0.0);
   taken.assign(matter.size(), OnWall{});
   friction = {};
   std::fill_n(virial, 6, 0.0);
+}
+
+// Whether atoms of the group are in the group of another fix.
+bool FixDPDWall::shares_atoms(const Fix *other) const
+{
+  const auto is_shared = [=](int mask) { return (mask & groupbit) && (mask & other->groupbit); };
+  int mine = std::any_of(atom->mask, atom->mask + atom->nlocal, is_shared), any = 0;
+  MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
+  return any;
 }
 
 // Whether fixes beside it can work, and whether atoms are kept from going through the face.
@@ -192,8 +203,8 @@ void FixDPDWall::check_others()
     const std::string name = std::string("fix ") + other->id + " (" + other->style + ")";
     keeps = keeps || strncmp(other->style, "wall/", 5) == 0 || strcmp(other->style, "indent") == 0;
     const auto begins = [&](const char *with) { return strncmp(other->style, with, strlen(with)) == 0; };
-    if (other->rigid_flag || begins("shake") || begins("rattle"))
-      stop(name + " keeps atoms together, and drag and noise of the wall act on each by itself");
+    if ((other->rigid_flag || begins("shake") || begins("rattle")) && shares_atoms(other))
+      stop(name + " keeps atoms of the group together, and drag and noise of the wall act on each by itself: leave them out of the group");
     for (const WallOfFix &one : matter)
       if (other->box_change & (Fix::BOX_CHANGE_X << one.axis)) stop("face " + name_of(one) + " moves, as " + name + " changes the box along it");
     const auto *wall = dynamic_cast<const FixDPDWall *>(other);

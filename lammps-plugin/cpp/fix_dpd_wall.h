@@ -49,6 +49,7 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   // Stops at faces that the box does not have, or that move.
   void check_faces();
   void check_others();
+  bool shares_atoms(const LAMMPS_NS::Fix *other) const;
   void show_virial();
 
   std::vector<WallOfFix> matter;

@@ -416,6 +416,27 @@ fn what_cannot_work_is_refused() {
         .replace("zlo density 3 species A", "zlo density 3 type 1");
     let error = outcome(&two, 1).unwrap_err();
     assert!(error.contains("the hybrid contains several"), "{error}");
+    let scaled = base
+        .replace("pair_style dpd/psi 1.0 5", "pair_style hybrid/scaled 0.5 dpd/psi 1.0 5")
+        .replace(&format!("* * {wide}"), &format!("* * dpd/psi {wide}"));
+    let error = outcome(&scaled, 1).unwrap_err();
+    assert!(error.contains("hybrid/scaled scales the forces of walls too"), "{error}");
+    // Rigid bodies of atoms that drag and noise of the wall leave alone are allowed.
+    let rigid = base.replace(
+        "fix 1 all nve",
+        "group body id 1:4\ngroup free subtract all body\nfix b body rigid/nve single\nfix 1 free nve",
+    );
+    let error = outcome(&rigid, 1).unwrap_err();
+    assert!(error.contains("fix b (rigid/nve) keeps atoms of the group together"), "{error}");
+    let (fixes, wall) = (rigid.find("group body").unwrap(), rigid.find("fix w all").unwrap());
+    let groups = "group body id 1:4\ngroup free subtract all body\n";
+    let rigid = format!(
+        "{}{groups}{}",
+        &rigid[..wall],
+        rigid[wall..].replace(groups, "").replace("fix w all", "fix w free")
+    );
+    assert!(fixes > wall);
+    outcome(&rigid, 1).unwrap_or_else(|e| panic!("{e}\n{rigid}"));
     // A hard core has no integral, and forces without a potential have no energy.
     let hard = "title = \"m\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\n\
         phi = \"1/r^12 - 1\"\nrange = 1.0\n";

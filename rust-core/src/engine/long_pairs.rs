@@ -233,11 +233,17 @@ impl Found {
         force.resize(j.len(), [0.0; 3]);
         *tally = Tally::default();
         for Around { other, term, .. } in terms.iter().filter(|around| around.rare == *species) {
-            let limit = term.potential.range().powi(2);
+            let range = term.potential.range();
             place.clear();
-            place.extend((0..j.len()).filter(|k| others[*k] == *other && square[*k] < limit));
             r.clear();
-            r.extend(place.iter().map(|k| square[*k].sqrt()));
+            for k in (0..j.len()).filter(|k| others[*k] == *other) {
+                // A root may round to the range.
+                let distance = square[k].sqrt();
+                if distance < range {
+                    place.push(k);
+                    r.push(distance);
+                }
+            }
             phi.resize(r.len(), 0.0);
             slope.resize(r.len(), 0.0);
             term.potential.block(r, phi, slope);

@@ -157,77 +157,14 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     scope.range = [scope.range[0].min(range[0]), scope.range[1].max(range[1])];
 
     say!("{} at kT = {}", model.title, number(kt));
-    let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
-    let (mut rows, mut empty) = (Vec::new(), Vec::new());
-    for k in 1..=arguments.rows.min(10_000) {
-        let scale = 2.0 * k as f64 / arguments.rows as f64;
-        let rho: Vec<f64> = densities.iter().map(|d| d * scale).collect();
-        let (p, slope) = (theory.pressure(&rho), theory.pressure_slope(&rho));
-        let f = theory.excess_free_energy_density(&rho) / (scale * total);
-        let cell = |x: f64| if x.is_finite() { decimal(x, 6) } else { String::new() };
-        if ![p, slope, f].iter().all(|x| x.is_finite()) {
-            empty.push(scale * total);
-        }
-        table.push([scale * total, p, slope, f].map(cell));
-        rows.push(json!({"density": scale * total, "pressure": p, "pressure_slope": slope, "excess": f}));
-    }
-    say::table(&table);
-    if let Some(line) = without_numbers(&empty) {
-        say!("{line}\n");
-    }
+    let rows = equation_of_state(&theory, &densities, arguments.rows);
     let middle = theory.pressure(&densities);
     let defined = middle.is_finite();
     if !defined {
         say!("at density {} there is no pressure: psi or its slope is not finite there\n", number(total));
     }
 
-    let answers = match species {
-        1 => vec![
-            answer(
-                "critical point",
-                critical_point(&|kt| Ok(model.at(kt)?), range),
-                |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
-            ),
-            answer("spinodal", theory.spinodal(), |s| json!(s)),
-            answer("binodal", theory.binodal(), |b| {
-                json!({"vapour": b.vapour, "liquid": b.liquid, "pressure": b.pressure,
-                       "chemical_potential": b.chemical_potential})
-            }),
-            answer("interface", theory.interface(201), |i| json!({"tension": i.tension, "width": i.width})),
-        ],
-        2 => vec![
-            answer(
-                "critical point at this density",
-                composition_critical_point(&|kt| Ok(model.at(kt)?), total, range),
-                |c| {
-                    json!({"kT": c.parameter, "composition": c.composition, "pressure": c.pressure,
-                           "stability_limit": c.limit})
-                },
-            ),
-            answer("spinodal at this density", theory.composition_spinodal(total), |s| json!(s)),
-            answer("coexistence", theory.coexistence([densities[0], densities[1]]), |c| {
-                json!({"composition": c.composition(), "density": c.density(), "pressure": c.pressure,
-                       "chemical_potentials": c.chemical_potentials, "share": c.share,
-                       "metastable": c.more_stable.is_some()})
-            }),
-            answer(
-                "binodal at this density",
-                theory.composition_binodal(total),
-                |b| json!({"composition": b.composition, "pressure": b.pressure}),
-            ),
-            answer(
-                "binodal at this pressure",
-                theory.composition_binodal_at_pressure(middle),
-                |b| json!({"composition": b.composition, "density": b.density, "pressure": b.pressure}),
-            ),
-            answer(
-                "interface at this density",
-                theory.composition_interface(total, 201),
-                |i| json!({"tension": i.tension, "width": i.width}),
-            ),
-        ],
-        _ => Vec::new(),
-    };
+    let answers = answers(&theory, model, &densities, range);
     if species == 2 {
         say!("composition and spinodal: the fraction of {}", model.species()[0]);
         for (of, rests_on) in ASSUMPTIONS {
@@ -279,6 +216,88 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         all[name.replace(' ', "_")] = value;
     }
     Ok((all, defined))
+}
+
+/// Prints the equation of state at densities in the proportion of `densities`, up to twice as many, and returns its rows.
+fn equation_of_state(theory: &MeanField, densities: &[f64], count: usize) -> Vec<Value> {
+    let total: f64 = densities.iter().sum();
+    let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
+    let (mut rows, mut empty) = (Vec::new(), Vec::new());
+    for k in 1..=count.min(10_000) {
+        let scale = 2.0 * k as f64 / count as f64;
+        let rho: Vec<f64> = densities.iter().map(|d| d * scale).collect();
+        let (p, slope) = (theory.pressure(&rho), theory.pressure_slope(&rho));
+        let f = theory.excess_free_energy_density(&rho) / (scale * total);
+        let cell = |x: f64| if x.is_finite() { decimal(x, 6) } else { String::new() };
+        if ![p, slope, f].iter().all(|x| x.is_finite()) {
+            empty.push(scale * total);
+        }
+        table.push([scale * total, p, slope, f].map(cell));
+        rows.push(json!({"density": scale * total, "pressure": p, "pressure_slope": slope, "excess": f}));
+    }
+    say::table(&table);
+    if let Some(line) = without_numbers(&empty) {
+        say!("{line}\n");
+    }
+    rows
+}
+
+/// Prints what mean field says of the phases of one or of two species, and returns it by name.
+fn answers(
+    theory: &MeanField,
+    model: &Model,
+    densities: &[f64],
+    range: [f64; 2],
+) -> Vec<(&'static str, Value)> {
+    let total: f64 = densities.iter().sum();
+    let middle = theory.pressure(densities);
+    match densities.len() {
+        1 => vec![
+            answer(
+                "critical point",
+                critical_point(&|kt| Ok(model.at(kt)?), range),
+                |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
+            ),
+            answer("spinodal", theory.spinodal(), |s| json!(s)),
+            answer("binodal", theory.binodal(), |b| {
+                json!({"vapour": b.vapour, "liquid": b.liquid, "pressure": b.pressure,
+                       "chemical_potential": b.chemical_potential})
+            }),
+            answer("interface", theory.interface(201), |i| json!({"tension": i.tension, "width": i.width})),
+        ],
+        2 => vec![
+            answer(
+                "critical point at this density",
+                composition_critical_point(&|kt| Ok(model.at(kt)?), total, range),
+                |c| {
+                    json!({"kT": c.parameter, "composition": c.composition, "pressure": c.pressure,
+                           "stability_limit": c.limit})
+                },
+            ),
+            answer("spinodal at this density", theory.composition_spinodal(total), |s| json!(s)),
+            answer("coexistence", theory.coexistence([densities[0], densities[1]]), |c| {
+                json!({"composition": c.composition(), "density": c.density(), "pressure": c.pressure,
+                       "chemical_potentials": c.chemical_potentials, "share": c.share,
+                       "metastable": c.more_stable.is_some()})
+            }),
+            answer(
+                "binodal at this density",
+                theory.composition_binodal(total),
+                |b| json!({"composition": b.composition, "pressure": b.pressure}),
+            ),
+            answer(
+                "binodal at this pressure",
+                theory.composition_binodal_at_pressure(middle),
+                |b| json!({"composition": b.composition, "density": b.density, "pressure": b.pressure}),
+            ),
+            answer(
+                "interface at this density",
+                theory.composition_interface(total, 201),
+                |i| json!({"tension": i.tension, "width": i.width}),
+            ),
+        ],
+        _ => Vec::new(),
+    }
 }
 
 /// Makes short runs: the homogeneous fluid if a density was given or there is no liquid, and a slab if there is a liquid.

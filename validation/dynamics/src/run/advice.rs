@@ -159,8 +159,9 @@ impl fmt::Display for Advice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::support::{self, SET6};
-    use psidpd_core::engine::Want;
+    use crate::tests::support::{self, SET6, SOFT};
+    use psidpd_core::engine::{PeriodicBox, Want};
+    use psidpd_core::model::Model;
 
     /// Advice for Warren's liquid in units of energy and mass that are 0.7 and 3 of the usual ones, for a step in the usual units of time.
     fn advice(dt: f64, rest: &str) -> Option<Advice> {
@@ -208,6 +209,17 @@ mod tests {
         {
             assert_eq!(advice(dt, good), None, "{good}");
         }
+    }
+
+    /// Two particles 0.8 apart by hand: ∇²φ = φ″ + 2φ′/r of φ = ½·25 (1 − r)² is 25 (1 − 2·0.2/0.8) = 12.5, a third of it for each direction.
+    #[test]
+    fn the_frequency_of_two_particles_by_hand() {
+        let model = Model::parse("m", SOFT).unwrap();
+        let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
+        let state = State::at_rest(domain, vec![3.0], vec![[0.1, 1.0, 2.0], [4.3, 1.0, 2.0]]);
+        let run = Simulation::new(&model, 0.7, state, 1).unwrap();
+        let found = frequency(&run).unwrap();
+        assert!((found - (12.5f64 / 3.0 / 3.0).sqrt()).abs() < 1e-9, "{found}");
     }
 
     /// A slab that fills a third of the box is as dense as its middle, with its own composition.

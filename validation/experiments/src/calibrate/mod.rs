@@ -116,84 +116,13 @@ fn calibrate_by(
     told: &mut dyn FnMut(&str),
 ) -> Result<Calibration, ExperimentError> {
     let model = Model::open(path)?;
-    let fluid = model.at(options.kt)?;
-    let names: Vec<String> = fluid.densities.iter().map(|d| d.name.clone()).collect();
-    let name = match (&options.name, &names[..]) {
-        (Some(name), _) if !names.contains(name) => return Err(ExperimentError::NoSuchDensity(name.clone())),
-        (Some(name), _) => name.clone(),
-        (None, [one]) => one.clone(),
-        (None, []) => return Err(ExperimentError::NoSuchDensity("n".into())),
-        (None, several) => return Err(ExperimentError::WhichDensity(several.join(", "))),
-    };
-    let species = model.species();
-    let (shares, count) = (options.composition.len(), species.len());
-    if shares != count {
-        let message = format!("a composition of {shares} shares for {count} species");
-        return Err(ExperimentError::Conditions(message));
-    }
-    let text = model.source().text().to_owned();
-    // ψ at the bulk density itself, whatever the file has for a correction or a self term.
-    let pairs = species.len() * species.len();
-    let trial = with_correction(&text, &name, species, &vec![Polynomial(vec![0.0, DUMMY_SLOPE]); pairs], "")?;
-    let parse = |text: &str| Model::parse_in(path, text);
-    let theory = MeanField::new(&parse(&trial)?.at(options.kt)?)?;
-    let per_species =
-        |total: f64| -> Vec<f64> { options.composition.iter().map(|share| share * total).collect() };
-    let targets = options
-        .densities
-        .iter()
-        .map(|total| {
-            let rho = per_species(*total);
-            let wanted = theory.pressure(&rho);
-            let scale = wanted.abs().max(SLOPE_SHARE * (total * theory.pressure_slope(&rho)).abs());
-            let slopes: f64 = match &rho[..] {
-                [rho] => rho * rho * theory.excess_slopes(0, &[*rho])[0],
-                _ => 0.0,
-            };
-            let finite = wanted.is_finite() && scale.is_finite() && scale > 0.0;
-            finite
-                .then_some(Target { wanted, base: wanted - slopes, scale })
-                .ok_or(ExperimentError::NoTarget(*total))
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let observe = format!("local_density = {{ density = \"{name}\", bins = 1000 }}");
+    let bench = Bench::new(run, path, &model, options)?;
+    let targets = bench.targets()?;
     let told = RefCell::new(told);
     told.borrow_mut()("measuring with rho~ = rho");
     let mut all_failed: Vec<Failed> = Vec::new();
     let mut measure = |trial: Trial| -> Result<Batch, ExperimentError> {
-        let mut batch = Batch::default();
-        for (k, total) in options.densities.iter().enumerate() {
-            let rho = per_species(*total);
-            let model = match trial {
-                Trial::Corrected(polynomials) => {
-                    parse(&with_correction(&text, &name, species, polynomials, "")?)?
-                }
-                Trial::Constant => {
-                    let variables: Vec<String> =
-                        names.iter().flat_map(|n| species.iter().map(move |s| format!("{n}_{s}"))).collect();
-                    let slopes: Vec<Vec<f64>> = (0..species.len())
-                        .map(|a| theory.excess_slopes(a, &rho).iter().map(|s| DUMMY_SLOPE * s).collect())
-                        .collect();
-                    let identity =
-                        with_correction(&text, &name, species, &vec![Polynomial::identity(); pairs], "")?;
-                    parse(&text::with_slopes(&identity, species, &variables, &slopes)?)?
-                }
-            };
-            let Options { kt, sampling, .. } = *options;
-            let bulk = Bulk { model: &model, kt, densities: &rho, observe: &observe, sampling };
-            match run(&bulk) {
-                Ok(observed) => {
-                    batch.points.push(Point::of(&observed, species, &rho));
-                    batch.of.push(k);
-                }
-                Err(why) if why.is_stop() => {
-                    let failed = Failed { density: *total, why: cause(&why).to_string() };
-                    told.borrow_mut()(&format!("density {total} is left out: {}", failed.why));
-                    batch.failed.push(failed);
-                }
-                Err(other) => return Err(other.into()),
-            }
-        }
+        let batch = bench.measure(trial, *told.borrow_mut())?;
         all_failed.clone_from(&batch.failed);
         Ok(batch)
     };
@@ -201,62 +130,199 @@ fn calibrate_by(
     let (mut first_guess, mut first) = ("constant", measure(Trial::Constant)?);
     if !first.usable(asked) {
         told.borrow_mut()("rho~ = rho does not run: measuring with rho~ = n");
-        (first_guess, first) = ("identity", measure(Trial::Corrected(&vec![Polynomial::identity(); pairs]))?);
+        (first_guess, first) = ("identity", measure(Trial::Corrected(&bench.identity()))?);
     }
-    let slope = |x: f64| theory.excess_slopes(0, &[x])[0];
+    let slope = |x: f64| bench.theory.excess_slopes(0, &[x])[0];
     let wish = Wish {
         targets: &targets,
-        slope: (species.len() == 1).then_some(&slope as &dyn Fn(f64) -> f64),
+        slope: (bench.species.len() == 1).then_some(&slope as &dyn Fn(f64) -> f64),
         tolerance: options.tolerance,
     };
     let rounds = match first.usable(asked) {
         true => search(first, &wish, &mut measure, &mut |round| told.borrow_mut()(&line(round)))?,
         false => Vec::new(),
     };
-    // Where most densities run, and then where the pressure is nearest.
-    let better = |a: &Round, b: &Round| {
-        (a.failed.len().cmp(&b.failed.len())).then(a.pressure_residual.total_cmp(&b.pressure_residual))
+    let Some((chosen, converged)) = best_of(&rounds, options.tolerance) else {
+        return Err(no_correction(path, options, &all_failed));
     };
-    let Some((chosen, best)) = rounds.iter().enumerate().min_by(|(_, a), (_, b)| better(a, b)) else {
-        if all_failed.is_empty() {
-            return Err(ExperimentError::Conditions("too few densities for a fit".into()));
-        }
-        let [low, high] = [options.densities[0], options.densities[asked - 1]];
-        let each: Vec<String> = all_failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
-        let (model, failed) = (path.to_owned(), each.join("; "));
-        return Err(ExperimentError::NoCorrection { model, low, high, failed });
-    };
-    let last = rounds.len() - 1;
-    let converged = rounds[last].meets(options.tolerance);
-    let (chosen, best) = if converged { (last, &rounds[last]) } else { (chosen, best) };
+    let best = &rounds[chosen];
     let polynomials: Vec<Polynomial> = best.fits.iter().map(|f| rounded(&f.polynomial())).collect();
-    let text =
-        with_correction(&text, &name, species, &polynomials, &note(best, converged, options, command))?;
-    let kept = best.batch.points.iter().zip(best.batch.of.iter().map(|k| &targets[*k]));
-    let residuals = kept.map(|(p, t)| Residual {
-        density: p.total,
-        temperature: p.temperature,
-        mean: p.means.clone(),
-        corrected: (0..pairs).map(|k| p.corrected(k, &best.fits[k].polynomial())).collect(),
-        wanted: t.wanted,
-        pressure: p.pressure,
-        deviation: (p.pressure.value - t.wanted).abs() / t.scale,
-    });
+    let text = bench.corrected(&polynomials, &note(best, converged, options, command))?;
+    let species = bench.species;
     Ok(Calibration {
         title: model.title.clone(),
         kt: options.kt,
-        density: name,
         pairs: species.iter().flat_map(|a| species.iter().map(move |b| format!("{b}|{a}"))).collect(),
+        density: bench.density,
         converged,
         tolerance: options.tolerance,
         sampling: options.sampling,
         first_guess,
         failed: best.failed.clone(),
-        residuals: residuals.collect(),
+        residuals: residuals(best, &targets),
         chosen,
         rounds,
         text,
     })
+}
+
+/// A model whose correction is sought, and how it is measured.
+struct Bench<'a> {
+    run: Measure<'a>,
+    path: &'a Path,
+    options: &'a Options,
+    species: &'a [String],
+    text: &'a str,
+    /// The names of all densities, and of the one that is corrected.
+    densities: Vec<String>,
+    density: String,
+    /// With ψ at the bulk density itself, whatever the file has for a correction or a self term.
+    theory: MeanField,
+}
+
+impl<'a> Bench<'a> {
+    fn new(
+        run: Measure<'a>,
+        path: &'a Path,
+        model: &'a Model,
+        options: &'a Options,
+    ) -> Result<Bench<'a>, ExperimentError> {
+        let densities: Vec<String> = model.at(options.kt)?.densities.iter().map(|d| d.name.clone()).collect();
+        let density = match (&options.name, &densities[..]) {
+            (Some(name), all) if !all.contains(name) => {
+                return Err(ExperimentError::NoSuchDensity(name.clone()));
+            }
+            (Some(name), _) => name.clone(),
+            (None, [one]) => one.clone(),
+            (None, []) => return Err(ExperimentError::NoSuchDensity("n".into())),
+            (None, several) => return Err(ExperimentError::WhichDensity(several.join(", "))),
+        };
+        let species = model.species();
+        let (shares, count) = (options.composition.len(), species.len());
+        if shares != count {
+            let message = format!("a composition of {shares} shares for {count} species");
+            return Err(ExperimentError::Conditions(message));
+        }
+        let text = model.source().text();
+        let dummy = vec![Polynomial(vec![0.0, DUMMY_SLOPE]); count * count];
+        let bulk = Model::parse_in(path, &with_correction(text, &density, species, &dummy, "")?)?;
+        let theory = MeanField::new(&bulk.at(options.kt)?)?;
+        Ok(Bench { run, path, options, species, text, densities, density, theory })
+    }
+
+    fn per_species(&self, total: f64) -> Vec<f64> {
+        self.options.composition.iter().map(|share| share * total).collect()
+    }
+
+    /// ρ̃ = n for every pair of species.
+    fn identity(&self) -> Vec<Polynomial> {
+        vec![Polynomial::identity(); self.species.len() * self.species.len()]
+    }
+
+    /// The file with a correction, and a comment on it.
+    fn corrected(&self, polynomials: &[Polynomial], comment: &str) -> Result<String, ExperimentError> {
+        Ok(with_correction(self.text, &self.density, self.species, polynomials, comment)?)
+    }
+
+    fn targets(&self) -> Result<Vec<Target>, ExperimentError> {
+        let target = |total: &f64| {
+            let rho = self.per_species(*total);
+            let wanted = self.theory.pressure(&rho);
+            let scale = wanted.abs().max(SLOPE_SHARE * (total * self.theory.pressure_slope(&rho)).abs());
+            let slopes: f64 = match &rho[..] {
+                [rho] => rho * rho * self.theory.excess_slopes(0, &[*rho])[0],
+                _ => 0.0,
+            };
+            let finite = wanted.is_finite() && scale.is_finite() && scale > 0.0;
+            finite
+                .then_some(Target { wanted, base: wanted - slopes, scale })
+                .ok_or(ExperimentError::NoTarget(*total))
+        };
+        self.options.densities.iter().map(target).collect()
+    }
+
+    /// The model that a trial has at the densities `rho`.
+    fn model(&self, trial: &Trial, rho: &[f64]) -> Result<Model, ExperimentError> {
+        let text = match trial {
+            Trial::Corrected(polynomials) => self.corrected(polynomials, "")?,
+            Trial::Constant => {
+                let of = |n: &String| self.species.iter().map(|s| format!("{n}_{s}")).collect::<Vec<_>>();
+                let variables: Vec<String> = self.densities.iter().flat_map(of).collect();
+                let slopes = |a| {
+                    self.theory.excess_slopes(a, rho).iter().map(|s| DUMMY_SLOPE * s).collect::<Vec<f64>>()
+                };
+                let slopes: Vec<Vec<f64>> = (0..self.species.len()).map(slopes).collect();
+                let identity = self.corrected(&self.identity(), "")?;
+                text::with_slopes(&identity, self.species, &variables, &slopes)?
+            }
+        };
+        Ok(Model::parse_in(self.path, &text)?)
+    }
+
+    /// Measures a trial at all densities, without those whose run stops.
+    fn measure(&self, trial: Trial, told: &mut dyn FnMut(&str)) -> Result<Batch, ExperimentError> {
+        let mut batch = Batch::default();
+        let Options { kt, sampling, .. } = *self.options;
+        let observe = format!("local_density = {{ density = \"{}\", bins = 1000 }}", self.density);
+        for (k, total) in self.options.densities.iter().enumerate() {
+            let rho = self.per_species(*total);
+            let model = self.model(&trial, &rho)?;
+            let bulk = Bulk { model: &model, kt, densities: &rho, observe: &observe, sampling };
+            match (self.run)(&bulk) {
+                Ok(observed) => {
+                    batch.points.push(Point::of(&observed, self.species, &rho));
+                    batch.of.push(k);
+                }
+                Err(why) if why.is_stop() => {
+                    let failed = Failed { density: *total, why: cause(&why).to_string() };
+                    told(&format!("density {total} is left out: {}", failed.why));
+                    batch.failed.push(failed);
+                }
+                Err(other) => return Err(other.into()),
+            }
+        }
+        Ok(batch)
+    }
+}
+
+/// The round that is chosen, and whether it meets the tolerance: the last if it does, else the one where most densities run, and then
+/// where the pressure is nearest. `None` without rounds.
+fn best_of(rounds: &[Round], tolerance: f64) -> Option<(usize, bool)> {
+    let last = rounds.len().checked_sub(1)?;
+    if rounds[last].meets(tolerance) {
+        return Some((last, true));
+    }
+    let better = |a: &Round, b: &Round| {
+        (a.failed.len().cmp(&b.failed.len())).then(a.pressure_residual.total_cmp(&b.pressure_residual))
+    };
+    let (chosen, _) = rounds.iter().enumerate().min_by(|(_, a), (_, b)| better(a, b))?;
+    Some((chosen, false))
+}
+
+fn no_correction(path: &Path, options: &Options, failed: &[Failed]) -> ExperimentError {
+    if failed.is_empty() {
+        return ExperimentError::Conditions("too few densities for a fit".into());
+    }
+    let [low, high] = [options.densities[0], options.densities[options.densities.len() - 1]];
+    let each: Vec<String> = failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
+    ExperimentError::NoCorrection { model: path.to_owned(), low, high, failed: each.join("; ") }
+}
+
+/// Wanted and measured at the densities of a round.
+fn residuals(best: &Round, targets: &[Target]) -> Vec<Residual> {
+    let kept = best.batch.points.iter().zip(best.batch.of.iter().map(|k| &targets[*k]));
+    let corrected =
+        |p: &Point| best.fits.iter().enumerate().map(|(k, fit)| p.corrected(k, &fit.polynomial())).collect();
+    let residual = |(p, t): (&Point, &Target)| Residual {
+        density: p.total,
+        temperature: p.temperature,
+        mean: p.means.clone(),
+        corrected: corrected(p),
+        wanted: t.wanted,
+        pressure: p.pressure,
+        deviation: (p.pressure.value - t.wanted).abs() / t.scale,
+    };
+    kept.map(residual).collect()
 }
 
 /// Why a run stopped, without the folder of it, which is gone.

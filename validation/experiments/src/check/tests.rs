@@ -133,6 +133,11 @@ fn laws_without_potential_and_jumps_are_named() {
     let cut = "title = \"t\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"expression\"\n\
                phi = \"exp(-r)\"\nrange = 1\n";
     assert!(has(&found(cut, 1.0, None), "energy-jump"));
+    // A jump counts from a millionth of the potential within its range on.
+    for (step, counts) in [("1e-4", true), ("2e-6", true), ("1e-8", false)] {
+        let steep = cut.replace("exp(-r)", &format!("(1 - r)^2 + {step}"));
+        assert_eq!(has(&found(&steep, 1.0, None), "energy-jump"), counts, "{step}");
+    }
 }
 
 #[test]

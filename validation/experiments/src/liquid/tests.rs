@@ -196,14 +196,18 @@ struct Known {
     freezes: f64,
     /// Its viscosity without drag.
     thin: f64,
+    /// Deviations in errors.
+    noise: f64,
     calls: f64,
     asked: Vec<Strengths>,
+    /// How often a result was measured.
+    results: usize,
 }
 
 impl Known {
     fn new() -> Known {
         let answer = Strengths { attraction: -46.0, linear: 2.2, square: 0.62 };
-        Known { answer, freezes: -1e3, thin: 4.0, calls: 0.0, asked: Vec::new() }
+        Known { answer, freezes: -1e3, thin: 4.0, noise: 1.3, calls: 0.0, asked: Vec::new(), results: 0 }
     }
 
     fn exact(fluid: &Strengths) -> [f64; 3] {
@@ -214,7 +218,7 @@ impl Known {
 
     fn noisy(&mut self, value: f64, error: f64) -> Measured {
         self.calls += 1.0;
-        Measured { value: value + error * 1.3 * (self.calls * 2.4).sin(), error }
+        Measured { value: value + error * self.noise * (self.calls * 2.4).sin(), error }
     }
 
     fn viscosity(&self, drag: &Drag) -> f64 {
@@ -242,6 +246,7 @@ impl Known {
 impl Instrument for Known {
     fn equilibrium(&mut self, fluid: &Strengths, care: Care) -> Result<Equilibrium, Trouble> {
         self.asked.push(*fluid);
+        self.results += usize::from(care != Care::Search);
         if fluid.attraction < self.freezes {
             return Err(Trouble::Frozen("ordered".into()));
         }
@@ -277,6 +282,15 @@ fn the_answer_of_a_known_fluid_is_found() {
         close(k, stiffness, 0.03);
         close(t, tension, 0.02);
     }
+}
+
+/// What its own measurement confirms is measured once.
+#[test]
+fn a_result_that_is_met_ends_the_search() {
+    let mut known = Known { noise: 0.0, ..Known::new() };
+    let liquid = known.sheet(1.0, 20.0);
+    assert!(model_by(&liquid, &mut known, &mut |_| ()).unwrap().good);
+    assert_eq!(known.results, 1);
 }
 
 /// A liquid whose table has all goals met is never refused, wherever chance has left the search.

@@ -229,4 +229,15 @@ mod tests {
             (0..2).flat_map(|round| runs.results(0.6, round).unwrap().map(|run| run.seed)).collect();
         assert_eq!(seeds, [1007, 1008, 1017, 1018]);
     }
+
+    #[test]
+    fn the_value_at_the_nearest_place_counts() {
+        let profile: Vec<_> =
+            (0..4).map(|k| (f64::from(k) - 0.5, Measured::from(f64::from(10 + k)))).collect();
+        for (z, expected) in [(-3.0, 10.0), (-0.1, 10.0), (0.1, 11.0), (1.4, 12.0), (2.1, 13.0), (40.0, 13.0)]
+        {
+            assert_eq!(nearest(&profile, z).value, expected, "{z}");
+        }
+        assert!(nearest(&[], 1.0).value.is_nan());
+    }
 }

@@ -455,6 +455,39 @@ fn more_time_is_for_what_is_open() {
     }
 }
 
+/// Interfaces and viscosities that the scene itself asks for are observed beside what all scenes are compared by, each as often as it pays; codes
+/// that are not ours have no forces, and Monte Carlo has no time.
+#[test]
+fn what_the_scene_asks_of_interfaces_is_observed() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), crate::models::SET6).unwrap();
+    let text = "model = \"m.toml\"\nkT = 1.0\nbox = [4.0, 4.0, 12.0]\nsteps = 50\ndt = 0.01\n[initial]\nkind = \"slab\"\n\
+                thickness = 5.0\ndensity = 6.0\n[observe]\nevery = 5\ninterface_width = true\nsurface_tension = true\n\
+                density_profile = true\nviscosity = true\n";
+    let scene = Scene::parse("slab", text, folder.path()).unwrap();
+    let origin = Origin::of(&scene, Duration::from_millis(50), NonZeroUsize::MIN).unwrap();
+    let name = |request: &psidpd_observe::Request| {
+        let whole = format!("{:?}", request.meter);
+        whole.split('(').next().unwrap_or_default().to_owned()
+    };
+    let observed = |host: Host, has_time: bool| {
+        let found = sample::observe(&origin, 7, host, has_time).unwrap().requests;
+        let mut found: Vec<(String, u64)> = found.iter().map(|r| (name(r), r.every)).collect();
+        found.sort();
+        found
+    };
+    let expected = |all: &[(&str, u64)]| -> Vec<(String, u64)> {
+        all.iter().map(|(name, every)| ((*name).to_owned(), *every)).collect()
+    };
+    let forces = [("InterfaceWidth", 7), ("Msd", 7), ("Pressure", 7), ("Rdf", 21), ("SurfaceTension", 21)];
+    let rest = [("Temperature", 21), ("Viscosity", 1)];
+    assert_eq!(observed(Host::Native, true), expected(&[&forces[..], &rest].concat()));
+    let timeless =
+        [("InterfaceWidth", 7), ("Pressure", 7), ("Rdf", 21), ("SurfaceTension", 21), ("Temperature", 21)];
+    assert_eq!(observed(Host::Native, false), expected(&timeless));
+    assert_eq!(observed(Host::Lammps, true), expected(&[("InterfaceWidth", 7), ("Msd", 7), ("Rdf", 7)]));
+}
+
 /// Particles with an energy of 3 each, wherever they are: so much is u, and the time is that of all steps between samples, of which
 /// there are 24 of the shortest.
 #[test]

@@ -143,22 +143,39 @@ impl Instrument for Runs<'_> {
     }
 
     fn result(&mut self, strength: f64, surface: f64, round: u64) -> Result<(Film, Measured), Trouble> {
-        let seed = |number: u64| self.sought.seed.wrapping_add(1000 + 10 * round + number);
+        let seeds = seeds_of_result(self.sought.seed, round);
         let lines = wall(strength, &self.units, "\"zlo\"");
         let found = self.run(vec![
-            (self.film(strength, RESULT), seed(0)),
-            (self.film(strength, RESULT), seed(1)),
-            (Setting::ridge(self.sought.angle, surface, &lines, &self.units), seed(2)),
+            (self.film(strength, RESULT), seeds[0]),
+            (self.film(strength, RESULT), seeds[1]),
+            (Setting::ridge(self.sought.angle, surface, &lines, &self.units), seeds[2]),
         ])?;
         let films = [0, 1].map(|k| self.tensions(&found[k]));
         Ok((both(films), found[2].scalar("contact_angle", "angle")))
     }
 }
 
+/// The seeds of the runs of a result, none of which a search or another round has.
+fn seeds_of_result(seed: u64, round: u64) -> [u64; 3] {
+    [0, 1, 2].map(|number| seed.wrapping_add(1000 + 10 * round + number))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use psidpd_observe::{Kind, Observation, Series};
+
+    #[test]
+    fn runs_of_results_have_seeds_of_their_own() {
+        for seed in [0, 7, u64::MAX] {
+            let search = [seed, seed.wrapping_add(1)];
+            let mut all: Vec<u64> =
+                (0..5).flat_map(|round| seeds_of_result(seed, round)).chain(search).collect();
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), 17);
+        }
+    }
 
     /// A film of a liquid of density 6 at kT = 0.7 on the lower wall, of ranges of 2: its particles have a pressure of 4.2, which is
     /// that of the liquid, so it touches; the tensions are those of the integral on either side of its surface.

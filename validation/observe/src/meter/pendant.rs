@@ -297,7 +297,15 @@ mod tests {
             let tension = 6.0 * 0.02 / (bond / radius.powi(2));
             assert!((get("tension") / tension - 1.0).abs() < 0.015, "{} {tension}", get("tension"));
             let profile = &out[1];
-            assert!(profile.get("radius").unwrap().values.len() > 40);
+            let radii = &profile.get("radius").unwrap().values;
+            assert!(radii.len() > 40);
+            // Heights are those of the box, whichever way the drop points.
+            for (height, r) in profile.x.as_ref().unwrap().values.iter().zip(radii) {
+                let z = height + 3.0;
+                let up = (if hangs_down { z } else { 20.0 - z } - apex) / radius;
+                let there = shape.iter().find(|p| p.z >= up).filter(|_| up > 0.1 && up < neck);
+                assert!(there.is_none_or(|p| (p.r * radius - r).abs() < 0.2), "{hangs_down} {height}: {r}");
+            }
             assert_eq!(out[2].columns[2].values.len(), 3200);
         }
     }

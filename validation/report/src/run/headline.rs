@@ -1,22 +1,11 @@
 //! The main results of a run, with warnings about them.
 
+mod content;
+
 use super::super::Table;
-use super::super::text::of_lengths;
-use super::series::{self, last_stage};
-use super::{About, Item, Observation, Path, Section, Value, read_json_if_there, with_error};
-use psidpd_formats::Expected;
-use psidpd_observe::Kind;
-use psidpd_observe::drift::drift;
-use psidpd_observe::observation::Column;
-use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
+use super::{About, Item, Observation, Path, Section, Value, read_json_if_there, series, with_error};
+use content::Content;
 use serde::Serialize;
-
-/// With fewer independent rows the error bars themselves are uncertain by a fifth.
-const FEW: f64 = 12.0;
-
-/// The slope of a series is called a drift if it differs from 0 by more than `DRIFT` of its errors, in at least `DRIFTING` rows.
-const DRIFT: f64 = 4.0;
-const DRIFTING: usize = 20;
 
 /// The measured values of a run, the most important first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -60,191 +49,10 @@ pub fn gather(
     table: Option<&series::Table>,
     observables: &[Observation],
 ) -> Headline {
-    let stage = about.and_then(|a| a.stages.last());
-    let mut all = Headline::default();
-    let of_stage = |o: &&Observation| stage.is_none_or(|s| o.stage == s.name) || o.stage.is_empty();
-    let scalar = |from: &[(&str, &str)]| {
-        from.iter().find_map(|(name, column)| {
-            let found = observables.iter().filter(of_stage).find(|o| o.name == *name)?;
-            let found = found.scalar(column).filter(|found| found.value.is_finite())?;
-            Some((found.value, Some(found.error), format!("{name}.{column}")))
-        })
-    };
-    let d = about.map_or(3, |a| a.dimensions);
-    let [per_volume, energy_density, per_area, of_viscosity] =
-        ["1/volume", "energy/volume", "energy/area", "mass/(r_c time)"].map(|unit| of_lengths(unit, d));
-    let mut add = |name: &str, unit: &str, found: Option<(f64, Option<f64>, String)>| {
-        let Some((value, error, source)) = found.filter(|f| f.0.is_finite()) else { return };
-        let expected = about.and_then(|a| a.expected.iter().find(|e| e.name == name));
-        all.values.push(HeadlineValue {
-            name: name.into(),
-            value,
-            error: error.filter(|e| e.is_finite() && *e > 0.0),
-            unit: unit.into(),
-            source,
-            mean_field: expected.and_then(|e: &Expected| e.mean_field),
-            published: expected.and_then(|e| e.published),
-        });
-    };
-    let volume = about.map(About::volume);
-    let mean = particles.zip(volume).map(|(n, v)| (n / v, None, "all particles / volume of the box".into()));
-    add("density", &per_volume, mean);
-    let rows = table.map(|t| last_stage(t, about));
-    let column = |name: &str| {
-        let (table, rows) = table.zip(rows.clone())?;
-        table.get(name)?.get(rows)
-    };
-    let from_rows = |name: &str| {
-        let values = column(name)?;
-        let source = format!("thermo.csv, {}", rows_in_words(values.len()));
-        match estimate(values) {
-            Ok(e) => Some((e.mean, Some(e.error), source)),
-            Err(_) => Some((values.iter().sum::<f64>() / values.len() as f64, None, source)),
-        }
-    };
-    // A flow that body forces drive is no heat.
-    let driven = stage.is_some_and(|s| s.body_forces);
-    let without_flow = driven.then(|| scalar(&[(WITHOUT_FLOW, "mean")])).flatten();
-    let whole = || scalar(&[("temperature", "kinetic")]).or_else(|| from_rows("temperature"));
-    let has_flow = driven && without_flow.is_none();
-    add("temperature", "energy", without_flow.or_else(whole));
-    add("pressure", &energy_density, scalar(&[("pressure", "carried")]).or_else(|| from_rows("pressure")));
-    let both = |c| [("interface_width", c), ("drop", c)];
-    let liquid = ["interface_width", "drop", "pendant", "contact_angle"].map(|name| (name, "liquid"));
-    add("liquid", &per_volume, scalar(&liquid));
-    add("vapour", &per_volume, scalar(&both("vapour")));
-    // Of the two routes to the tension of a slab the one with the smaller error.
-    let routes = ["stress", "free_energy"].map(|route| scalar(&[("surface_tension", route)]));
-    let error = |found: &(f64, Option<f64>, String)| found.1.filter(|e| *e > 0.0).unwrap_or(f64::INFINITY);
-    let tension = routes.into_iter().flatten().min_by(|a, b| error(a).total_cmp(&error(b)));
-    add("tension", &per_area, tension.or_else(|| scalar(&[("drop", "tension"), ("pendant", "tension")])));
-    let width =
-        scalar(&both("width")).map(|(w, error, from)| (w, error, format!("{from}: 2 d of tanh(z/d)")));
-    add("width", "length", width);
-    add("radius", "length", scalar(&[("drop", "radius")]));
-    add("contact_angle", "degree", scalar(&[("contact_angle", "angle")]));
-    add("viscosity", &of_viscosity, scalar(&[("poiseuille", "viscosity"), ("viscosity", "viscosity")]));
-    let others = others(observables.iter().filter(of_stage));
-    for (name, observable, column) in others.into_iter().filter(|(_, o, _)| !driven || o.name != WITHOUT_FLOW)
-    {
-        let source = format!("{}.{}", observable.name, column.name);
-        let value = observable.scalar(&column.name).map(|found| (found.value, Some(found.error), source));
-        add(&name, &of_lengths(&column.unit, d), value);
-    }
-
-    let mut note = |text: String| all.notes.push(text);
-    let thermo =
-        [("temperature", "temperature"), ("potential", "potential energy"), ("pressure", "pressure")];
-    if let Some(rows) = rows.as_ref().filter(|rows| !rows.is_empty()) {
-        let name = stage.map_or("run", |s| s.name.as_str());
-        if rows.len() < MINIMUM_SAMPLES {
-            note(format!(
-                "too short for error bars: {} of thermo.csv in stage \"{name}\", {MINIMUM_SAMPLES} are needed; write \
-                 rows more often (`thermo` in [output]) or make more steps",
-                rows_in_words(rows.len())
-            ));
-        }
-        let few = thermo.iter().filter_map(|(key, title)| {
-            let worth = estimate(column(key)?).ok()?.effective();
-            (worth < FEW).then_some((worth, *title))
-        });
-        if let Some((worth, title)) = few.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            note(format!(
-                "short: stage \"{name}\" has about {:.0} independent values of the {title}, so its error is itself uncertain by \
-                 {:.0} %; make more steps",
-                worth.max(1.0),
-                100.0 / (2.0 * worth.max(1.0)).sqrt()
-            ));
-        }
-    }
-    for (key, title) in thermo {
-        let Some(values) = column(key) else { continue };
-        let rows: Vec<f64> = (0..values.len()).map(|k| k as f64).collect();
-        if let Ok(d) = drift(&rows, values)
-            && d.slope.abs() > DRIFT * d.slope_error
-            && values.len() >= DRIFTING
-        {
-            let over = (values.len() - 1) as f64;
-            note(format!(
-                "drifting: over the last stage the {title} changes by {}; it is not in equilibrium: equilibrate longer, and do \
-                 not trust the errors",
-                with_error(d.slope * over, Some(d.slope_error * over))
-            ));
-        }
-    }
-    let measured = all.values.iter().find(|v| v.name == "temperature");
-    if let (Some(s), Some(t)) =
-        (stage.filter(|s| s.thermostat && !s.integrator.starts_with("monte-carlo")), measured)
-        && let Some(error) = t.error
-        && (t.value - s.kt).abs() > (4.0 * error).max(0.01 * s.kt)
-    {
-        // A flow that body forces or walls drive counts as heat, at any time step.
-        let because = match has_flow {
-            true => "it includes the flow that body forces or moving walls drive; `temperature_profile` in [observe] leaves the flow out".into(),
-            false => format!("a smaller time step than {} brings it nearer", s.dt),
-        };
-        let off = 100.0 * (t.value / s.kt - 1.0);
-        all.notes
-            .push(format!("the temperature is {off:+.1} % off the kT = {} of its stage: {because}", s.kt));
-    }
-    all.notes.extend(about.and_then(|a| image_of_drop(a, &all)));
-    for o in observables.iter().filter(of_stage) {
-        if !o.note.is_empty() && o.x.is_none() {
-            all.notes.push(format!("{}: {}", o.name, o.note));
-        }
-    }
-    all
-}
-
-/// The temperature about the mean flow of slices.
-const WITHOUT_FLOW: &str = "temperature_profile_mean";
-
-/// Scalars that have no name of their own among the results: all coexisting compositions, diffusion coefficients, mean flows and
-/// peaks, and the first number of any other observable.
-fn others<'a>(all: impl Iterator<Item = &'a Observation>) -> Vec<(String, &'a Observation, &'a Column)> {
-    const NAMED: [&str; 8] = [
-        "temperature",
-        "pressure",
-        "interface_width",
-        "drop",
-        "surface_tension",
-        "contact_angle",
-        "poiseuille",
-        "viscosity",
-    ];
-    let scalars =
-        all.filter(|o| o.kind == Kind::Scalar && o.x.is_none() && !NAMED.contains(&o.name.as_str()));
-    let mut found = Vec::new();
-    for observable in scalars {
-        let plain = ["coexistence", "diffusion"].contains(&observable.name.as_str());
-        let whole = plain || observable.name == "velocity_profile_mean" || observable.name.ends_with("_peak");
-        for column in observable.columns.iter().take(if whole { usize::MAX } else { 1 }) {
-            let name = match plain {
-                true => column.name.clone(),
-                // `stress_profile_integral` has the column `integral`.
-                false if observable.name.ends_with(&column.name) => observable.name.clone(),
-                false => format!("{}_{}", observable.name, column.name),
-            };
-            found.push((name, observable, column));
-        }
-    }
-    found
-}
-
-/// The warning about a drop that interacts with its own image through a face of the box.
-fn image_of_drop(about: &About, found: &Headline) -> Option<String> {
-    let value = |name: &str| found.values.iter().find(|v| v.name == name).map(|v| v.value);
-    let reach = about.densities.iter().map(|d| d.range).fold(1.0, f64::max);
-    let extent = 2.0 * value("radius")? + value("width")?;
-    let length = |k: usize| about.box_edges[k].iter().map(|c| c * c).sum::<f64>().sqrt();
-    let narrow = (0..about.dimensions)
-        .filter(|k| about.box_periodic[*k])
-        .map(length)
-        .min_by(f64::total_cmp)
-        .filter(|length| length - extent < reach)?;
-    Some(format!(
-        "the drop touches its image: it is {extent:.2} across with its interface, in a box of {narrow:.2}; use a larger box"
-    ))
+    let content = Content::new(about, particles, table, observables);
+    let values = content.values();
+    let notes = content.notes(&values);
+    Headline { values, notes }
 }
 
 impl Headline {
@@ -296,14 +104,11 @@ impl Headline {
     }
 }
 
-fn rows_in_words(count: usize) -> String {
-    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::content::WITHOUT_FLOW;
     use super::*;
-    use psidpd_formats::AboutStage;
+    use psidpd_formats::{AboutStage, Expected};
 
     fn table(values: &[f64]) -> series::Table {
         let n = values.len();
