@@ -1,6 +1,7 @@
 use super::*;
 use psidpd_core::engine::check_reach;
 use psidpd_dynamics::run::check_memory;
+use psidpd_dynamics::scene::Scene;
 use psidpd_experiments::check::{
     Cost, Findings, Flow, Severity, StepEstimate, Steps, Warning, check, cost, estimates, flow_of_scene,
 };
@@ -51,7 +52,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
     let progress = Progress::new();
     let (mut too_far, mut too_large) = (None, None);
-    let (mut mixtures, mut flow_of_fluid) = (Vec::new(), None);
+    let (mut mixtures, mut flow_of_fluid, mut settling) = (Vec::new(), None, Vec::new());
     let (model, kt, densities, steps, taken) = if document.root().get("model").is_some() {
         let scene = arguments.settings.scene(&arguments.file)?;
         let densities = scene.densities();
@@ -68,6 +69,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
             taken = progress.spinner("trying the scene", || cost(&scene)).ok();
         }
         flow_of_fluid = Some(flow_of_scene(&scene));
+        settling = stages_that_settle(&scene);
         (scene.model.clone(), scene.kt, Some(densities), steps, taken)
     } else {
         let (model, kt) = arguments.settings.model(&arguments.file)?;
@@ -88,7 +90,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     {
         findings.flow = flow;
     }
-    if let Some(warning) = too_long(&findings.steps) {
+    if let Some(warning) = too_long(&findings.steps, &settling) {
         findings.warnings.push(warning);
         findings.warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
     }
@@ -145,10 +147,20 @@ fn remedy(step: &StepEstimate) -> String {
     }
 }
 
-/// A warning about the worst of the time steps that are too long.
-fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
+/// The names of stages that nothing samples and that others follow: what is a little off in them is forgotten.
+fn stages_that_settle(scene: &Scene) -> Vec<String> {
+    let is_sampled =
+        |name: &String| scene.observe.requests.iter().any(|request| request.stages.contains(name));
+    let names = scene.stages.iter().map(|stage| &stage.name);
+    let last = scene.stages.last().map(|stage| &stage.name);
+    names.filter(|name| Some(*name) != last && !is_sampled(name)).cloned().collect()
+}
+
+/// A warning about the worst of the time steps that are too long. Those of stages that settle are if the fluid is far off.
+fn too_long(steps: &[StepEstimate], settling: &[String]) -> Option<Warning> {
     let error = |s: &StepEstimate| s.error.max(s.carried);
-    let worst = steps.iter().filter(|s| error(s) > TOO_LONG).max_by(|a, b| error(a).total_cmp(&error(b)))?;
+    let most = |s: &StepEstimate| if settling.contains(&s.stage) { FAR_OFF } else { TOO_LONG };
+    let worst = steps.iter().filter(|s| error(s) > most(s)).max_by(|a, b| error(a).total_cmp(&error(b)))?;
     Some(Warning {
         id: "time-step",
         severity: Severity::Warning,
@@ -307,19 +319,41 @@ mod tests {
     /// A temperature or a carried pressure that is more than a tenth off is warned of; of several steps the worst.
     #[test]
     fn steps_that_err_by_a_tenth_are_too_long() {
-        assert_eq!(too_long(&[step("a", 0.099, 0.099)]), None);
-        assert_eq!(too_long(&[]), None);
+        assert_eq!(too_long(&[step("a", 0.099, 0.099)], &[]), None);
+        assert_eq!(too_long(&[], &[]), None);
         for (error, carried) in [(0.101, 0.0), (0.0, 0.101)] {
-            assert!(too_long(&[step("a", error, carried)]).is_some());
+            assert!(too_long(&[step("a", error, carried)], &[]).is_some());
         }
         let steps = [step("a", 0.2, 0.1), step("b", 0.01, 0.3), step("c", 0.25, 0.15)];
-        let warning = too_long(&steps).unwrap();
+        let warning = too_long(&steps, &[]).unwrap();
         assert!(warning.id == "time-step" && warning.severity == Severity::Warning);
         let says = "dt = 0.02 of stage \"b\" changes temperatures by about 1.0 % and the pressure of the momentum flux by about \
                     30 % of rho kT: use dt = 0.0054, ";
         assert!(warning.message.starts_with(says), "{}", warning.message);
         let unknown = StepEstimate { one_percent: None, ..step("a", 0.2, 0.1) };
-        assert!(too_long(&[unknown]).unwrap().message.contains("use a shorter step"));
+        assert!(too_long(&[unknown], &[]).unwrap().message.contains("use a shorter step"));
+        // In a stage that settles a third does not matter, and a fluid that does not last does.
+        let settling = ["b".to_owned()];
+        let warning = too_long(&steps, &settling).unwrap();
+        assert!(warning.message.contains("stage \"c\""), "{}", warning.message);
+        assert_eq!(too_long(&[step("b", 0.2, 0.99)], &settling), None);
+        assert!(too_long(&[step("b", f64::INFINITY, f64::INFINITY)], &settling).is_some());
+    }
+
+    /// The first stage of the slab settles; sampled, or alone, it does not.
+    #[test]
+    fn stages_that_nothing_samples_settle() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("m.toml"), include_str!("../../models/warren2003-set6.toml"))
+            .unwrap();
+        let scene = |more: &str| {
+            let text = "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.0\n[[stage]]\nname = \"a\"\nsteps = 5\n\
+                        [[stage]]\nname = \"b\"\nsteps = 5\n[observe]\n";
+            Scene::parse("s", &(text.to_owned() + more), folder.path()).unwrap()
+        };
+        assert_eq!(stages_that_settle(&scene("pressure = true\n")), ["a"]);
+        assert!(stages_that_settle(&scene("pressure = { stages = [\"a\"] }\n")).is_empty());
+        assert_eq!(stages_that_settle(&scene("")), ["a"]);
     }
 
     #[test]
