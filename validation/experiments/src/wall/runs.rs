@@ -188,18 +188,21 @@ mod tests {
         let runs = Runs { sought: &sought, folder: Path::new(""), units };
         let places: Vec<f64> = (0..110).map(|k| 0.2 * f64::from(k) + 0.1).collect();
         let film =
-            |pressure: f64| {
+            |pressure: f64, from: f64| {
+                let ideal = |z: &f64| if (from..10.0).contains(z) { pressure } else { 0.0 };
                 let profile = Observation::new("stress_profile", "", Kind::Profile, &Series::new(1))
                     .against("z", "length", places.clone())
                     .exact("integral", "", places.iter().map(|z| if *z < 10.0 { -3.0 } else { 4.0 }))
-                    .exact("ideal", "", places.iter().map(|z| if *z < 10.0 { pressure } else { 0.0 }));
+                    .exact("ideal", "", places.iter().map(ideal));
                 let whole = Observation::new("stress_profile_integral", "", Kind::Scalar, &Series::new(1))
                     .exact("integral", "", [4.5]);
                 runs.tensions(&Observed(vec![profile, whole]))
             };
-        let found = film(4.2);
+        let found = film(4.2, 0.0);
         assert_eq!((found.liquid.map(|l| l.value), found.vapour.value), (Some(-3.0), 0.5));
         // Less than three quarters of the liquid's: a film that has left.
-        assert!(film(3.2).liquid.is_some() && film(3.1).liquid.is_none());
+        assert!(film(3.2, 0.0).liquid.is_some() && film(3.1, 0.0).liquid.is_none());
+        // The surface of the liquid is as high above the face as its own density would have to be moved.
+        assert!(found.surface.abs() < 1e-9 && (film(4.2, 0.6).surface - 0.6).abs() < 1e-9);
     }
 }
