@@ -176,7 +176,9 @@ impl Style {
         let (unit, mut tally) = (self.scale.energy, *tally);
         for (wall, taken) in self.engine.plan().walls().iter().zip(self.engine.on_walls()) {
             tally.pair -= taken.energy;
-            tally.virial[wall.wall.axis] -= taken.virial;
+            // The fix has faces only.
+            let axis = wall.wall.surface.face().map_or(0, |(axis, _)| axis);
+            tally.virial[axis] -= taken.virial;
         }
         let virial = std::array::from_fn(|k| unit * tally.virial[k] + unit * tally.thermostat_virial[k]);
         Totals { excess: unit * tally.excess, pair: unit * tally.pair, virial, below, above }

@@ -8,7 +8,7 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::pair_sums::COMPONENTS;
 use psidpd_core::engine::{Step, WallBath, faces};
 use psidpd_core::model::Model;
-use psidpd_core::model::wall::Wall;
+use psidpd_core::model::wall::{Surface, Wall};
 use psidpd_core::theory::{drag_without_slip, local_densities_of_matter};
 
 impl Style {
@@ -34,8 +34,7 @@ impl Style {
         let volume = scale.length.powi(model.dimensions() as i32);
         let given = |value: f64, unit: f64| (value >= 0.0).then_some(value / unit);
         let mut made = Wall {
-            axis: wall.axis,
-            high: wall.high,
+            surface: Surface::Face { axis: wall.axis, high: wall.high },
             species: self.species_of_matter(wall)?,
             density: wall.density * volume,
             local_densities: Vec::new(),
@@ -143,8 +142,8 @@ impl Style {
                     let of = (&x, *species, atoms.tag[k]);
                     let Some([after, _]) = bath.act(face, of, mass, dimensions, before) else { continue };
                     let force: [f64; 3] = std::array::from_fn(|c| per_time * (after[c] - before[c]));
-                    let mut d = [0.0; 3];
-                    d[face.wall.wall.axis] = face.inwards * face.distance(&x);
+                    let z = face.place.distance(&x);
+                    let d = face.place.normal(&x).map(|n| z * n);
                     for (w, (a, b)) in virial.iter_mut().zip(COMPONENTS) {
                         *w += scale.energy * 0.5 * (d[a] * force[b] + d[b] * force[a]);
                     }

@@ -9,13 +9,13 @@
 //! F_i   = −Σ_j [(s_i,c(j) + s_j,c(i)) w′(r_ij) + φ′(r_ij)] ê_ij,    s = ∂ψ/∂ñ ρ̃′(n)
 //! F^D_i = −Σ_j γ w_R² (ê_ij·v_ij) ê_ij,    F^R_i = Σ_j σ w_R ξ_ij Δt^(−1/2) ê_ij,    σ² = 2γkT
 //! W     = ½ Σ_i Σ_j r_ij ⊗ F_ij,    r_ij = r_i − r_j
-//! n_w,i += ρ_w ∫ w    U += ρ_w [∫ φ + ψ′_w ∫ w]    W_zz += z F_z    of a wall, at the distance z from its face
+//! n_w,i += ρ_w ∫ w    U += ρ_w [∫ φ + ψ′_w ∫ w]    W += z n ⊗ F    of a wall, at the distance z along its normal n
 //! ```
 
 use crate::engine::{PeriodicBox, Step};
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::pair::PairForm;
-use crate::model::wall::WallField;
+use crate::model::wall::{Surface, WallField};
 use crate::model::{Bounds, ExcessFreeEnergy, Fluid};
 
 /// Energy, densities, forces and virial of one configuration.
@@ -69,11 +69,11 @@ pub fn conservative(
             pair_energy += 0.5 * term.potential.at(r).0;
         }
     });
-    let there = |wall: &&WallField| !domain.periodic()[wall.wall.axis];
+    let there = |wall: &&WallField| wall.wall.surface.face().is_none_or(|(axis, _)| !domain.periodic()[axis]);
     let walls: Vec<&WallField> = fluid.walls.iter().filter(there).collect();
     for (i, wall) in (0..x.len()).flat_map(|i| walls.iter().map(move |wall| (i, wall))) {
         for (d, density) in &wall.fields[species[i]].densities {
-            n[i * variables + d * count + wall.wall.species] += density.at(distance(wall, domain, x[i]))[0];
+            n[i * variables + d * count + wall.wall.species] += density.at(distance(wall, domain, x[i]).0)[0];
         }
     }
     let (mut excess, mut slopes) = (Vec::new(), Vec::new());
@@ -99,7 +99,7 @@ pub fn conservative(
     });
     let mut wall_energy = 0.0;
     for (i, wall) in (0..x.len()).flat_map(|i| walls.iter().map(move |wall| (i, wall))) {
-        let (field, z, axis) = (&wall.fields[species[i]], distance(wall, domain, x[i]), wall.wall.axis);
+        let (field, (z, normal)) = (&wall.fields[species[i]], distance(wall, domain, x[i]));
         let energies = field.energies.iter().map(|energy| energy.at(z));
         let of_densities = field
             .densities
@@ -107,8 +107,10 @@ pub fn conservative(
             .map(|(d, density)| -slopes[i * variables + d * count + wall.wall.species] * density.at(z)[1]);
         let force = of_densities.sum::<f64>() - energies.clone().map(|[_, slope, _]| slope).sum::<f64>();
         wall_energy += energies.map(|[energy, ..]| energy).sum::<f64>();
-        forces[i][axis] += if wall.wall.high { -force } else { force };
-        virial[axis] += z * force;
+        (0..3).for_each(|c| forces[i][c] += force * normal[c]);
+        for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+            virial[k] += z * force * normal[a] * normal[b];
+        }
     }
     Ok(Truth {
         energy: wall_energy + excess.iter().sum::<f64>() + pair_energy,
@@ -119,10 +121,30 @@ pub fn conservative(
     })
 }
 
-/// The distance of a place from the face of a wall.
-fn distance(wall: &WallField, domain: &PeriodicBox, x: [f64; 3]) -> f64 {
-    let (axis, low) = (wall.wall.axis, domain.origin()[wall.wall.axis]);
-    if wall.wall.high { low + domain.lengths()[axis] - x[axis] } else { x[axis] - low }
+/// The distance of a place from the surface of a wall, and the direction from there into the fluid.
+fn distance(wall: &WallField, domain: &PeriodicBox, x: [f64; 3]) -> (f64, [f64; 3]) {
+    match wall.wall.surface {
+        Surface::Face { axis, high } => {
+            let low = domain.origin()[axis];
+            let mut normal = [0.0; 3];
+            normal[axis] = if high { -1.0 } else { 1.0 };
+            (if high { low + domain.lengths()[axis] - x[axis] } else { x[axis] - low }, normal)
+        }
+        Surface::Round(round) => {
+            // The nearest of the images of the centre.
+            let mut d = [0.0; 3];
+            for c in (0..3).filter(|c| round.across[*c]) {
+                let shifts = if domain.periodic()[c] { [-1.0, 0.0, 1.0] } else { [0.0; 3] };
+                let all = shifts.map(|shift| x[c] - round.center[c] - shift * domain.lengths()[c]);
+                d[c] = all.into_iter().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+            }
+            let c = d[0].hypot(d[1]).hypot(d[2]);
+            match round.inside {
+                true => (round.radius - c, d.map(|d| -d / c)),
+                false => (c - round.radius, d.map(|d| d / c)),
+            }
+        }
+    }
 }
 
 /// Drag and noise of one step, with their virial.

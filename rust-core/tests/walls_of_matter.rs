@@ -1,11 +1,11 @@
-//! Walls as half-spaces of matter, in everything that evaluates a fluid.
+//! Walls of matter, plane and round, in everything that evaluates a fluid.
 
 use psidpd_core::engine::noise::threefry2x32;
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{
     Engine, LocalEnergy, Particles, PeriodicBox, Pool, Precision, Request, Settings, Want,
 };
-use psidpd_core::model::wall::Wall;
+use psidpd_core::model::wall::{Round, Surface, Wall};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::truth;
 use std::num::NonZeroUsize;
@@ -62,14 +62,16 @@ fn uniform(k: u32) -> f64 {
     f64::from(threefry2x32::<20>([k, 0], [5, 9])[0]) / 2f64.powi(32)
 }
 
+/// A fluid, and places and species of particles in a box.
+type Setting = (Fluid, Vec<[f64; 3]>, Vec<i32>, PeriodicBox);
+
 /// A fluid between two walls, of the first and of the last species, and particles between them.
-fn between_walls(text: &str) -> (Fluid, Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
+fn between_walls(text: &str) -> Setting {
     let model = Model::parse("m.toml", text).unwrap();
     let (dimensions, last) = (model.dimensions(), model.species().len() - 1);
     let axis = dimensions - 1;
     let wall = |high: bool, species: usize, density: f64| Wall {
-        axis,
-        high,
+        surface: Surface::Face { axis, high },
         species,
         density,
         local_densities: if high { vec![2.0; 3] } else { Vec::new() },
@@ -94,6 +96,52 @@ fn between_walls(text: &str) -> (Fluid, Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
     (fluid, (0..count).map(place).collect(), species, domain)
 }
 
+/// The setting of each test: between two plane walls, in and around a cylinder and a sphere, and in the plane in and around a circle, over
+/// the ends of a box that is periodic.
+fn settings(text: &str) -> Vec<Setting> {
+    let mut all = vec![between_walls(text)];
+    let model = Model::parse("m.toml", text).unwrap();
+    let (dimensions, last) = (model.dimensions(), model.species().len() - 1);
+    let lengths = [4.4, 4.6, if dimensions == 2 { 1.0 } else { 4.5 }];
+    let origin = if dimensions == 2 { [0.5, -1.0, -0.5] } else { [0.5, -1.0, 2.0] };
+    let domain = PeriodicBox::orthogonal(origin, lengths, [true; 3]).unwrap();
+    let across = |along: Option<usize>| [0, 1, 2].map(|c| c < dimensions && Some(c) != along);
+    let shapes = if dimensions == 2 { vec![None] } else { vec![Some(1), None] };
+    for (along, inside) in shapes.into_iter().flat_map(|along| [(along, true), (along, false)]) {
+        let radius = if inside { 1.7 } else { 1.1 };
+        let round = Round { across: across(along), center: [0.8, 3.3, 2.2], radius, inside };
+        let wall = Wall {
+            surface: Surface::Round(round),
+            species: last,
+            density: 4.0,
+            local_densities: vec![2.0; 3],
+            strength: 0.7,
+            velocity: [0.0; 3],
+            drag: [None; 2],
+        };
+        let fluid = model.clone().with_walls(vec![wall]).at(1.0).unwrap();
+        let place = |k: u32| {
+            let mut x = domain.point([uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2)]);
+            if dimensions == 2 {
+                x[2] = 0.0;
+            }
+            x
+        };
+        let is_in_fluid = |x: &[f64; 3]| {
+            let nearest = |c: usize| {
+                let d = x[c] - round.center[c];
+                (-1..=1).map(|k| (d - f64::from(k) * lengths[c]).powi(2)).fold(f64::INFINITY, f64::min)
+            };
+            let square: f64 = (0..3).filter(|c| round.across[*c]).map(nearest).sum();
+            (square.sqrt() < radius) == inside
+        };
+        let x: Vec<[f64; 3]> = (0..).map(place).filter(is_in_fluid).take(110).collect();
+        let species = (0..110).map(|k| k % (last as i32 + 1)).collect();
+        all.push((fluid, x, species, domain.clone()));
+    }
+    all
+}
+
 fn pool() -> Pool {
     Pool::new(NonZeroUsize::new(2).unwrap())
 }
@@ -101,16 +149,15 @@ fn pool() -> Pool {
 /// The sweep in both precisions, the sums over pairs and the evaluation for measurements are the theory written down once.
 #[test]
 fn every_evaluation_is_the_truth() {
-    for text in MODELS {
-        let (fluid, x, species, domain) = between_walls(text);
+    for (fluid, x, species, domain) in MODELS.into_iter().flat_map(settings) {
         let indices: Vec<usize> = species.iter().map(|s| *s as usize).collect();
         let truth = truth::conservative(&fluid, &x, &indices, &domain).unwrap();
         let without = Fluid { walls: Vec::new(), ..fluid.clone() };
         let free = truth::conservative(&without, &x, &indices, &domain).unwrap();
         let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
-        assert!((truth.energy - free.energy).abs() > 1.0, "walls act");
+        assert!((truth.energy - free.energy).abs() > 0.1, "walls act");
         let tag: Vec<i32> = (1..=x.len() as i32).collect();
-        let mut on_walls = [0.0; 2];
+        let mut on_walls = [0.0; 3];
         for (precision, tolerance) in [(Precision::Double, 1e-11), (Precision::Mixed, 3e-5)] {
             for sums in [false, true] {
                 let settings =
@@ -133,7 +180,13 @@ fn every_evaluation_is_the_truth() {
                 for (n, m) in found.iter().zip(&truth.densities) {
                     assert!((n - m).abs() < tolerance * 100.0, "{n} {m}");
                 }
-                on_walls = [0, 1].map(|k| engine.on_walls()[k].force);
+                on_walls = [0.0; 3];
+                for (wall, taken) in fluid.walls.iter().zip(engine.on_walls()) {
+                    (0..3).for_each(|c| on_walls[c] += taken.vector[c]);
+                    if let Some((axis, high)) = wall.wall.surface.face() {
+                        on_walls[axis] += if high { taken.force } else { -taken.force };
+                    }
+                }
             }
         }
         let evaluator = Evaluator::new(fluid).unwrap();
@@ -149,8 +202,10 @@ fn every_evaluation_is_the_truth() {
         // Stretched, it is evaluated anew: what walls add is not among the pairs that are known.
         assert_eq!(evaluator.energy_of_stretched(&pool(), &found, &species, [1.0001, 1.0, 1.0]), None);
         // What the walls give to the fluid is what they get, with the other sign.
-        let given: f64 = truth.forces.iter().map(|f| f[evaluator.fluid.dimensions - 1]).sum();
-        assert!((given - (on_walls[0] - on_walls[1])).abs() < 1e-4 * scale, "{given} {on_walls:?}");
+        for (c, on_walls) in on_walls.into_iter().enumerate() {
+            let given: f64 = truth.forces.iter().map(|f| f[c]).sum();
+            assert!((given + on_walls).abs() < 1e-4 * scale, "{c}: {given} {on_walls}");
+        }
     }
 }
 
@@ -158,8 +213,7 @@ fn every_evaluation_is_the_truth() {
 /// among them.
 #[test]
 fn forces_are_gradients() {
-    for text in MODELS {
-        let (fluid, x, species, domain) = between_walls(text);
+    for (fluid, x, species, domain) in MODELS.into_iter().flat_map(settings) {
         let (axis, jumps) = (fluid.dimensions - 1, fluid.force_jumps());
         let evaluator = Evaluator::new(fluid).unwrap();
         let here = evaluator.evaluate(&pool(), &x, &species, &domain);
@@ -173,9 +227,11 @@ fn forces_are_gradients() {
                 evaluator.evaluate(&pool(), &x, &species, &domain)
             };
             let h = 1e-5;
-            let slope = (moved(axis, h).energy - moved(axis, -h).energy) / (2.0 * h);
-            let force = here.forces[k][axis];
-            assert!((slope + force).abs() < 1e-5 * (1.0 + force.abs()), "{slope} {force}");
+            for c in 0..=axis {
+                let slope = (moved(c, h).energy - moved(c, -h).energy) / (2.0 * h);
+                let force = here.forces[k][c];
+                assert!((slope + force).abs() < 1e-5 * (1.0 + force.abs()), "{slope} {force}");
+            }
             if !jumps {
                 let by = |c: usize| (moved(c, h).forces[k][c] - moved(c, -h).forces[k][c]) / (2.0 * h);
                 let divergence: f64 = (0..=axis).map(by).sum();
@@ -192,8 +248,7 @@ fn forces_are_gradients() {
 /// The changes of energy of trial moves are differences of the energy, before and after moves are accepted.
 #[test]
 fn trial_moves_know_walls() {
-    for text in MODELS {
-        let (fluid, mut x, species, domain) = between_walls(text);
+    for (fluid, mut x, species, domain) in MODELS.into_iter().flat_map(settings) {
         let (axis, mut trials) = (fluid.dimensions - 1, LocalEnergy::new(&fluid).unwrap());
         let evaluator = Evaluator::new(fluid).unwrap();
         let tag: Vec<i32> = (1..=x.len() as i32).collect();
@@ -203,7 +258,10 @@ fn trial_moves_know_walls() {
             let mut to = x[particle];
             to[0] += 0.3 * (uniform(900 + k as u32) - 0.5);
             let [low, high] = [domain.origin()[axis], domain.origin()[axis] + domain.lengths()[axis]];
-            to[axis] = (to[axis] + 0.6 * (uniform(800 + k as u32) - 0.5)).clamp(low, high);
+            to[axis] += 0.6 * (uniform(800 + k as u32) - 0.5);
+            if !domain.periodic()[axis] {
+                to[axis] = to[axis].clamp(low, high);
+            }
             let before = evaluator.energy(&pool(), &x, &species, &domain);
             let found = trials.change(particle, to, 1).unwrap();
             let there = std::mem::replace(&mut x[particle], to);
@@ -223,8 +281,7 @@ fn trial_moves_know_walls() {
 fn a_wall_is_the_mean_of_random_matter() {
     let fluid = Model::parse("m.toml", MODELS[1]).unwrap();
     let wall = Wall {
-        axis: 2,
-        high: false,
+        surface: Surface::Face { axis: 2, high: false },
         species: 0,
         density: 6.05,
         local_densities: vec![2.3],

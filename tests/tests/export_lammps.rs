@@ -614,6 +614,11 @@ fn what_has_no_counterpart_is_refused() {
             "more groups than LAMMPS has",
         ),
         (ONE_SPECIES.replace("steps = 50", "steps = 3000000000"), "more than one run of LAMMPS takes"),
+        (
+            ONE_SPECIES.to_owned()
+                + "[[wall]]\nkind = \"continuum\"\nshape = \"sphere\"\nradius = 1.5\nfluid = \"outside\"\n",
+            "fix dpd/wall has plane walls only",
+        ),
     ];
     for (scene, message) in cases {
         let text = refusal(folder(&scene).path());

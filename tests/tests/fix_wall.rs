@@ -5,7 +5,7 @@
 mod style_common;
 
 use psidpd_core::maximum::largest;
-use psidpd_core::model::wall::Wall;
+use psidpd_core::model::wall::{Surface, Wall};
 use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab};
 use psidpd_tests::{lammps, last_words};
 use std::path::Path;
@@ -17,8 +17,7 @@ const COMMANDS: &str = "fix lo all dpd/wall zlo density 4 type 2 strength 0.8 dr
 
 fn wall(axis: usize, high: bool) -> Wall {
     Wall {
-        axis,
-        high,
+        surface: Surface::Face { axis, high },
         species: 0,
         density: 3.0,
         local_densities: Vec::new(),

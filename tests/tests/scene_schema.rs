@@ -293,7 +293,7 @@ fn the_schema_refuses_unknown_and_missing_keys() {
         "[[part]]\nshape = \"rest\"\nradius = 1",
         "[[body_force]]\nspecies = [\"A\"]",
         "[[stage]]\nsteps = 3",
-        "[[wall]]\nkind = \"continuum\"",
+        "[[wall]]\nfaces = [\"zlo\"]",
         "[[stage]]\nname = \"a\"\nsteps = 3\nkT = [1, 2, 3]",
         "[output]\nthermo = 1.5",
         "[observe]\nrfd = true",

@@ -71,7 +71,7 @@ pub use step::Step;
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, ThreadCount, Times, part};
 pub use wall_drag::WallBath;
-pub use walls::{Face, OnWall, faces};
+pub use walls::{Face, OnWall, Place, faces};
 
 #[cfg(test)]
 mod tests;

@@ -6,7 +6,7 @@ use super::step::Step;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::pair::PairForm;
-use crate::model::wall::{Wall, WallField};
+use crate::model::wall::{Round, Wall, WallField};
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SPARSE;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
@@ -400,24 +400,44 @@ impl ThermostatPlan {
     }
 }
 
-/// Prints what a wall adds at its face.
-fn write_wall(f: &mut fmt::Formatter<'_>, wall: &WallField, species: &[String]) -> fmt::Result {
-    let Wall { axis, high, density, .. } = wall.wall;
-    let (face, matter) =
-        (format!("{}{}", ["x", "y", "z"][axis], if high { "hi" } else { "lo" }), wall.wall.species);
-    writeln!(f, "wall          {face}: {} at a density of {density:.6}", species[matter])?;
+/// Prints what a wall adds at its surface.
+fn write_wall(
+    f: &mut fmt::Formatter<'_>,
+    wall: &WallField,
+    species: &[String],
+    dimensions: usize,
+) -> fmt::Result {
+    let Wall { surface, density, species: matter, .. } = &wall.wall;
+    write!(f, "wall          {}", surface.name(dimensions))?;
+    let place = match surface.round() {
+        None => "face",
+        Some(Round { radius, inside, .. }) => {
+            write!(f, " of radius {radius} with the fluid {}", if *inside { "inside" } else { "outside" })?;
+            "surface"
+        }
+    };
+    writeln!(f, ": {} at a density of {density:.6}", species[*matter])?;
     for (name, field) in species.iter().zip(&wall.fields) {
         let energy: f64 = field.energies.iter().map(|energy| energy.at(0.0)[0]).sum();
-        write!(f, "              {name} at the face: ")?;
-        if !field.densities.is_empty() {
-            write!(f, "local density + {:.4}, ", 0.5 * density)?;
+        write!(f, "              {name} at the {place}: ")?;
+        match surface.round() {
+            _ if field.densities.is_empty() => {}
+            None => write!(f, "local density + {:.4}, ", 0.5 * density)?,
+            Some(_) => {
+                let all = field.densities.iter().map(|(_, density)| format!("{:.4}", density.at(0.0)[0]));
+                write!(f, "local density + {}, ", all.collect::<Vec<_>>().join(" and "))?;
+            }
         }
         write!(f, "energy {energy:+.4} besides psi, range {}; ", field.range)?;
         match &field.friction {
             None => writeln!(f, "no friction")?,
             Some(friction) => {
-                let [along, across] = friction.at(0.0);
-                writeln!(f, "friction {along:.4} along it, {across:.4} across, range {}", friction.range())?;
+                let [along, across, around] = friction.at(0.0);
+                write!(f, "friction {along:.4} along it, {across:.4} across, ")?;
+                if surface.round().is_some_and(|round| round.axis(dimensions).is_some()) {
+                    write!(f, "{around:.4} around, ")?;
+                }
+                writeln!(f, "range {}", friction.range())?;
             }
         }
     }
@@ -500,7 +520,7 @@ impl fmt::Display for Plan {
             }
         }
         for wall in &self.walls {
-            write_wall(f, wall, &self.species)?;
+            write_wall(f, wall, &self.species, *dimensions)?;
         }
         match &self.thermostat {
             None => write!(f, "thermostat    none: no noise is drawn"),

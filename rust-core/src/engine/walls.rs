@@ -1,10 +1,11 @@
-//! Walls: what matter behind faces of the box adds to densities, energies and forces of particles.
+//! Walls: what matter behind faces of the box, and behind cylinders and spheres, adds to densities, energies and forces of particles.
 //!
 //! Each particle is by itself, so that results do not depend on threads.
 
+use super::pair_sums::COMPONENTS;
 use super::particles::Particles;
 use super::plan::Plan;
-use crate::model::wall::{Field, WallField};
+use crate::model::wall::{Field, Round, Surface, WallField};
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::Tally;
 use psidpd_threads::Pool;
@@ -12,12 +13,103 @@ use psidpd_threads::Pool;
 /// What a wall takes in an evaluation.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct OnWall {
-    /// The force on it, away from the fluid.
+    /// The force on it, away from the fluid, added up over its surface.
     pub force: f64,
+    /// The force on a round wall as a vector; that on a face is across it.
+    pub vector: [f64; 3],
     /// The energy of the particles near it, besides that of their ψ.
     pub energy: f64,
     /// The component of its virial across the face, along the line from the particle to the face.
     pub virial: f64,
+}
+
+/// The surface of a wall in a box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// A face.
+    Face {
+        /// The direction across it.
+        axis: usize,
+        /// Its coordinate in this direction.
+        at: f64,
+        /// 1 if the fluid is above the face, −1 if it is below.
+        inwards: f64,
+    },
+    /// A cylinder or a sphere, of which a particle sees the nearest image.
+    Round {
+        /// The surface.
+        round: Round,
+        /// The lengths of the box, infinite along directions without images.
+        periods: [f64; 3],
+    },
+}
+
+impl Place {
+    /// The surface in a box; `None` if the box has no such face.
+    pub fn of(surface: &Surface, domain: &PeriodicBox, dimensions: usize) -> Option<Place> {
+        let (origin, lengths, periodic) = (domain.origin(), domain.lengths(), domain.periodic());
+        match *surface {
+            Surface::Face { axis, .. } if axis >= dimensions || periodic[axis] => None,
+            Surface::Face { axis, high: true } => {
+                Some(Place::Face { axis, at: origin[axis] + lengths[axis], inwards: -1.0 })
+            }
+            Surface::Face { axis, .. } => Some(Place::Face { axis, at: origin[axis], inwards: 1.0 }),
+            Surface::Round(round) => {
+                let period = |c: usize| if periodic[c] { lengths[c] } else { f64::INFINITY };
+                Some(Place::Round { round, periods: [0, 1, 2].map(period) })
+            }
+        }
+    }
+
+    /// The distance of a place from the surface, negative behind it.
+    #[inline(always)]
+    pub fn distance(&self, x: &[f64; 3]) -> f64 {
+        match self {
+            Place::Face { axis, at, inwards } => inwards * (x[*axis] - at),
+            Place::Round { round, periods } => {
+                round.side() * (round.radius - length(from_center(round, periods, x)))
+            }
+        }
+    }
+
+    /// A round surface, and the vector from its axis or centre to a place.
+    pub fn arm(&self, x: &[f64; 3]) -> Option<(&Round, [f64; 3])> {
+        match self {
+            Place::Face { .. } => None,
+            Place::Round { round, periods } => Some((round, from_center(round, periods, x))),
+        }
+    }
+
+    /// The direction into the fluid at the point of the surface that is nearest to a place.
+    pub fn normal(&self, x: &[f64; 3]) -> [f64; 3] {
+        match self {
+            Place::Face { axis, inwards, .. } => {
+                std::array::from_fn(|c| if c == *axis { *inwards } else { 0.0 })
+            }
+            Place::Round { round, periods } => {
+                let d = from_center(round, periods, x);
+                let c = -round.side() * length(d);
+                d.map(|d| d / c)
+            }
+        }
+    }
+}
+
+/// The vector to `x` from the nearest image of the centre, across the surface.
+fn from_center(round: &Round, periods: &[f64; 3], x: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let d = x[c] - round.center[c];
+        let images = (d / periods[c]).round();
+        match (round.across[c], images == 0.0) {
+            (false, _) => 0.0,
+            (true, true) => d,
+            (true, false) => d - images * periods[c],
+        }
+    })
+}
+
+fn length(d: [f64; 3]) -> f64 {
+    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
 }
 
 /// A wall in a box: its place.
@@ -27,31 +119,17 @@ pub struct Face<'a> {
     pub wall: &'a WallField,
     /// Its index among the walls of the fluid.
     pub index: usize,
-    /// The coordinate of the face across it.
-    pub at: f64,
-    /// 1 if the fluid is above the face, −1 if it is below.
-    pub inwards: f64,
+    /// Its surface.
+    pub place: Place,
 }
 
-impl Face<'_> {
-    /// The distance of a place from the face.
-    #[inline(always)]
-    pub fn distance(&self, x: &[f64; 3]) -> f64 {
-        self.inwards * (x[self.wall.wall.axis] - self.at)
-    }
-}
-
-/// The walls that a box has: those at faces of directions that are not periodic.
+/// The walls that a box has: faces of directions that are not periodic, and all round ones.
 pub fn faces<'a>(walls: &'a [WallField], domain: &PeriodicBox, dimensions: usize) -> Vec<Face<'a>> {
-    let (origin, lengths, periodic) = (domain.origin(), domain.lengths(), domain.periodic());
-    let all = walls.iter().enumerate();
-    let has = |wall: &&WallField| wall.wall.axis < dimensions && !periodic[wall.wall.axis];
     let face = |(index, wall): (usize, &'a WallField)| {
-        let (axis, high) = (wall.wall.axis, wall.wall.high);
-        let (at, inwards) = if high { (origin[axis] + lengths[axis], -1.0) } else { (origin[axis], 1.0) };
-        Face { wall, index, at, inwards }
+        let place = Place::of(&wall.wall.surface, domain, dimensions)?;
+        Some(Face { wall, index, place })
     };
-    all.filter(|(_, wall)| has(wall)).map(face).collect()
+    walls.iter().enumerate().filter_map(face).collect()
 }
 
 /// Calls `visit` with the field of every face in whose range a particle is, and its distance.
@@ -63,7 +141,7 @@ pub fn for_each_near<'a>(
     mut visit: impl FnMut(&Face<'a>, &'a Field, f64),
 ) {
     for face in faces {
-        let z = face.distance(x);
+        let z = face.place.distance(x);
         if let Some(field) = face.wall.fields.get(species as usize).filter(|field| z < field.range) {
             visit(face, field, z);
         }
@@ -133,7 +211,14 @@ pub fn add_forces(
     pool.parts(force, |first, force| {
         for (k, sum) in (first..x.len()).zip(force) {
             for_each_near(faces, &x[k], species(k), |face, field, z| {
-                sum[face.wall.wall.axis] += face.inwards * of(k, face, field, z)[0];
+                let force = of(k, face, field, z)[0];
+                match face.place {
+                    Place::Face { axis, inwards, .. } => sum[axis] += inwards * force,
+                    round => {
+                        let n = round.normal(&x[k]);
+                        (0..3).for_each(|c| sum[c] += n[c] * force);
+                    }
+                }
             });
         }
     });
@@ -144,8 +229,17 @@ pub fn add_forces(
             for_each_near(faces, x, species(k), |face, field, z| {
                 let [force, energy] = of(k, face, field, z);
                 tally.pair += energy;
-                tally.virial[face.wall.wall.axis] += z * force;
                 let on_wall = &mut on_walls[face.index];
+                match face.place {
+                    Place::Face { axis, .. } => tally.virial[axis] += z * force,
+                    round => {
+                        let n = round.normal(x);
+                        for (virial, (a, b)) in tally.virial.iter_mut().zip(COMPONENTS) {
+                            *virial += z * force * n[a] * n[b];
+                        }
+                        (0..3).for_each(|c| on_wall.vector[c] -= n[c] * force);
+                    }
+                }
                 on_wall.force += force;
                 on_wall.energy += energy;
                 on_wall.virial += z * force;

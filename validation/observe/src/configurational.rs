@@ -1,7 +1,7 @@
-//! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`; between reflecting faces with weights.
+//! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`; between reflecting surfaces with weights.
 
 use super::frame::Frame;
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{Face, PeriodicBox, Place, faces};
 use psidpd_core::model::Fluid;
 
 /// The edge of a block of space, in ranges of the forces.
@@ -33,11 +33,11 @@ pub fn sums(frame: &Frame) -> [f64; 2] {
     sums
 }
 
-/// The weight of a particle and its gradient: 1, but near reflecting faces the distance from them in ranges of the forces.
+/// The weight of a particle and its gradient: 1, but near reflecting faces and round walls the distance from them in ranges of the forces.
 ///
 /// `kT = ⟨w F·F⟩/⟨−∇·(w F)⟩` holds for any weight that is 0 where space ends. Without a weight a face adds `ρ F` to the divergence,
 /// with the density and the mean outward force of the particles that touch it.
-fn weight(frame: &Frame, range: f64, x: [f64; 3]) -> (f64, [f64; 3]) {
+fn weight(frame: &Frame, rounds: &[Face], range: f64, x: [f64; 3]) -> (f64, [f64; 3]) {
     let domain = frame.view.domain;
     let (mut weight, mut gradient) = (1.0, [0.0; 3]);
     for k in (0..frame.view.dimensions).filter(|k| !domain.periodic()[*k]) {
@@ -48,6 +48,14 @@ fn weight(frame: &Frame, range: f64, x: [f64; 3]) -> (f64, [f64; 3]) {
         gradient[k] = weight * slope;
         weight *= part;
     }
+    for Face { place, .. } in rounds {
+        let distance = place.distance(&x).max(0.0);
+        if distance < range {
+            let (part, n) = (distance / range, place.normal(&x));
+            gradient = std::array::from_fn(|c| part * gradient[c] + weight * n[c] / range);
+            weight *= part;
+        }
+    }
     (weight, gradient)
 }
 
@@ -56,9 +64,11 @@ fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
     let laplacians = evaluation.laplacians(frame.view.pool, &frame.evaluator.fluid);
     let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
+    let mut rounds = faces(&frame.evaluator.fluid.walls, frame.view.domain, frame.view.dimensions);
+    rounds.retain(|wall| matches!(wall.place, Place::Round { .. }));
     for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
-            let (w, gradient) = weight(frame, range, frame.view.x[k]);
+            let (w, gradient) = weight(frame, &rounds, range, frame.view.x[k]);
             let across: f64 = gradient.iter().zip(f).map(|(g, f)| g * f).sum();
             visit(k, [w * f.iter().map(|f| f * f).sum::<f64>(), w * l - across]);
         }

@@ -89,6 +89,9 @@ pub enum Recorded {
     Lines,
 }
 
+/// The components of the force on a wall of matter, and what presses on it across its surface, added up over the surface.
+pub type OnWall = [f64; 4];
+
 #[derive(Debug, Clone, Default)]
 pub struct Flux {
     /// The paths of the particles.
@@ -98,7 +101,7 @@ pub struct Flux {
     /// The positions at which conservative forces acted.
     pub forces: Vec<Acted>,
     /// What friction and reflection give to each wall of matter.
-    pub on_walls: Vec<[f64; 3]>,
+    pub on_walls: Vec<OnWall>,
 }
 
 /// The drag of the pairs in one action of a thermostat, averaged over the step.
@@ -117,7 +120,7 @@ pub struct Acted {
     pub share: f64,
     pub virial: [f64; 6],
     /// The forces on walls of matter.
-    pub on_walls: Vec<[f64; 3]>,
+    pub on_walls: Vec<OnWall>,
     /// The positions of the particles, if they differ from those at the end of the step and lines are recorded.
     pub at: Option<Place>,
 }
@@ -133,11 +136,11 @@ pub struct Place {
 
 impl Flux {
     /// The force on each of so many walls, averaged over the step.
-    pub fn on_walls(&self, count: usize) -> Vec<[f64; 3]> {
-        let mut sums = vec![[0.0; 3]; count];
-        let mut add = |share: f64, forces: &[[f64; 3]]| {
+    pub fn on_walls(&self, count: usize) -> Vec<OnWall> {
+        let mut sums = vec![[0.0; 4]; count];
+        let mut add = |share: f64, forces: &[OnWall]| {
             for (sum, force) in sums.iter_mut().zip(forces) {
-                (0..3).for_each(|c| sum[c] += share * force[c]);
+                (0..4).for_each(|c| sum[c] += share * force[c]);
             }
         };
         self.forces.iter().for_each(|acted| add(acted.share, &acted.on_walls));

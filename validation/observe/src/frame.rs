@@ -176,7 +176,7 @@ enum Part<'a> {
         x: &'a [[f64; 3]],
         displacements: &'a [[f64; 3]],
     },
-    /// The forces of walls, along the lines from their faces to the particles at `x`.
+    /// The forces of walls, along the lines from their surfaces to the particles at `x`.
     Walls {
         acted: &'a Acted,
         evaluation: &'a Evaluation,
@@ -209,9 +209,8 @@ impl Part<'_> {
             Part::Walls { acted, evaluation, x, displacements } => {
                 let lines = evaluation.near_walls.iter().map(|near| {
                     let mut d = displacements.get(near.particle).map_or([0.0; 3], |by| by.map(|by| -by));
-                    d[near.axis] += near.height;
-                    let mut f = [0.0; 3];
-                    f[near.axis] = acted.share * near.force;
+                    d.iter_mut().zip(near.line()).for_each(|(d, line)| *d += line);
+                    let f = near.force().map(|f| acted.share * f);
                     Line { from: x[near.particle], d, f }
                 });
                 Lines::in_blocks(Carrier::Pair, displacements.is_empty(), lines, visit);

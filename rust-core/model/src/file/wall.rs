@@ -3,7 +3,7 @@
 use crate::expression::TooLarge;
 use crate::fluid::{ExcessFreeEnergy, Fluid};
 use crate::pair::PairForm;
-use crate::wall::{Field, Friction, HalfSpace, Wall, WallField};
+use crate::wall::{Field, Friction, MatterIntegral, Surface, Wall, WallField};
 
 /// Why a fluid can have no such wall.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -13,9 +13,17 @@ pub enum NoWall {
         "the model states forces that have no potential, and a wall's force is the gradient of an energy"
     )]
     NotConservative,
-    /// An integral over the half-space is not finite.
-    #[error("the potential between {0} and {1} has no finite integral over a half-space")]
+    /// An integral over the matter is not finite.
+    #[error("the potential between {0} and {1} has no finite integral over the matter of a wall")]
     HardCore(String, String),
+    /// The surface is too round.
+    #[error("a radius of {radius} is smaller than the range {range} of the forces between fluid and wall")]
+    TooRound {
+        /// The radius of the surface.
+        radius: f64,
+        /// The longest range.
+        range: f64,
+    },
     /// ψ of the matter has no finite slope.
     #[error("psi of {species} has no finite slope at the local density {density} of the wall")]
     Response {
@@ -77,15 +85,19 @@ fn response(wall: &Wall, fluid: &Fluid) -> Result<Vec<f64>, NoWall> {
 }
 
 fn field(wall: &Wall, fluid: &Fluid, species: usize, response: &[f64]) -> Result<Field, NoWall> {
-    let (count, dimensions) = (fluid.species.len(), fluid.dimensions);
-    let finite = |field: Option<HalfSpace>| {
+    let (count, dimensions, surface) = (fluid.species.len(), fluid.dimensions, &wall.surface);
+    let finite = |field: Option<MatterIntegral>| {
         let hard = || NoWall::HardCore(fluid.species[species].clone(), fluid.species[wall.species].clone());
         field.ok_or_else(hard)
     };
     let (mut densities, mut energies) = (Vec::new(), Vec::new());
     for (d, density) in fluid.densities.iter().enumerate() {
         let w = &density.kernel;
-        let of = |factor| finite(HalfSpace::of(dimensions, w.range(), factor, |r| (w.value(r), w.slope(r))));
+        check_radius(surface, w.range())?;
+        let of = |factor| {
+            let weight = |r: f64| (w.value(r), w.slope(r));
+            finite(MatterIntegral::behind(surface, dimensions, w.range(), factor, weight))
+        };
         densities.push((d, of(wall.density)?));
         let slope = response[d * count + species];
         if slope != 0.0 {
@@ -95,10 +107,12 @@ fn field(wall: &Wall, fluid: &Fluid, species: usize, response: &[f64]) -> Result
     for term in fluid.pairs.iter().filter(|term| term.acts(species, wall.species, 0.0)) {
         let phi = &term.potential;
         let amount = wall.density * wall.strength;
-        energies.push(finite(HalfSpace::of(dimensions, phi.range(), amount, |r| phi.at(r)))?);
+        check_radius(surface, phi.range())?;
+        energies
+            .push(finite(MatterIntegral::behind(surface, dimensions, phi.range(), amount, |r| phi.at(r)))?);
     }
     let ranges =
-        densities.iter().map(|(_, field)| field.range()).chain(energies.iter().map(HalfSpace::range));
+        densities.iter().map(|(_, field)| field.range()).chain(energies.iter().map(MatterIntegral::range));
     let range = ranges.fold(0.0, f64::max);
     let drag = match (fluid.thermostats[species * count + wall.species], wall.drag) {
         (Some(own), [gamma, range]) => {
@@ -108,21 +122,32 @@ fn field(wall: &Wall, fluid: &Fluid, species: usize, response: &[f64]) -> Result
         (None, [None, _]) => None,
     };
     let drag = drag.filter(|[gamma, range, _]| *gamma > 0.0 && *range > 0.0);
-    let friction = drag.map(|drag| Friction::of(dimensions, wall.density, drag));
+    if let Some([_, range, _]) = drag {
+        check_radius(surface, range)?;
+    }
+    let friction = drag.map(|drag| Friction::of(surface, dimensions, wall.density, drag));
     Ok(Field { range, densities, energies, friction })
+}
+
+/// A particle must see one side of a round surface, not all of it.
+fn check_radius(surface: &Surface, range: f64) -> Result<(), NoWall> {
+    match surface.round() {
+        Some(round) if round.radius < range => Err(NoWall::TooRound { radius: round.radius, range }),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Model;
+    use crate::wall::Round;
 
     const WARREN: &str = include_str!("../../../../validation/models/warren2003-set6.toml");
 
     fn wall(species: usize) -> Wall {
         Wall {
-            axis: 2,
-            high: false,
+            surface: Surface::Face { axis: 2, high: false },
             species,
             density: 6.05,
             local_densities: Vec::new(),
@@ -187,6 +212,13 @@ mod tests {
             bind_wall(&wall(0), &fluid).unwrap_err()
         };
         assert_eq!(refused(stated), NoWall::NotConservative);
+        let round = |radius: f64| {
+            let round = Round { across: [true; 3], center: [0.0; 3], radius, inside: false };
+            let surface = Surface::Round(round);
+            bind_wall(&Wall { surface, ..wall(0) }, &Model::parse("m.toml", WARREN).unwrap().at(1.0).unwrap())
+        };
+        assert_eq!(round(0.99).unwrap_err(), NoWall::TooRound { radius: 0.99, range: 1.0 });
+        assert!(round(1.0).is_ok());
         assert!(matches!(refused(singular), NoWall::Response { .. }));
         assert!(matches!(refused(hard), NoWall::HardCore(..)));
     }

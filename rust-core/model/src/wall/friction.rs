@@ -1,13 +1,14 @@
-//! The tensor of friction against a half-space of matter.
+//! The tensor of friction against the matter of a wall.
 
-use super::half_space::tensor;
+use super::integral::tensor;
+use super::surface::Surface;
 
-/// The tensor of friction by the distance from the face.
+/// The tensor of friction by the distance from the surface.
 #[derive(Debug, Clone)]
 pub struct Friction {
     range: f64,
-    /// The components along the face and across it at equal distances.
-    nodes: Vec<[f64; 2]>,
+    /// The components at equal distances.
+    nodes: Vec<[f64; 3]>,
 }
 
 /// By how much a fluid slips further than Brinkman's equation says, in ranges R: a constant, as next to a wall it has half of its
@@ -23,16 +24,19 @@ const MOST_CARRIED: f64 = 20.0;
 const INTERVALS: usize = 256;
 
 impl Friction {
-    /// The friction of matter of a number density by drag with the coefficient γ, the range and the exponent of `w_R`.
-    pub fn of(dimensions: usize, density: f64, [gamma, range, exponent]: [f64; 3]) -> Friction {
+    /// The friction of matter of a number density behind a surface, by drag with the coefficient γ, the range and the exponent of `w_R`.
+    pub fn of(
+        surface: &Surface,
+        dimensions: usize,
+        density: f64,
+        [gamma, range, exponent]: [f64; 3],
+    ) -> Friction {
         let weight = |r: f64| {
             let w = (1.0 - r / range).max(0.0);
             if exponent == 1.0 { w * w } else { w.powf(2.0 * exponent) }
         };
-        let node = |k: usize| {
-            let z = range * k as f64 / INTERVALS as f64;
-            tensor(dimensions, range, z, weight).map(|sum| density * gamma * sum)
-        };
+        let tensor = tensor(surface, dimensions, range, weight);
+        let node = |k: usize| tensor(range * k as f64 / INTERVALS as f64).map(|sum| density * gamma * sum);
         Friction { range, nodes: (0..=INTERVALS).map(node).collect() }
     }
 
@@ -41,15 +45,16 @@ impl Friction {
         self.range
     }
 
-    /// The components along the face and across it at the distance `z`, in mass over time.
-    pub fn at(&self, z: f64) -> [f64; 2] {
+    /// The components along the surface, across it and around it at the distance `z`, in mass over time. Along a cylinder is along its
+    /// axis; other surfaces have one component along them, and none of its own around them.
+    pub fn at(&self, z: f64) -> [f64; 3] {
         if z >= self.range {
-            return [0.0; 2];
+            return [0.0; 3];
         }
         let at = z.max(0.0) / self.range * INTERVALS as f64;
         let k = (at as usize).min(INTERVALS - 1);
         let t = at - k as f64;
-        [0, 1].map(|c| self.nodes[k][c] + t * (self.nodes[k + 1][c] - self.nodes[k][c]))
+        [0, 1, 2].map(|c| self.nodes[k][c] + t * (self.nodes[k + 1][c] - self.nodes[k][c]))
     }
 
     /// How far behind the face a flow in a fluid of this viscosity and density extrapolates to the velocity of the wall, by
@@ -94,13 +99,17 @@ impl Friction {
 
 #[cfg(test)]
 mod tests {
+    use super::super::integral::tests::sum_over_points;
+    use super::super::surface::Round;
     use super::*;
+
+    const FLAT: Surface = Surface::Face { axis: 0, high: false };
 
     /// The usual weight has a closed form: `ζ_zz = ρ_w γ ∫_z^1 2πh² [−ln h − 2(1 − h) + (1 − h²)/2] dh`, and the trace
     /// `ρ_w γ ∫_z^1 2π [1/12 − h²/2 + 2h³/3 − h⁴/4] dh`.
     #[test]
     fn friction_of_the_usual_weight_has_its_closed_form() {
-        let friction = Friction::of(3, 3.0, [4.5, 1.0, 1.0]);
+        let friction = Friction::of(&FLAT, 3, 3.0, [4.5, 1.0, 1.0]);
         for z in [0.0f64, 0.1, 0.25, 0.5, 0.8] {
             let steps = 20000;
             let h = (1.0 - z) / f64::from(steps);
@@ -111,12 +120,12 @@ mod tests {
                 across += h * two_pi * t * t * (-t.ln() - 2.0 * (1.0 - t) + 0.5 * (1.0 - t * t));
                 trace += h * two_pi * (1.0 / 12.0 - t * t / 2.0 + 2.0 * t.powi(3) / 3.0 - t.powi(4) / 4.0);
             }
-            let [along, found] = friction.at(z);
+            let [along, found, _] = friction.at(z);
             assert!(
                 (found - 13.5 * across).abs() < 1e-4 && (2.0 * along + found - 13.5 * trace).abs() < 1e-4
             );
         }
-        assert_eq!(friction.at(1.0), [0.0; 2]);
+        assert_eq!(friction.at(1.0), [0.0; 3]);
     }
 
     /// Sums of `γ w_R² r̂ r̂` over a fine grid of points behind the face, in the plane and in space, for three exponents.
@@ -125,7 +134,7 @@ mod tests {
         let (range, gamma, density) = (1.3, 2.5, 4.0);
         for dimensions in [2, 3] {
             for exponent in [0.25, 1.0, 1.5] {
-                let friction = Friction::of(dimensions, density, [gamma, range, exponent]);
+                let friction = Friction::of(&FLAT, dimensions, density, [gamma, range, exponent]);
                 for z in [0.0, 0.2, 0.7, 1.1] {
                     let (steps, mut sums) = (1000, [0.0; 2]);
                     let h = range / f64::from(steps);
@@ -162,7 +171,8 @@ mod tests {
             let of = |mass: f64, length: f64, energy: f64| {
                 let time = length * (mass / energy).sqrt();
                 let per_volume = length.powi(-(dimensions as i32));
-                let friction = Friction::of(dimensions, 3.0 * per_volume, [4.5 * mass / time, length, 1.0]);
+                let friction =
+                    Friction::of(&FLAT, dimensions, 3.0 * per_volume, [4.5 * mass / time, length, 1.0]);
                 let viscosity = 0.9 * energy * time * per_volume;
                 friction.factor_without_slip(viscosity, 3.0 * per_volume, [0.7 * energy, 1.5 * mass])
             };
@@ -181,7 +191,7 @@ mod tests {
     /// weak the momentum that the face takes is ρ∫ζ u, and the length of slip η/ρ∫ζ less the mean place of the friction.
     #[test]
     fn one_strength_has_no_slip() {
-        let friction = Friction::of(3, 6.05, [18.0, 1.0, 1.0]);
+        let friction = Friction::of(&FLAT, 3, 6.05, [18.0, 1.0, 1.0]);
         let (eta, rho, kt, mass) = (7.8, 6.05, 0.7, 3.0);
         let factor = friction.factor_without_slip(eta, rho, [kt, mass]);
         let surplus = SURPLUS[0] + SURPLUS[1] * kt / mass * (mass * rho / eta).powi(2);
@@ -195,5 +205,34 @@ mod tests {
         let expected = eta / (weak * rho * sum) - place / sum;
         assert!((friction.slip(eta, rho, weak) / expected - 1.0).abs() < 1e-3);
         assert!(friction.slip(eta, rho, 1e6) < -0.5);
+    }
+
+    /// Sums of `γ w_R² r̂ r̂` over fine points behind round surfaces: along the axis, across the surface and around it.
+    #[test]
+    fn friction_of_round_walls_is_what_a_sum_over_points_is() {
+        for (dimensions, directions) in [(2, 2), (3, 3), (3, 2)] {
+            for (radius, inside) in [(1.0, true), (1.6, true), (1.0, false), (1.6, false)] {
+                let across = [true, true, directions == 3];
+                let surface = Surface::Round(Round { across, center: [0.0; 3], radius, inside });
+                let friction = Friction::of(&surface, dimensions, 4.0, [2.5, 1.0, 1.0]);
+                for z in [0.0, 0.2, 0.6] {
+                    let mut sums = [0.0; 3];
+                    sum_over_points(dimensions, &surface, z, |d, r, weight| {
+                        let weight = 10.0 * weight * (1.0 - r).powi(2);
+                        (0..3).for_each(|c| sums[c] += weight * (d[c] / r).powi(2));
+                    });
+                    if directions == 3 {
+                        sums[2] *= 0.5;
+                    }
+                    if directions == dimensions {
+                        sums[0] = sums[2];
+                    }
+                    for (found, sum) in friction.at(z).into_iter().zip(sums) {
+                        let off = (found - sum).abs() / friction.at(0.0)[0];
+                        assert!(off < 2e-3, "{dimensions}-D {surface:?} {z}: {found} {sum}");
+                    }
+                }
+            }
+        }
     }
 }

@@ -1,6 +1,6 @@
-//! Walls as a continuum: a half-space of matter behind a face of the box.
+//! Walls as a continuum: matter behind a face of the box, or outside or inside of a cylinder or a sphere.
 //!
-//! Matter of density ρ_w adds to the local densities of a particle, and to its energy, what integrals over the half-space say:
+//! Matter of density ρ_w adds to the local densities of a particle, and to its energy, what integrals over the matter say:
 //!
 //! ```text
 //! n_w,i += ρ_w ∫ w        U_i = ρ_w [s ∫ φ + Σ_d ∂ψ_w/∂n_d ∫ w_d]
@@ -11,18 +11,18 @@
 //! `ζ = ρ_w γ ∫ w_R² r̂ r̂`: Revenga, Zúñiga, Español and Pagonabarraga, Int. J. Mod. Phys. C 9, 1319 (1998).
 
 mod friction;
-mod half_space;
+mod integral;
+mod surface;
 
 pub use friction::{Friction, SURPLUS};
-pub use half_space::HalfSpace;
+pub use integral::MatterIntegral;
+pub use surface::{Round, Surface};
 
-/// Matter behind a face of the box. Faces of directions that are periodic have no walls.
+/// Matter behind a surface. Faces of directions that are periodic have no walls.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wall {
-    /// The direction across the face.
-    pub axis: usize,
-    /// Whether it is the upper face.
-    pub high: bool,
+    /// The surface of the matter.
+    pub surface: Surface,
     /// Index of the species of the matter.
     pub species: usize,
     /// The number density of the matter.
@@ -32,7 +32,7 @@ pub struct Wall {
     pub local_densities: Vec<f64>,
     /// Factor of the pair potentials between particle and matter.
     pub strength: f64,
-    /// The velocity of the matter, along the face.
+    /// The velocity of the matter, along its surface.
     pub velocity: [f64; 3],
     /// Drag coefficient and range between particle and matter, in place of those of the model.
     pub drag: [Option<f64>; 2],
@@ -53,9 +53,9 @@ pub struct Field {
     /// The range of densities and energy.
     pub range: f64,
     /// Additions to local densities, each with the index of its density; all are densities of the species of the matter.
-    pub densities: Vec<(usize, HalfSpace)>,
+    pub densities: Vec<(usize, MatterIntegral)>,
     /// Parts of the energy.
-    pub energies: Vec<HalfSpace>,
+    pub energies: Vec<MatterIntegral>,
     /// The friction; `None` without drag.
     pub friction: Option<Friction>,
 }

@@ -70,12 +70,24 @@ pub struct NearWall {
     pub wall: usize,
     /// The species of the particle.
     pub species: usize,
-    /// The direction across the face.
-    pub axis: usize,
-    /// The distance from the face; negative below an upper face.
-    pub height: f64,
-    /// The force on the particle, along the axis.
-    pub force: f64,
+    /// The distance from the surface.
+    pub distance: f64,
+    /// The direction from the surface to the particle.
+    pub normal: [f64; 3],
+    /// The force on the particle in this direction.
+    pub push: f64,
+}
+
+impl NearWall {
+    /// The vector from the nearest point of the surface to the particle.
+    pub fn line(&self) -> [f64; 3] {
+        self.normal.map(|n| self.distance * n)
+    }
+
+    /// The force on the particle.
+    pub fn force(&self) -> [f64; 3] {
+        self.normal.map(|n| self.push * n)
+    }
 }
 
 impl Evaluator {
@@ -109,8 +121,11 @@ impl Evaluator {
         let mut near_walls = Vec::new();
         self.for_each_near_wall(&faces, x, species, &psi, |near, of_wall| {
             energy += of_wall;
-            virial[near.axis] += near.height * near.force;
-            forces[near.particle][near.axis] += near.force;
+            let (line, force) = (near.line(), near.force());
+            for (virial, (a, b)) in virial.iter_mut().zip(COMPONENTS) {
+                *virial += line[a] * force[b];
+            }
+            (0..3).for_each(|c| forces[near.particle][c] += force[c]);
             near_walls.push(near);
         });
         Evaluation { energy, densities, forces, virial, psi, excess, planes, near_walls, range, reach }
@@ -174,10 +189,9 @@ impl Evaluator {
                 let slope = |d: usize| {
                     psi.slopes.get(particle * variables + d * count + face.wall.wall.species).copied()
                 };
-                let [force, energy] = walls::force_and_energy(field, z, slope);
-                let (axis, wall, species) = (face.wall.wall.axis, face.index, *kind as usize);
-                let (height, force) = (face.inwards * z, face.inwards * force);
-                visit(NearWall { particle, wall, species, axis, height, force }, energy);
+                let [push, energy] = walls::force_and_energy(field, z, slope);
+                let (wall, species, normal) = (face.index, *kind as usize, face.place.normal(x));
+                visit(NearWall { particle, wall, species, distance: z, normal, push }, energy);
             });
         }
     }

@@ -48,15 +48,20 @@ impl Evaluation {
         let (variables, kinds) = (fluid.variables(), fluid.species.len());
         for near in &self.near_walls {
             let wall = &fluid.walls[near.wall];
-            let (row, z) = (near.particle * (1 + 3 * variables), near.height.abs());
+            let (row, z) = (near.particle * (1 + 3 * variables), near.distance);
             let field = &wall.fields[near.species];
+            // ∇²H = H″ + H′ ∇·n.
+            let divergence = wall.wall.surface.divergence(z);
             for (d, density) in &field.densities {
                 let [_, slope, curvature] = density.at(z);
                 let v = d * kinds + wall.wall.species;
-                sums[row] += times(self.psi.slopes[near.particle * variables + v], curvature);
-                sums[row + 1 + 3 * v + near.axis] += slope * near.height.signum();
+                let laplacian = curvature + divergence * slope;
+                sums[row] += times(self.psi.slopes[near.particle * variables + v], laplacian);
+                (0..3).for_each(|c| sums[row + 1 + 3 * v + c] += slope * near.normal[c]);
             }
-            sums[row] += field.energies.iter().map(|energy| energy.at(z)[2]).sum::<f64>();
+            for [_, slope, curvature] in field.energies.iter().map(|energy| energy.at(z)) {
+                sums[row] += curvature + divergence * slope;
+            }
         }
     }
 }

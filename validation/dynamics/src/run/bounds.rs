@@ -1,10 +1,11 @@
 //! The region in which a particle needs neither wrapping nor reflection, and the faces around it.
 
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{PeriodicBox, Place, faces};
+use psidpd_core::model::wall::WallField;
 
 /// The inside of a box: the coordinates that [`PeriodicBox::wrap`] does not change along periodic directions,
 /// and those between walls along the others.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bounds {
     /// The lowest and the highest coordinate inside. A tilted box has no such interval, so none of its
     /// coordinates count as inside.
@@ -12,7 +13,16 @@ pub(super) struct Bounds {
     pub high: [f64; 3],
     /// The directions with reflecting faces, which are those that are not periodic. The box must have edges along the axes.
     walls: [bool; 3],
+    /// Cylinders and spheres of matter.
+    pub rounds: Surfaces,
 }
+
+/// The round surfaces of walls in a box, with the numbers of the walls.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Surfaces(Vec<(usize, Place)>);
+
+/// How far behind a round surface a place still counts as on it, in radii: rounding leaves it there.
+const ON_SURFACE: f64 = 1e-9;
 
 /// Number of floating-point numbers below the upper face that are tried.
 const TRIES: usize = 64;
@@ -20,7 +30,12 @@ const TRIES: usize = 64;
 impl Bounds {
     /// The bounds of a box; the third direction of two-dimensional models has no walls.
     pub fn of(domain: &PeriodicBox, dimensions: usize) -> Bounds {
-        let mut bounds = Bounds { low: [f64::NEG_INFINITY; 3], high: [f64::INFINITY; 3], walls: [false; 3] };
+        let mut bounds = Bounds {
+            low: [f64::NEG_INFINITY; 3],
+            high: [f64::INFINITY; 3],
+            walls: [false; 3],
+            rounds: Surfaces::default(),
+        };
         let (origin, lengths) = (domain.origin(), domain.lengths());
         let edges = [0, 1, 2].map(|k| domain.edge(k));
         let leans = (0..3).any(|k| (0..3).any(|c| c != k && edges[k][c] != 0.0));
@@ -39,7 +54,7 @@ impl Bounds {
     }
 
     pub fn has_walls(&self) -> bool {
-        self.walls.contains(&true)
+        self.walls.contains(&true) || !self.rounds.is_empty()
     }
 
     /// The directions with reflecting faces.
@@ -49,7 +64,7 @@ impl Bounds {
 
     /// Whether a place is beyond a face.
     pub fn has_escaped(&self, x: &[f64; 3]) -> bool {
-        self.walls().any(|k| !(self.low[k]..=self.high[k]).contains(&x[k]))
+        self.walls().any(|k| !(self.low[k]..=self.high[k]).contains(&x[k])) || self.rounds.is_in_matter(x)
     }
 
     /// Mirrors a coordinate beyond a face to the inside, at the faces in turn.
@@ -57,6 +72,39 @@ impl Bounds {
         let (low, length) = (self.low[k], self.high[k] - self.low[k]);
         let s = (x - low).rem_euclid(2.0 * length);
         low + s.min(2.0 * length - s)
+    }
+}
+
+impl Surfaces {
+    /// Those of `walls`.
+    pub fn of(walls: &[WallField], domain: &PeriodicBox) -> Surfaces {
+        let all = faces(walls, domain, 3).into_iter().map(|face| (face.index, face.place));
+        Surfaces(all.filter(|(_, place)| matches!(place, Place::Round { .. })).collect())
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &Place)> {
+        self.0.iter().map(|(wall, place)| (*wall, place))
+    }
+
+    /// Whether a place is in the matter of a round wall, further behind its surface than rounding leads.
+    pub fn is_in_matter(&self, x: &[f64; 3]) -> bool {
+        let radius = |place: &Place| place.arm(x).map_or(0.0, |(round, _)| round.radius);
+        self.0.iter().any(|(_, place)| place.distance(x) < -ON_SURFACE * radius(place))
+    }
+
+    /// Mirrors a place in the matter of a round wall at its surface.
+    pub fn mirror(&self, x: &mut [f64; 3]) {
+        for (_, place) in &self.0 {
+            let z = place.distance(x);
+            if z < 0.0 {
+                let n = place.normal(x);
+                (0..3).for_each(|c| x[c] -= 2.0 * z * n[c]);
+            }
+        }
     }
 }
 

@@ -20,6 +20,7 @@ mod monte_carlo;
 mod order;
 mod rates;
 mod resume;
+mod round;
 mod steps;
 
 const VAN_DER_WAALS: &str = r#"

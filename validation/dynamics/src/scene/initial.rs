@@ -115,14 +115,14 @@ fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox),
     let common = Common::of(root, model, &domain)?;
     let parts = match parts {
         Some(parts) => common.parts(&parts)?,
-        None => vec![common.fill(root, WHOLE.to_owned(), common.shapes.whole())?],
+        None => vec![common.fill(root, WHOLE.to_owned(), common.shapes.free())?],
     };
     Ok((Initial::Parts(parts), domain))
 }
 
 fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Result<Part, FileError> {
     let shape = match kind {
-        "random" | "lattice" => common.shapes.whole(),
+        "random" | "lattice" => common.shapes.free(),
         "slab" | "sphere" => common.shapes.read(kind, key, section)?,
         "cylinder" if common.shapes.dimensions == 3 => common.shapes.read(kind, key, section)?,
         _ => return Err(key.error(common.shapes.unknown("kind", kind, KINDS))),

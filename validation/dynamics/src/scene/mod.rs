@@ -166,6 +166,7 @@ impl Scene {
         scene.check_noise(&root)?;
         scene.check_trials(&root)?;
         scene.check_room(document)?;
+        scene.check_walls(&root)?;
         Ok(scene)
     }
 
@@ -239,6 +240,21 @@ impl Scene {
         let fills = (part.shape.volume(self.model.dimensions()) / volume - 1.0).abs() < 1e-9;
         (fills && self.domain.periodic()[..self.model.dimensions()].iter().all(|p| *p))
             .then(|| part.count as f64 / volume)
+    }
+
+    /// Refuses particles that start in the matter of a round wall.
+    fn check_walls(&self, root: &Section) -> Result<(), FileError> {
+        let fluid = self.model.at(self.kt)?;
+        let bounds = crate::run::Surfaces::of(&fluid.walls, &self.domain);
+        if bounds.is_empty() {
+            return Ok(());
+        }
+        let state = self.initial_state();
+        let Some(k) = state.x.iter().position(|x| bounds.is_in_matter(x)) else { return Ok(()) };
+        let message = format!("particle {} starts in the matter of a round wall", state.tag[k]);
+        Err(root.require("wall")?.error(message).with_help(
+            "parts that stay away from it: shape = \"cylinder\" or \"sphere\" of its radius for a fluid inside, shape = \"rest\" for one outside",
+        ))
     }
 
     /// Refuses parts without room for their particles at the minimum distance.

@@ -2,7 +2,9 @@
 
 use super::number::vector;
 use super::shape::Shapes;
-use super::{Arrangement, Composition, FileError, Model, PeriodicBox, Section, Shape, Value, Velocities};
+use super::{
+    Arrangement, Composition, FileError, Model, PeriodicBox, Section, Shape, Value, Velocities, wall,
+};
 
 const MOST_PARTICLES: f64 = 1e8;
 
@@ -37,7 +39,9 @@ impl<'a> Common<'a> {
     /// Collects the shared data of the scene `root`.
     pub fn of(root: &Section, model: &'a Model, domain: &'a PeriodicBox) -> Result<Common<'a>, FileError> {
         let density = root.get("density").map(|value| value.positive()).transpose()?;
-        Ok(Common { model, shapes: Shapes { dimensions: model.dimensions(), domain }, density })
+        let dimensions = model.dimensions();
+        let rounds = wall::rounds(root, dimensions, domain)?;
+        Ok(Common { model, shapes: Shapes { dimensions, domain, rounds }, density })
     }
 
     /// Reads the particles of a region, except whether they are frozen; `name` is the name of the part.
@@ -133,7 +137,7 @@ impl<'a> Common<'a> {
         }
         let all: Vec<Shape> = shapes.iter().filter(|s| !is_rest(s)).cloned().collect();
         if let Shape::Rest { others, .. } = &mut shapes[first] {
-            *others = all;
+            others.extend(all);
         }
         let (rest, whole) =
             (shapes[first].volume(self.shapes.dimensions), self.shapes.domain.volume(self.shapes.dimensions));

@@ -262,7 +262,8 @@ fn is_steady(frequencies: &[f64]) -> bool {
 
 /// On one thread: a piece is too small for more.
 fn simulation(model: &Model, kt: f64, state: State, seed: u64) -> Result<Simulation, RunError> {
-    let mut run = Simulation::new(model, kt, state, seed)?;
+    // A piece is far from all walls.
+    let mut run = Simulation::new(&model.clone().with_walls(Vec::new()), kt, state, seed)?;
     run.set_settings(Settings { threads: NonZeroUsize::MIN, ..run.settings() })?;
     Ok(run)
 }

@@ -5,7 +5,7 @@ use crate::ExperimentError;
 use crate::liquid::Trouble;
 use crate::seek::{Goal, Next, PAIRS, Point, line, next};
 use psidpd_core::model::pair::PairForm as _;
-use psidpd_core::model::wall::HalfSpace;
+use psidpd_core::model::wall::MatterIntegral;
 use psidpd_core::model::{Fluid, PairTerm};
 use psidpd_observe::Measured;
 use serde::Serialize;
@@ -16,7 +16,7 @@ pub fn attracts(fluid: &Fluid) -> bool {
     let dimensions = fluid.dimensions;
     let of = |term: &PairTerm| {
         let phi = &term.potential;
-        HalfSpace::of(dimensions, phi.range(), 1.0, |r| phi.at(r))
+        MatterIntegral::of(dimensions, phi.range(), 1.0, |r| phi.at(r))
     };
     let Some(parts) = fluid.pairs.iter().map(of).collect::<Option<Vec<_>>>() else { return false };
     let places = (0..PLACES).map(|k| f64::from(k) / f64::from(PLACES) * fluid.cutoff());

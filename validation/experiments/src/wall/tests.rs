@@ -231,7 +231,7 @@ fn scenes_have_the_wall() {
         let scene = parsed(&Setting::film(strength, 100.0, &units));
         let fluid = scene.model.at(0.7).unwrap();
         let [lower, upper] = &fluid.walls[..] else { panic!("{:?}", fluid.walls) };
-        assert!((!lower.wall.high) && upper.wall.high);
+        assert_eq!([lower, upper].map(|wall| wall.wall.surface.face().unwrap().1), [false, true]);
         assert_eq!(
             [lower.wall.density, lower.wall.strength, upper.wall.strength],
             [0.75, strength, strength]

@@ -17,7 +17,7 @@ impl Meter for Temperature {
                 (`output.md`). `configurational` is ⟨Σ F·F⟩/⟨−Σ ∇·F⟩ with the conservative forces alone \
                 (Rugh; Butler et al., J. Chem. Phys. 109, 6519 (1998)), with ∇·F from the second derivatives of ψ, \
                 kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \
-                Within the range of the forces from a reflecting face a particle counts with w, its distance from the face in \
+                Within the range of the forces from a reflecting face or a round wall a particle counts with w, its distance from the face in \
                 ranges, ⟨Σ w F·F⟩/⟨−Σ ∇·(w F)⟩: where space ends the plain ratio is too high. \
                 At large time steps the two temperatures err differently. There is no configurational temperature for a force that is not a gradient, for one that jumps at its range (the linear kernel), and in boxes narrower \
                 than twice the range.",

@@ -1,26 +1,54 @@
 use super::*;
-use crate::options::FACES;
+use psidpd_core::model::wall::Surface;
 
 /// The force on walls of matter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WallForce {
     dimensions: usize,
-    /// The name of each wall's face, and its direction.
-    faces: Vec<(String, usize)>,
-    /// The components of the force per area on each wall.
+    walls: Vec<Measured>,
+    /// What is measured of each wall, wall by wall.
     series: Series,
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Measured {
+    name: String,
+    area: f64,
+    is_round: bool,
+}
+
 const AXES: [&str; 3] = ["x", "y", "z"];
+
+impl Measured {
+    fn of(surface: &Surface, domain: &PeriodicBox, dimensions: usize) -> Measured {
+        use std::f64::consts::PI;
+        let area = match surface {
+            Surface::Face { axis, .. } => domain.volume(dimensions) / domain.height(*axis),
+            Surface::Round(round) => match (round.directions(), round.axis(dimensions)) {
+                (3, _) => 4.0 * PI * round.radius * round.radius,
+                (_, Some(axis)) => 2.0 * PI * round.radius * domain.height(axis),
+                _ => 2.0 * PI * round.radius,
+            },
+        };
+        Measured { name: surface.name(dimensions), area, is_round: surface.round().is_some() }
+    }
+
+    /// What is measured: the names, and their places among the components of [`crate::flux::OnWall`].
+    fn columns(&self, dimensions: usize) -> impl Iterator<Item = (&'static str, usize)> + use<> {
+        let normal = self.is_round.then_some(("normal", 3));
+        AXES.into_iter().zip(0..dimensions).chain(normal)
+    }
+}
 
 impl Meter for WallForce {
     const TABLE: Table = Table {
         path: "wall_force",
         title: "force on walls of matter",
         about: "The force per area on each wall of the scene (`[[wall]]`), component by component: all momentum that the wall has \
-                taken in the step over its length, by conservative forces, drag, noise and reflection at its face. Across the \
-                wall it is the pressure of the fluid, along it the stress of the flow; all walls together take what body forces \
-                give to a steady flow.",
+                taken in the step over its length, by conservative forces, drag, noise and reflection at its surface. Across a \
+                face it is the pressure of the fluid, along it the stress of the flow; all walls together take what body forces \
+                give to a steady flow. A cylinder or a sphere has `normal` too, the mean of what presses on it across its surface: \
+                the pressure of the fluid. Several cylinders are `cylinder_1`, `cylinder_2` …, in the order of the scene.",
         ..PLAIN
     };
 
@@ -28,29 +56,32 @@ impl Meter for WallForce {
     const OF_MOTION: bool = true;
 
     fn read(options: &Options) -> Result<WallForce, FileError> {
-        let walls = &options.place.fluid.walls;
+        let (walls, dimensions) = (&options.place.fluid.walls, options.place.fluid.dimensions);
         if walls.is_empty() {
             return Err(options.value.error("the scene has no [[wall]]"));
         }
-        let name = |axis: usize, high: bool| {
-            let name = FACES.iter().find(|(_, face)| *face == (axis, high)).map_or("", |(name, _)| name);
-            (name.to_owned(), axis)
-        };
-        let dimensions = options.place.fluid.dimensions;
-        let faces: Vec<_> = walls.iter().map(|wall| name(wall.wall.axis, wall.wall.high)).collect();
-        let series = Series::new(3 * faces.len());
-        Ok(WallForce { dimensions, faces, series })
+        let of = |surface: &Surface| Measured::of(surface, options.place.domain, dimensions);
+        let mut walls: Vec<Measured> = walls.iter().map(|wall| of(&wall.wall.surface)).collect();
+        for name in ["cylinder", "sphere"] {
+            let named: Vec<usize> = (0..walls.len()).filter(|k| walls[*k].name == name).collect();
+            if named.len() > 1 {
+                named.into_iter().zip(1..).for_each(|(k, number)| walls[k].name = format!("{name}_{number}"));
+            }
+        }
+        let width = walls.iter().map(|wall| wall.columns(dimensions).count()).sum();
+        Ok(WallForce { dimensions, walls, series: Series::new(width) })
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
         let Some(flux) = frame.view.flux else { return false };
-        let domain = frame.view.domain;
-        let forces = flux.on_walls(self.faces.len());
-        let pressures = forces.iter().zip(&self.faces).flat_map(|(force, (_, axis))| {
-            let area = frame.volume() / domain.height(*axis);
-            force.map(|f| f / area)
-        });
-        self.series.push(&pressures.collect::<Vec<f64>>())
+        let forces = flux.on_walls(self.walls.len());
+        let of = |(force, wall): (&[f64; 4], &Measured)| {
+            let per_area: Vec<f64> =
+                wall.columns(self.dimensions).map(|(_, k)| force[k] / wall.area).collect();
+            per_area
+        };
+        let all: Vec<f64> = forces.iter().zip(&self.walls).flat_map(of).collect();
+        self.series.push(&all)
     }
 
     fn series(&mut self) -> Vec<&mut Series> {
@@ -59,14 +90,12 @@ impl Meter for WallForce {
 
     fn finish(&self) -> Vec<Observation> {
         let mut out = Observation::new("wall_force", "Force on walls per area", Kind::Scalar, &self.series);
-        for (k, (face, _)) in self.faces.iter().enumerate() {
-            for c in 0..self.dimensions {
-                out = out.column(
-                    &format!("{face}_{}", AXES[c]),
-                    "energy/volume",
-                    [self.series.mean(3 * k + c)],
-                );
-            }
+        let columns = self
+            .walls
+            .iter()
+            .flat_map(|wall| wall.columns(self.dimensions).map(|(what, _)| format!("{}_{what}", wall.name)));
+        for (k, name) in columns.enumerate() {
+            out = out.column(&name, "energy/volume", [self.series.mean(k)]);
         }
         vec![out]
     }

@@ -149,7 +149,14 @@ pub fn drift<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: 
 where
     R: Fn(f64, f64, f64, f64) -> (f64, f64) + Copy,
 {
-    let before = Before { first: part.first, x: part.x, v: part.v, f: part.f, species: part.species };
+    let before = Before {
+        first: part.first,
+        x: part.x,
+        v: part.v,
+        f: part.f,
+        species: part.species,
+        image: part.image,
+    };
     let bounces = around.faces.met(before, over_mass, rule);
     vectors::run_best(Drift { part, over_mass, around, rule });
     if !bounces.is_empty() {
@@ -180,10 +187,26 @@ fn reflect(part: &mut Part, around: Surroundings, bounces: &[Bounce]) {
         if faces.records {
             let mass = faces.mass[part.species[k] as usize];
             let mut legs = faces.legs(bounces, part.x[k], part.v[k], part.f[k].map(|f| f / mass));
-            legs.iter_mut().for_each(|leg| leg.particle += part.first);
+            let is_round = bounces.iter().any(|bounce| bounce.wall.is_some());
+            for leg in &mut legs {
+                leg.particle += part.first;
+                if is_round {
+                    around.domain.wrap(&mut leg.to, &mut [0; 3]);
+                }
+            }
             part.legs.append(&mut legs);
-            part.hits
-                .extend(bounces.iter().map(|b| Hit { direction: b.direction, momentum: mass * b.given }));
+            part.hits.extend(bounces.iter().map(|b| b.hit(mass)));
+        }
+        for bounce in bounces.iter().filter(|bounce| bounce.wall.is_some()) {
+            part.image[k][bounce.direction] = bounce.image;
+        }
+        if !faces.bounds.rounds.is_empty() {
+            around.domain.wrap(&mut part.x[k], &mut part.image[k]);
+            // It met two surfaces, which are a range apart, or more.
+            if faces.bounds.rounds.is_in_matter(&part.x[k]) {
+                let first = part.first + k;
+                part.faults.escaped = Some(part.faults.escaped.map_or(first, |other| other.min(first)));
+            }
         }
     }
 }

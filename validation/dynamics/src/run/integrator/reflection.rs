@@ -1,4 +1,4 @@
-//! Particles that meet reflecting faces in a drift.
+//! Particles that meet reflecting faces, or the round surfaces of walls, in a drift.
 //!
 //! A drift moves particles with the velocity of the step, which has a share of the kick by the present forces in it and lacks the
 //! rest. To mirror what is beyond a face and to reverse its velocity would be a leapfrog over the kink of the potential, which
@@ -8,6 +8,8 @@
 
 use crate::run::bounce::{Arc, fly};
 use crate::run::bounds::Bounds;
+use crate::run::round::{self, fly_beside};
+use psidpd_core::engine::Place;
 
 /// The drift of a step, in which the present forces are held.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -72,13 +74,16 @@ pub struct Before<'a> {
     pub v: &'a [[f64; 3]],
     pub f: &'a [[f64; 3]],
     pub species: &'a [i32],
+    pub image: &'a [[i32; 3]],
 }
 
-/// A particle that meets a face.
+/// A particle that meets a face; one that meets a round surface has a bounce for each direction across it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounce {
     pub particle: usize,
     pub direction: usize,
+    /// The round wall that it met.
+    pub wall: Option<usize>,
     /// Place and velocity of the step at the end, and the velocity of the path; `None` if it moved further than across the box.
     pub end: Option<[f64; 3]>,
     /// The velocity that the faces have given.
@@ -89,6 +94,18 @@ pub struct Bounce {
     start: f64,
     /// The way of the particle, with the places of the step at its ends and the velocities that carry momentum; empty if ways are not recorded.
     arcs: Vec<Arc>,
+    /// How often it had crossed the box at the start.
+    pub image: i32,
+    /// The velocity across a round surface that it has given, in one of the bounces.
+    push: f64,
+}
+
+impl Bounce {
+    pub fn hit(&self, mass: f64) -> Hit {
+        let (momentum, push) =
+            (mass * self.given, mass * if self.wall.is_some() { self.push } else { self.given.abs() });
+        Hit { wall: self.wall, direction: self.direction, momentum, push }
+    }
 }
 
 /// A straight part of a particle's way, from `to − d`, with the velocity that carries its momentum.
@@ -100,11 +117,14 @@ pub struct Leg {
     pub u: [f64; 3],
 }
 
-/// The momentum that faces have given to a particle in a direction.
+/// The momentum that faces, or a round wall, have given to a particle in a direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
+    pub wall: Option<usize>,
     pub direction: usize,
     pub momentum: f64,
+    /// Its part across the surface, into the fluid.
+    pub push: f64,
 }
 
 impl Faces<'_> {
@@ -153,11 +173,103 @@ impl Faces<'_> {
                     arc.given += v + ahead * a;
                 }
                 let given = flown.map_or(0.0, |end| end.given);
-                bounces.push(Bounce { particle: k, direction: c, end, given, beyond, start: x[c], arcs });
+                let (wall, image, push) = (None, before.image[k][c], 0.0);
+                bounces.push(Bounce {
+                    particle: k,
+                    direction: c,
+                    wall,
+                    end,
+                    given,
+                    beyond,
+                    start: x[c],
+                    arcs,
+                    image,
+                    push,
+                });
             }
         }
+        for (wall, place) in self.bounds.rounds.iter() {
+            self.met_round((wall, place), before, over_mass, &rule, &mut bounces);
+        }
         bounces.sort_by_key(|bounce| bounce.particle);
+        // Surfaces that are round are a range or more from all others.
+        for of_one in bounces.chunk_by_mut(|a, b| a.particle == b.particle) {
+            for k in 1..of_one.len() {
+                if of_one[..k].iter().any(|other| other.direction == of_one[k].direction) {
+                    of_one[k].end = None;
+                }
+            }
+        }
         bounces
+    }
+
+    /// Adds the bounces of particles that meet a round surface.
+    fn met_round<R>(
+        &self,
+        (wall, place): (usize, &Place),
+        before: Before,
+        over_mass: &[f64],
+        rule: &R,
+        bounces: &mut Vec<Bounce>,
+    ) where
+        R: Fn(f64, f64, f64, f64) -> (f64, f64),
+    {
+        let Path { time, kicked, shift, ahead } = self.path;
+        for (k, (x, (v, (f, s)))) in
+            before.x.iter().zip(before.v.iter().zip(before.f.iter().zip(before.species))).enumerate()
+        {
+            let Some((surface, arm)) = place.arm(x) else { continue };
+            let distance = place.distance(x);
+            let across =
+                |of: &dyn Fn(usize) -> f64| [0, 1, 2].map(|c| if surface.across[c] { of(c) } else { 0.0 });
+            let moved = [0, 1, 2].map(|c| rule(x[c], v[c], f[c], over_mass[*s as usize]));
+            let a = across(&|c| f[c] / self.mass[*s as usize]);
+            let waits = distance <= round::NEAR * surface.radius;
+            let beyond = across(&|c| if waits { self.beyond(before.first + k, c) } else { 0.0 });
+            let u = across(&|c| moved[c].1 - kicked * a[c]);
+            // All from the place of the step at the start.
+            let from = across(&|c| beyond[c] - shift * a[c]);
+            let to = across(&|c| moved[c].0 - x[c]);
+            let middle = across(&|c| from[c] + 0.5 * time * u[c]);
+            let end = across(&|c| from[c] + time * (u[c] + 0.5 * time * a[c]));
+            let reach = [from, to, middle, end].map(round::square).into_iter().fold(0.0, f64::max).sqrt();
+            if distance > reach && beyond == [0.0; 3] {
+                continue;
+            }
+            let mut arcs: [Vec<Arc>; 3] = Default::default();
+            let show = |arc: round::Arc| {
+                for c in (0..3).filter(|c| self.records && surface.across[*c]) {
+                    let given = arc.given[c] + moved[c].1 + ahead * a[c];
+                    let x = x[c] + (arc.arm[c] - arm[c]);
+                    arcs[c].push(Arc { time: arc.time, x, u: arc.u[c], a: arc.a[c], given });
+                }
+            };
+            let start = across(&|c| arm[c] + from[c]);
+            let flown = fly_beside(surface, start, u, a, time, show);
+            let is_inside =
+                surface.side() * (surface.radius.powi(2) - round::square(across(&|c| arm[c] + to[c]))) >= 0.0;
+            if is_inside && beyond == [0.0; 3] && flown.is_some_and(|end| end.push == 0.0) {
+                continue;
+            }
+            let placed = across(&|c| flown.map_or(0.0, |end| end.arm[c]) + self.path.shift_at_end() * a[c]);
+            let inside = round::clamp(surface, placed);
+            let mut push = flown.map_or(0.0, |end| end.push);
+            for c in (0..3).filter(|c| surface.across[*c]) {
+                let end = flown.map(|end| [x[c] + (inside[c] - arm[c]), moved[c].1 + end.given[c], end.u[c]]);
+                bounces.push(Bounce {
+                    particle: k,
+                    direction: c,
+                    wall: Some(wall),
+                    end,
+                    given: flown.map_or(0.0, |end| end.given[c]),
+                    beyond: placed[c] - inside[c],
+                    start: x[c],
+                    arcs: std::mem::take(&mut arcs[c]),
+                    image: before.image[k][c],
+                    push: std::mem::take(&mut push),
+                });
+            }
+        }
     }
 
     fn beyond(&self, particle: usize, direction: usize) -> f64 {

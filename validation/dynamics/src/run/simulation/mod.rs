@@ -78,7 +78,11 @@ impl Simulation {
         let particles = Particles::new(state, fluid.species.len(), fluid.dimensions)?;
         let domain = &particles.now().domain;
         check_reach(domain, fluid.dimensions, fluid.cutoff(), particles.now().len())?;
-        let motion = Motion::within(domain, fluid.dimensions);
+        let motion = Motion::within(domain, &fluid);
+        if let Some(k) = particles.now().x.iter().position(|x| motion.bounds.rounds.is_in_matter(x)) {
+            let fault = format!("particle {} starts in the matter of a wall", particles.now().tag[k]);
+            return Err(RunError::State(fault));
+        }
         let forces = Forces::new(model, kt)?;
         Ok(Simulation {
             particles,

@@ -72,7 +72,7 @@ impl Simulation {
         let most = max_move.or(self.monte_carlo.found).unwrap_or(start).min(longest);
         let (number, kt) = (self.number, self.kt());
         let failed = |source| RunError::Engine { step: number, source };
-        let bounds = self.motion.bounds;
+        let bounds = self.motion.bounds.clone();
         let Simulation { particles, external, monte_carlo, .. } = self;
         let (state, _) = particles.motion(true);
         let frozen = &external.frozen;
@@ -122,8 +122,7 @@ impl Simulation {
     /// that [`Simulation::degrees_of_freedom`] counts.
     pub(in crate::run) fn draw_velocities(&mut self, random: &mut ChaCha8Rng) {
         let (kt, dimensions) = (self.kt(), self.dimensions());
-        let conserved = self.frozen().is_empty() && !self.rubs();
-        let conserved = self.particles.now().domain.periodic().map(|periodic| conserved && periodic);
+        let conserved = self.conserved();
         let Simulation { particles, external, .. } = self;
         let frozen = &external.frozen;
         let state = particles.now();

@@ -3,11 +3,12 @@
 //! A kick that ends a step may be deferred: if the next step begins with the same kick and a drift, one loop
 //! makes both, with the same bits.
 
-use super::super::bounds::Bounds;
+use super::super::bounds::{Bounds, Surfaces};
 use super::super::integrator::parts::{Faults, Kept, Moved, Moving, Part, Surroundings, drift, kick, share};
 use super::super::integrator::reflection::{Beyond, Faces, Path};
 use super::{RunError, Simulation};
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Fluid;
 
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
@@ -25,9 +26,11 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    pub fn within(domain: &PeriodicBox, dimensions: usize) -> Motion {
+    pub fn within(domain: &PeriodicBox, fluid: &Fluid) -> Motion {
+        let mut bounds = Bounds::of(domain, fluid.dimensions);
+        bounds.rounds = Surfaces::of(&fluid.walls, domain);
         Motion {
-            bounds: Bounds::of(domain, dimensions),
+            bounds,
             kept: Kept::default(),
             deferred: None,
             held: None,
@@ -94,7 +97,7 @@ impl Simulation {
         }
     }
 
-    /// Puts particles at `x + c f/m` for an evaluation of forces, mirrored at the faces of the box; [`Simulation::step_back`]
+    /// Puts particles at `x + c f/m` for an evaluation of forces, mirrored at faces and round surfaces; [`Simulation::step_back`]
     /// follows.
     pub(super) fn displace(&mut self, c: f64) {
         self.moving(None, c, true, |part, over_mass, around| {
@@ -107,6 +110,7 @@ impl Simulation {
                     bounds.walls().for_each(|c| to[c] = bounds.fold(c, to[c]));
                     around.domain.wrap(to, &mut [0; 3]);
                 }
+                bounds.rounds.mirror(to);
             }
         });
         self.step_back();

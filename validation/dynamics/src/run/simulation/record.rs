@@ -4,7 +4,7 @@ use super::{Simulation, State};
 use crate::integrator::Integrator;
 use crate::run::integrator::reflection::{Hit, Leg, Path};
 use psidpd_core::engine::thermostat::{Pull, Pulls};
-use psidpd_observe::flux::{Acted, Drag, Flux, Line, Place, Recorded};
+use psidpd_observe::flux::{Acted, Drag, Flux, Line, OnWall, Place, Recorded};
 use std::sync::Arc;
 
 /// The transport of momentum in the present step, whose length is `dt`.
@@ -128,34 +128,45 @@ impl Simulation {
     }
 
     /// The conservative forces on the walls in the last evaluation.
-    fn forces_of_fluid_on_walls(&self) -> Vec<[f64; 3]> {
+    fn forces_of_fluid_on_walls(&self) -> Vec<OnWall> {
         let engine = self.engine();
         let walls = engine.plan().walls().iter().zip(engine.on_walls());
         walls
             .map(|(wall, taken)| {
-                let mut on_wall = [0.0; 3];
-                on_wall[wall.wall.axis] = if wall.wall.high { taken.force } else { -taken.force };
+                let [x, y, z] = taken.vector;
+                let mut on_wall = [x, y, z, taken.force];
+                if let Some((axis, high)) = wall.wall.surface.face() {
+                    on_wall[axis] = if high { taken.force } else { -taken.force };
+                }
                 on_wall
             })
             .collect()
     }
 
     /// Records the friction of walls, and what they are `given` by it.
-    pub(super) fn record_friction(&mut self, drag: Arc<Drag>, given: &[[f64; 3]]) {
+    pub(super) fn record_friction(&mut self, drag: Arc<Drag>, given: &[OnWall]) {
         if let Some(record) = &mut self.record {
             record.flux.drag.push(drag);
             add_to_walls(&mut record.flux.on_walls, given);
         }
     }
 
-    /// Records the momentum that `hits` give to walls: the direction of each, and the momentum of the particle.
+    /// Records the momentum that `hits` give to walls.
     pub(super) fn record_hits(&mut self, hits: &[Hit]) {
         let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
-        let mut given = vec![[0.0; 3]; self.engine().plan().walls().len()];
-        for (wall, given) in self.engine().plan().walls().iter().zip(&mut given) {
-            let wall = &wall.wall;
-            let here = |hit: &&Hit| hit.direction == wall.axis && (hit.momentum < 0.0) == wall.high;
-            given[wall.axis] -= over_dt * hits.iter().filter(here).map(|hit| hit.momentum).sum::<f64>();
+        let mut given = vec![[0.0; 4]; self.engine().plan().walls().len()];
+        for (index, (wall, given)) in self.engine().plan().walls().iter().zip(&mut given).enumerate() {
+            let here = |hit: &&Hit| match (wall.wall.surface.face(), hit.wall) {
+                (Some((axis, high)), None) => hit.direction == axis && (hit.momentum < 0.0) == high,
+                (None, Some(wall)) => wall == index,
+                _ => false,
+            };
+            let mut sums = [0.0; 4];
+            for hit in hits.iter().filter(here) {
+                sums[hit.direction] += hit.momentum;
+                sums[3] -= hit.push;
+            }
+            *given = sums.map(|sum| -over_dt * sum);
         }
         if let Some(record) = &mut self.record {
             add_to_walls(&mut record.flux.on_walls, &given);
@@ -181,10 +192,10 @@ impl Simulation {
     }
 }
 
-fn add_to_walls(sums: &mut Vec<[f64; 3]>, given: &[[f64; 3]]) {
-    sums.resize(given.len(), [0.0; 3]);
+fn add_to_walls(sums: &mut Vec<OnWall>, given: &[OnWall]) {
+    sums.resize(given.len(), [0.0; 4]);
     for (sum, given) in sums.iter_mut().zip(given) {
-        (0..3).for_each(|c| sum[c] += given[c]);
+        (0..4).for_each(|c| sum[c] += given[c]);
     }
 }
 

@@ -14,14 +14,9 @@ impl Simulation {
     }
 
     /// Number of degrees of freedom of the kinetic energy: `d` for each mobile particle, less one for each
-    /// direction along which the total momentum is conserved. Frozen particles and the friction of walls break all
-    /// conservation, faces that of the direction across them.
+    /// direction along which the total momentum is conserved.
     pub fn degrees_of_freedom(&self) -> usize {
-        let periodic = self.particles.now().domain.periodic();
-        let conserved = match self.frozen().is_empty() && !self.rubs() {
-            true => periodic[..self.dimensions()].iter().filter(|p| **p).count(),
-            false => 0,
-        };
+        let conserved = self.conserved()[..self.dimensions()].iter().filter(|c| **c).count();
         (self.dimensions() * self.mobile()).saturating_sub(conserved)
     }
 

@@ -48,7 +48,7 @@ impl Simulation {
         };
         let mut virial = [0.0; 6];
         let (mut drag, mut lines) = ([0.0; 6], Vec::new());
-        let mut given = vec![[0.0; 3]; forces.engine.plan().walls().len()];
+        let mut given = vec![[0.0; 4]; forces.engine.plan().walls().len()];
         for (k, v) in before.into_iter().enumerate().filter(|(k, _)| moves(*k)) {
             let mut v = v;
             for face in &faces {
@@ -56,13 +56,14 @@ impl Simulation {
                 let per_time = state.mass[state.species[k] as usize] / dt;
                 let force: [f64; 3] = std::array::from_fn(|c| per_time * (after[c] - v[c]));
                 let of_drag = lost.map(|lost| -per_time * lost);
-                let mut d = [0.0; 3];
-                d[face.wall.wall.axis] = face.inwards * face.distance(&state.x[k]);
+                let (z, normal) = (face.place.distance(&state.x[k]), face.place.normal(&state.x[k]));
+                let d = normal.map(|n| z * n);
                 for (c, (a, b)) in COMPONENTS.into_iter().enumerate() {
                     virial[c] += 0.5 * (d[a] * force[b] + d[b] * force[a]);
                     drag[c] += 0.5 * (d[a] * of_drag[b] + d[b] * of_drag[a]);
                 }
                 (0..3).for_each(|c| given[face.index][c] -= force[c]);
+                given[face.index][3] += (0..3).map(|c| normal[c] * force[c]).sum::<f64>();
                 lines.push(Line { from: state.x[k], d, f: of_drag });
                 v = after;
             }
@@ -79,6 +80,15 @@ impl Simulation {
     /// Whether a wall moves.
     pub fn has_moving_walls(&self) -> bool {
         self.engine().plan().walls().iter().any(|wall| wall.wall.velocity != [0.0; 3])
+    }
+
+    /// The directions along which the total momentum is conserved: frozen particles and the friction of walls break all conservation,
+    /// faces that of the direction across them, and so do round surfaces.
+    pub(super) fn conserved(&self) -> [bool; 3] {
+        let (free, surfaces) = (self.frozen().is_empty() && !self.rubs(), self.engine().plan().walls());
+        let round = |c: usize| surfaces.iter().any(|w| w.wall.surface.round().is_some_and(|r| r.across[c]));
+        let periodic = self.particles.now().domain.periodic();
+        std::array::from_fn(|c| free && periodic[c] && !round(c))
     }
 
     /// Whether a wall of the box has friction.

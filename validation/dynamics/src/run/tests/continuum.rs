@@ -5,7 +5,7 @@ use crate::run::runner::{Begin, Runner};
 use crate::run::tests::resume::{assert_same, finished, until};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{PeriodicBox, faces};
-use psidpd_core::model::wall::{SURPLUS, Wall};
+use psidpd_core::model::wall::{SURPLUS, Surface, Wall};
 use psidpd_observe::Recorded;
 use psidpd_observe::frame::{Frame, View};
 use std::num::NonZeroUsize;
@@ -71,8 +71,7 @@ fn energy_between_walls_is_conserved_to_second_order() {
 fn noise_of_a_wall_has_the_covariance_of_its_friction() {
     let (kt, dt, mass) = (0.7, 0.3, 1.7);
     let wall = Wall {
-        axis: 2,
-        high: true,
+        surface: Surface::Face { axis: 2, high: true },
         species: 0,
         density: 3.0,
         local_densities: Vec::new(),
@@ -90,7 +89,7 @@ fn noise_of_a_wall_has_the_covariance_of_its_friction() {
         run.prepare_for(Integrator::VelocityVerlet, dt, Want::FORCES).unwrap();
         run.step(dt, Integrator::VelocityVerlet, Want::FORCES).unwrap();
         let walls = run.engine().plan().walls();
-        let [along, across] = walls[0].fields[0].friction.as_ref().unwrap().at(height);
+        let [along, across, _] = walls[0].fields[0].friction.as_ref().unwrap().at(height);
         let v = &run.state().v;
         let mean = |f: &dyn Fn(&[f64; 3]) -> f64| v.iter().map(f).sum::<f64>() / v.len() as f64;
         let zeta = [along, along, across];
@@ -191,8 +190,7 @@ fn friction_of_a_wall_is_in_the_pressure() {
     let (mass, dt, z) = (3.0, 0.3, 0.2);
     for high in [false, true] {
         let wall = Wall {
-            axis: 1,
-            high,
+            surface: Surface::Face { axis: 1, high },
             species: 0,
             density: 3.0,
             local_densities: Vec::new(),
@@ -219,7 +217,7 @@ fn friction_of_a_wall_is_in_the_pressure() {
             run.record_flux(Recorded::Lines);
             run.prepare_for(integrator, dt, Want::TOTALS).unwrap();
             let friction = run.engine().plan().walls()[0].fields[1].friction.clone().unwrap();
-            let [along, across] = friction.at(z);
+            let [along, across, _] = friction.at(z);
             let zeta = [along, across, along];
             for step in 0..3 {
                 run.step(dt, integrator, Want::TOTALS).unwrap();
@@ -423,7 +421,11 @@ fn walls_are_read_and_refused() {
             .unwrap();
     let walls = read.model.walls();
     assert_eq!(walls.len(), 2);
-    assert!(walls[1].high && walls[1].species == 1 && (walls[1].density - 3.0).abs() < 1e-12);
+    assert!(
+        walls[1].surface.face() == Some((2, true))
+            && walls[1].species == 1
+            && (walls[1].density - 3.0).abs() < 1e-12
+    );
     let drag = walls[0].drag[0].unwrap();
     let fluid = read.model.at(1.0).unwrap();
     let friction = fluid.walls[0].fields[0].friction.as_ref().unwrap();

@@ -6,18 +6,40 @@ use super::scene::{
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
-use crate::scene::wall::KINDS;
+use crate::scene::wall::{FLUIDS, KINDS, SHAPES};
 
 pub const WALL: Table = Table::array("wall",
-    "Walls as a continuum: a half-space of matter behind a reflecting face, which costs no particles and has no layers or pits. A \
-     particle in front of it has the local densities and the energy that integrals over the matter say, the matter's own ψ responds to \
+    "Walls as a continuum: matter behind a reflecting face, around a cylinder or a sphere, or in one, which costs no particles and has \
+     no layers or pits. A particle in front of it has the local densities and the energy that integrals over the matter say, the matter's own ψ responds to \
      first order, and drag and noise against it are a friction by the distance from the face. See `docs/walls.md`.",
     &[
-        key("kind", Choice(|| names(KINDS)), REQUIRED, "`continuum`: matter of one density that fills the half-space.",
+        key("kind", Choice(|| names(KINDS)), REQUIRED, "`continuum`: matter of one density that fills all that is behind the surface.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\nspecies = \"A\"\ndensity = 3.0"),
-        key("faces", Names, REQUIRED,
-            "The faces of the box behind which the matter lies: `xlo`, `xhi`, `ylo` … Their directions must be reflecting.",
+        key("faces", Names, OPTIONAL,
+            "The faces of the box behind which the matter lies: `xlo`, `xhi`, `ylo` … Their directions must be reflecting. Required \
+             without a `shape`.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\ndensity = 3.0"),
+        key("shape", Choice(|| names(&SHAPES)), OPTIONAL,
+            "A round wall instead of faces: a `cylinder`, or a `sphere`, which in two dimensions is a circle; two dimensions have no \
+             cylinder. It lies in the box, and the box is so large that nothing sees images of it: a diameter and the range of the forces \
+             with the fluid inside, a diameter and twice the range with the fluid outside. Several with the fluid outside are a range apart.",
+            "[[wall]]\nkind = \"continuum\"\nshape = \"cylinder\"\nradius = 2.0\nfluid = \"inside\"\nspecies = \"A\"\ndensity = 3.0"),
+        key("radius", Positive, OPTIONAL,
+            "The radius of a round wall, no smaller than the range of the forces; it has no default.",
+            "[[wall]]\nkind = \"continuum\"\nshape = \"sphere\"\nradius = 1.5\nfluid = \"outside\"\nspecies = \"A\""),
+        key("fluid", Choice(|| names(&FLUIDS)), OPTIONAL,
+            "On which side of a round wall the fluid is: `inside`, with matter all around, as in a capillary, or `outside`, with the \
+             matter in the cylinder or the sphere, as that of a fibre; it has no default. A density of the scene fills the side of the fluid, and so does \
+             a part of `shape = \"rest\"`.",
+            "[[wall]]\nkind = \"continuum\"\nshape = \"sphere\"\nradius = 1.5\nfluid = \"outside\"\nspecies = \"A\"\n\
+             [[part]]\nshape = \"rest\"\ndensity = 3.0"),
+        key("center", Point, OPTIONAL,
+            "The centre of a round wall; the middle of the box if left out. Of a cylinder the two coordinates across its axis are enough.",
+            "[[wall]]\nkind = \"continuum\"\nshape = \"sphere\"\nradius = 1.5\nfluid = \"outside\"\nspecies = \"A\"\n\
+             center = [3.0, 3.0, 3.2]"),
+        key("axis", Choice(|| names(&AXES)), OPTIONAL,
+            "The direction along a cylinder; z if left out.",
+            "[[wall]]\nkind = \"continuum\"\nshape = \"cylinder\"\nradius = 1.5\nfluid = \"outside\"\nspecies = \"A\"\naxis = \"x\""),
         key("species", Text, OPTIONAL,
             "The species of the matter, with the interactions that the model gives it; required if the model has several.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\""),
@@ -34,7 +56,7 @@ pub const WALL: Table = Table::array("wall",
              `psidpd model wall` finds that of a contact angle.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\"]\nspecies = \"A\"\nstrength = 0.8"),
         key("velocity", Point, OPTIONAL,
-            "The velocity of the matter, along its face; at rest if left out.",
+            "The velocity of the matter, along its face or along the axis of a cylinder; at rest if left out. A sphere rests, and a cylinder does not turn.",
             "[[wall]]\nkind = \"continuum\"\nfaces = [\"zhi\"]\nspecies = \"A\"\nvelocity = [0.5, 0.0, 0.0]"),
         key("viscosity", Positive, OPTIONAL,
             "The shear viscosity of the fluid: the drag gets the strength at which a flow extrapolates to the wall's velocity at \

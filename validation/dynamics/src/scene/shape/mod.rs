@@ -24,10 +24,9 @@ pub enum Shape {
         radius: f64,
         length: f64,
     },
-    /// The part of a block that other regions, which do not overlap, leave free.
+    /// The part of a region that others in it, which do not overlap, leave free.
     Rest {
-        low: [f64; 3],
-        high: [f64; 3],
+        whole: Box<Shape>,
         others: Vec<Shape>,
     },
 }
@@ -40,9 +39,8 @@ impl Shape {
             Shape::Sphere { radius, .. } if dimensions == 2 => PI * radius * radius,
             Shape::Sphere { radius, .. } => 4.0 / 3.0 * PI * radius.powi(3),
             Shape::Cylinder { radius, length, .. } => PI * radius * radius * length,
-            Shape::Rest { low, high, others } => {
-                let whole = Shape::Block { low: *low, high: *high }.volume(dimensions);
-                whole - others.iter().map(|s| s.volume(dimensions)).sum::<f64>()
+            Shape::Rest { whole, others } => {
+                whole.volume(dimensions) - others.iter().map(|s| s.volume(dimensions)).sum::<f64>()
             }
         }
     }
@@ -50,7 +48,8 @@ impl Shape {
     /// The corners of the smallest block around the region.
     pub fn bounds(&self, dimensions: usize) -> [[f64; 3]; 2] {
         match self {
-            Shape::Block { low, high } | Shape::Rest { low, high, .. } => [*low, *high],
+            Shape::Block { low, high } => [*low, *high],
+            Shape::Rest { whole, .. } => whole.bounds(dimensions),
             Shape::Sphere { center, radius } => {
                 let half = |k: usize| if k < dimensions { *radius } else { 0.0 };
                 [std::array::from_fn(|k| center[k] - half(k)), std::array::from_fn(|k| center[k] + half(k))]
@@ -72,9 +71,8 @@ impl Shape {
                 let across: f64 = (0..3).filter(|k| k != axis).map(|k| (x[k] - center[k]).powi(2)).sum();
                 (x[*axis] - center[*axis]).abs() <= 0.5 * length && across <= radius * radius
             }
-            Shape::Rest { low, high, others } => {
-                Shape::Block { low: *low, high: *high }.contains(x, dimensions)
-                    && !others.iter().any(|s| s.contains(x, dimensions))
+            Shape::Rest { whole, others } => {
+                whole.contains(x, dimensions) && !others.iter().any(|s| s.contains(x, dimensions))
             }
         }
     }
@@ -91,7 +89,8 @@ mod tests {
         let rod = Shape::Cylinder { axis: 1, center: [4.4, 2.5, 1.2], radius: 0.8, length: 4.0 };
         let low = [0.0; 3];
         let high = [6.0, 5.0, 5.0];
-        let rest = Shape::Rest { low, high, others: vec![ball.clone(), rod.clone()] };
+        let whole = Box::new(Shape::Block { low, high });
+        let rest = Shape::Rest { whole, others: vec![ball.clone(), rod.clone()] };
         for shape in [ball, rod, rest] {
             let points = 120;
             let mut inside = 0;

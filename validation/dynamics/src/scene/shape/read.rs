@@ -4,6 +4,7 @@ use super::Shape;
 use crate::scene::number::{axis, vector};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::wall::Round;
 pub use psidpd_observe::options::FACES;
 
 /// Share of the box by which a region may reach beyond it, because of rounding.
@@ -14,6 +15,8 @@ pub const SHAPES: &[&str] = &["box", "slab", "layer", "sphere", "cylinder", "res
 pub struct Shapes<'a> {
     pub dimensions: usize,
     pub domain: &'a PeriodicBox,
+    /// The round surfaces of walls.
+    pub rounds: Vec<Round>,
 }
 
 impl Shapes<'_> {
@@ -22,8 +25,31 @@ impl Shapes<'_> {
         Shape::Block { low, high: std::array::from_fn(|k| low[k] + lengths[k]) }
     }
 
+    /// The box without the matter of round walls.
+    pub fn free(&self) -> Shape {
+        let [low, high] = self.whole().bounds(self.dimensions);
+        let region = |round: &Round| {
+            let Round { center, radius, .. } = *round;
+            match round.axis(self.dimensions) {
+                None => Shape::Sphere { center, radius },
+                Some(axis) => {
+                    let middle = 0.5 * (low[axis] + high[axis]);
+                    let center = std::array::from_fn(|c| if c == axis { middle } else { center[c] });
+                    Shape::Cylinder { axis, center, radius, length: high[axis] - low[axis] }
+                }
+            }
+        };
+        match (self.rounds.iter().find(|round| round.inside), &self.rounds[..]) {
+            (Some(around), _) => region(around),
+            (None, []) => self.whole(),
+            (None, all) => {
+                Shape::Rest { whole: Box::new(self.whole()), others: all.iter().map(region).collect() }
+            }
+        }
+    }
+
     /// Reads the region named `kind`, whose keys are in `section`; errors point at `key`. A region of kind
-    /// `rest` is the whole box until the other regions are known: see [`Shape::Rest`].
+    /// `rest` is all that walls leave of the box until the other regions are known: see [`Shape::Rest`].
     pub fn read(&self, kind: &str, key: &Value, section: &Section) -> Result<Shape, FileError> {
         let shape = match kind {
             "box" => self.read_block(section)?,
@@ -35,8 +61,10 @@ impl Shapes<'_> {
             },
             "cylinder" if self.dimensions == 3 => self.read_cylinder(section)?,
             "rest" => {
-                let [low, high] = self.whole().bounds(self.dimensions);
-                return Ok(Shape::Rest { low, high, others: Vec::new() });
+                return Ok(match self.free() {
+                    rest @ Shape::Rest { .. } => rest,
+                    whole => Shape::Rest { whole: Box::new(whole), others: Vec::new() },
+                });
             }
             _ => return Err(key.error(self.unknown("shape", kind, SHAPES))),
         };

@@ -89,7 +89,7 @@ impl<'a> Physics<'a> {
             if again {
                 writeln!(s, "unfix         {name}")?;
             }
-            let face = format!("{}{}", AXES[wall.axis], if wall.high { "hi" } else { "lo" });
+            let face = wall.surface.name(self.dimensions);
             write!(
                 s,
                 "fix           {name} {} dpd/wall {face} density {:?} species {} strength {:?}",
