@@ -204,9 +204,12 @@ mod tests {
         assert!((found.time - 4.5 * 0.01 / better).abs() < 1e-12, "{found:?}");
         assert!(found.better_errors.iter().all(|e| *e < 0.03), "{found:?}");
         assert!(found.to_string().contains("integrator = \"force-gradient\", lambda = 0.17"), "{found}");
-        for (dt, good) in
-            [(0.0002, ""), (0.06, "integrator = \"force-gradient\"\n"), (0.01, "thermostat = false\n")]
-        {
+        for (dt, good) in [
+            (0.0002, ""),
+            (0.06, "integrator = \"force-gradient\"\n"),
+            (0.01, "thermostat = false\n"),
+            (0.01, "[[body_force]]\nacceleration = [0.1, 0.0, 0.0]\n"),
+        ] {
             assert_eq!(advice(dt, good), None, "{good}");
         }
     }

@@ -32,6 +32,25 @@ fn van_der_waals() -> &'static str {
      [excess_free_energy]\nF = \"-kT*ln(1 - b*n) - a*n\"\n"
 }
 
+/// A stated pressure needs a correction, and a psi that is a table or a formula none.
+#[test]
+fn only_a_stated_pressure_has_to_be_calibrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..40).map(|k| format!("{k}, {}\n", 0.1 * f64::from(k * k))).collect();
+    std::fs::write(folder.path().join("psi.csv"), rows).unwrap();
+    let warned = |psi: &str, correction: &str| {
+        let text = format!(
+            "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n{correction}\
+             [excess_free_energy]\nF = {psi}\n"
+        );
+        let model = Model::parse_in(&folder.path().join("m.toml"), &text).unwrap();
+        has(&check(&model, 1.0, Some(&[3.0])).unwrap(), "uncalibrated")
+    };
+    assert!(warned("{ pressure = \"rho*kT + rho^2\" }", ""));
+    assert!(!warned("{ pressure = \"rho*kT + rho^2\" }", "correction = [0.1, 1.02]\n"));
+    assert!(!warned("{ table = \"psi.csv\" }", "") && !warned("\"0.1*n^2\"", ""));
+}
+
 #[test]
 fn poles_and_spinodals_are_named() {
     // kT_c = 8a/27b = 5.93, ρ_c = 1/3b = 3.33

@@ -375,7 +375,9 @@ mod tests {
         let units = ["density", "temperature", "pressure"].map(|name| value(name).unit.as_str());
         assert_eq!(units, ["1/length^3", "energy", "energy/length^3"]);
         assert!(found.notes.is_empty(), "{:?}", found.notes);
-        let rows = found.table().rows;
+        let table = found.table();
+        assert_eq!(table.align.len(), table.header.len());
+        let rows = table.rows;
         assert!(
             rows.iter().any(|row| row[0] == "pressure" && row.contains(&with_error(1.24, Some(0.03)))),
             "{rows:?}"
