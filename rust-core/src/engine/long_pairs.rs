@@ -208,7 +208,10 @@ impl Found {
     /// Finds the particles within `limits`, the squares of ranges by species, around `x`.
     fn search(&mut self, cells: &Cells, domain: &PeriodicBox, x: [f64; 3], limits: &[f64]) {
         let Found { i, species, j, others, d, square, .. } = self;
-        (j.clear(), others.clear(), d.clear(), square.clear());
+        j.clear();
+        others.clear();
+        d.clear();
+        square.clear();
         let own = *i as u32;
         let visit = |id: u32, kind: u32, separation: [f64; 3], length: f64| {
             let kind = kind as usize;

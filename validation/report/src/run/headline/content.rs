@@ -71,7 +71,7 @@ impl<'a> Content<'a> {
         table.get(name)?.get(rows)
     }
 
-    fn from_rows(&self, name: &str) -> Option<Found> {
+    fn mean_of_rows(&self, name: &str) -> Option<Found> {
         let values = self.column(name)?;
         let source = format!("thermo.csv, {}", rows_in_words(values.len()));
         match estimate(values) {
@@ -103,7 +103,8 @@ impl<'a> Content<'a> {
         let dimensions = self.about.map_or(3, |a| a.dimensions);
         let volume = self.about.map(About::volume);
         let density = self.particles.zip(volume);
-        let whole = || self.scalar(&[("temperature", "kinetic")]).or_else(|| self.from_rows("temperature"));
+        let whole =
+            || self.scalar(&[("temperature", "kinetic")]).or_else(|| self.mean_of_rows("temperature"));
         let liquid = ["interface_width", "drop", "pendant", "contact_angle"].map(|name| (name, "liquid"));
         let both = |column| self.scalar(&[("interface_width", column), ("drop", column)]);
         let width = both("width").map(|(w, error, from)| (w, error, format!("{from}: 2 d of tanh(z/d)")));
@@ -117,7 +118,7 @@ impl<'a> Content<'a> {
             (
                 "pressure",
                 "energy/volume",
-                self.scalar(&[("pressure", "carried")]).or_else(|| self.from_rows("pressure")),
+                self.scalar(&[("pressure", "carried")]).or_else(|| self.mean_of_rows("pressure")),
             ),
             ("liquid", "1/volume", self.scalar(&liquid)),
             ("vapour", "1/volume", both("vapour")),
