@@ -221,7 +221,7 @@ impl<'a> Bench<'a> {
 
     /// The file with a correction, and a comment on it.
     fn corrected(&self, polynomials: &[Polynomial], comment: &str) -> Result<String, ExperimentError> {
-        Ok(with_correction(self.text, &self.density, self.species, polynomials, comment)?)
+        with_correction(self.text, &self.density, self.species, polynomials, comment)
     }
 
     fn targets(&self) -> Result<Vec<Target>, ExperimentError> {
