@@ -14,6 +14,7 @@ const CORE: &[&[&str]] = &[
     &["theory"],
     // The foundations of the engine.
     &[
+        "engine::components",
         "engine::counts",
         "engine::error",
         "engine::exclusions",
@@ -31,6 +32,8 @@ const CORE: &[&[&str]] = &[
     &["engine::excess_pass"],
     // What matter behind faces of the box adds.
     &["engine::walls"],
+    // Pair potentials of rare species with long ranges.
+    &["engine::long_pairs"],
     // The fast engine: one traversal of all cells, without a neighbour list.
     &["engine::sweep::terms", "engine::sweep::times"],
     &["engine::sweep::workspace"],
@@ -39,7 +42,7 @@ const CORE: &[&[&str]] = &[
     &["engine::local_energy"],
     // Sums over a list of pairs.
     &["engine::pair_sums"],
-    // The sweep with special pairs, whose forces are sums over a list.
+    // The sweep with special pairs, whose forces are sums over a list, and with long pairs.
     &["engine::sweep_path"],
     // The engine as hosts use it.
     &["engine::facade"],

@@ -7,16 +7,16 @@
 //! All is in double precision. Each particle of the rare species collects its pairs by itself, and their forces are added in its order, so that
 //! results do not depend on threads.
 
+use super::components::COMPONENTS;
 use super::error::EngineError;
-use super::pair_sums::COMPONENTS;
 use super::particles::Particles;
 use super::plan::Plan;
-use super::sweep::Pool;
 use super::vectors::{Loop, run_best};
 use crate::model::PairTerm;
 use crate::model::pair::PairForm;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
+use psidpd_threads::Pool;
 use std::ops::Range;
 
 /// How many pairs within the range of a sweep take the time of a pair apart from it.
@@ -113,7 +113,7 @@ impl LongPairs {
         (0..dimensions).all(|k| !domain.periodic()[k] || domain.height(k) >= 2.0 * self.limits.longest())
     }
 
-    /// Adds the forces on particles in a box, and returns energy and virial if they are wanted.
+    /// Adds the forces on particles in a box, and returns energy and virial if they are requested.
     ///
     /// # Errors
     /// Fails for a force that is not finite. Positions of particles that interact are finite, and types in range.
@@ -344,7 +344,7 @@ impl Cells {
                 (0..3).for_each(|c| inside[c] -= boxes * self.edges[k][c]);
             }
         }
-        // Conversion rounds to zero, and takes what is no number for it.
+        // Conversion rounds to zero, and makes 0 of NaN.
         std::array::from_fn(|k| ((s[k] * self.count[k] as f64) as i64).clamp(0, self.count[k] - 1))
     }
 }

@@ -22,6 +22,7 @@
 //! each pair `−[∂ψ_i/∂n + ∂ψ_j/∂n] w′ − φ′`, drag and noise. Where ghosts stand for particles of other ranks, the
 //! host copies slopes from owners to ghosts in between, so that an evaluation has two halves.
 
+mod components;
 mod counts;
 mod error;
 mod evaluate;

@@ -2,7 +2,7 @@
 //!
 //! Each particle is by itself, so that results do not depend on threads.
 
-use super::pair_sums::COMPONENTS;
+use super::components::COMPONENTS;
 use super::particles::Particles;
 use super::plan::Plan;
 use crate::model::wall::{Field, Round, Surface, WallField};

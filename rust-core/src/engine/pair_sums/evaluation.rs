@@ -5,6 +5,7 @@ use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
 use super::plane_list::{PlaneList, merge};
 use super::sweep_pairs::SweepPairs;
+use crate::engine::components::COMPONENTS;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::Pool;
 use crate::engine::walls;
@@ -303,9 +304,6 @@ impl Evaluation {
         self.planes[part].pairs(self.range)
     }
 }
-
-/// Indices of the components of a symmetric tensor, in the order of the virial.
-pub const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 #[cfg(test)]
 mod tests {

@@ -32,7 +32,8 @@ mod sweep_pairs;
 
 pub(super) use special::Corrections;
 
-pub use evaluation::{COMPONENTS, Evaluation, Evaluator, NearWall};
+pub use super::components::COMPONENTS;
+pub use evaluation::{Evaluation, Evaluator, NearWall};
 pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
 

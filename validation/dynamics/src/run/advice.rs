@@ -182,6 +182,7 @@ mod tests {
         );
         let scene = support::scene(&model, &text).unwrap();
         let mut run = scene.simulation(scene.initial_state()).unwrap();
+        scene.enter(&scene.stages[0], &mut run).unwrap();
         run.prepare(0.005 * time(), Want::FORCES).unwrap();
         run.advance(400, 0.005 * time(), Integrator::VelocityVerlet).unwrap();
         Advice::of(&mut run, &scene.stages[0])

@@ -22,6 +22,7 @@ mod masses;
 mod number;
 mod output;
 mod part;
+mod round;
 mod shape;
 mod stage;
 mod template;

@@ -1,10 +1,9 @@
 //! `[[part]]`: regions filled with particles, such as drops, columns, supports and walls.
 
 use super::number::vector;
+use super::round::rounds;
 use super::shape::Shapes;
-use super::{
-    Arrangement, Composition, FileError, Model, PeriodicBox, Section, Shape, Value, Velocities, wall,
-};
+use super::{Arrangement, Composition, FileError, Model, PeriodicBox, Section, Shape, Value, Velocities};
 
 const MOST_PARTICLES: f64 = 1e8;
 
@@ -40,7 +39,7 @@ impl<'a> Common<'a> {
     pub fn of(root: &Section, model: &'a Model, domain: &'a PeriodicBox) -> Result<Common<'a>, FileError> {
         let density = root.get("density").map(|value| value.positive()).transpose()?;
         let dimensions = model.dimensions();
-        let rounds = wall::rounds(root, dimensions, domain)?;
+        let rounds = rounds(root, dimensions, domain)?;
         Ok(Common { model, shapes: Shapes { dimensions, domain, rounds }, density })
     }
 

@@ -6,7 +6,8 @@ use super::scene::{
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
-use crate::scene::wall::{FLUIDS, KINDS, SHAPES};
+use crate::scene::round::{FLUIDS, SHAPES};
+use crate::scene::wall::KINDS;
 
 pub const WALL: Table = Table::array("wall",
     "Walls as a continuum: matter behind a reflecting face, around a cylinder or a sphere, or in one, which costs no particles and has \
