@@ -5,11 +5,12 @@ use psidpd_core::engine::{
     Engine, EngineError, Evaluated, Particles, Path, PeriodicBox, Precision, Reason, Request, Settings,
     SpecialPair, Want,
 };
+use psidpd_core::model::wall::{Surface, Wall};
 use psidpd_core::model::{Fluid, Model};
 use std::num::NonZeroUsize;
 
 /// A solvent S with small solutes B and C, of ranges up to three times that of the solvent; `density` makes all of it a many-body fluid.
-fn fluid(dimensions: usize, density: bool) -> Fluid {
+fn model(dimensions: usize, density: bool) -> Model {
     let soft = |pair: &str, strength: f64, range: f64| {
         format!("[[pair]]\nbetween = {pair}\nform = \"soft\"\nstrength = {strength:?}\nrange = {range:?}\n")
     };
@@ -24,7 +25,11 @@ fn fluid(dimensions: usize, density: bool) -> Fluid {
     if density {
         text += "[density.n]\nkernel = \"lucy\"\nrange = 0.9\n[excess_free_energy]\nS = \"0.2*n^2\"\nB = \"0.1*n^1.5\"\nC = \"0\"\n";
     }
-    Model::parse("m.toml", &text).unwrap().at(1.0).unwrap()
+    Model::parse("m.toml", &text).unwrap()
+}
+
+fn fluid(dimensions: usize, density: bool) -> Fluid {
+    model(dimensions, density).at(1.0).unwrap()
 }
 
 fn uniform(k: u32) -> f64 {
@@ -101,7 +106,9 @@ fn forces_are_those_of_sums_over_pairs() {
                     let mut engine = engine(&fluid, precision, threads);
                     let found = engine.evaluate(&x, &domain, &kinds).unwrap();
                     assert_eq!(engine.path(), Some(Path::Sweep), "{what}");
-                    assert_eq!(engine.potentials_apart(), 5, "{what}");
+                    // In the plane a longer range of the sweep costs less than searches around C.
+                    let apart = if dimensions == 2 { 4 } else { 5 };
+                    assert_eq!(engine.potentials_apart(), apart, "{what}");
                     found
                 });
                 agree(&found[0], &expected, bound, &what);
@@ -145,6 +152,42 @@ fn who_is_rare_is_decided_by_the_particles() {
     let found = engine.evaluate(&x, &narrow, &kinds).unwrap();
     assert_eq!(engine.path(), Some(Path::PairSums(Reason::Box)));
     agree(&found, &plain(&fluid, &x, &narrow, &kinds, None), 1e-12, "narrow");
+}
+
+/// A few per cent of large particles are apart, and a tenth are not: a search around each took 6 µs where the whole sweep took 0.7 µs
+/// a particle.
+#[test]
+fn only_few_large_particles_are_apart() {
+    let domain = PeriodicBox::orthogonal([0.0; 3], [9.0; 3], [true; 3]).unwrap();
+    let fluid = fluid(3, false);
+    let (x, _) = particles(&domain, 3, 2000);
+    let mut engine = engine(&fluid, Precision::Mixed, 1);
+    for (every, is_apart) in [(100, true), (20, true), (10, false), (5, false), (3, false)] {
+        let kinds: Vec<i32> = (0..2000).map(|k| i32::from(k % every == 0)).collect();
+        engine.evaluate(&x, &domain, &kinds).unwrap();
+        assert_eq!(engine.potentials_apart() > 0, is_apart, "one of {every}");
+    }
+}
+
+/// A wall adds to densities and forces beside long pairs as it does to sums over pairs.
+#[test]
+fn walls_beside_long_pairs_have_their_forces() {
+    let domain = PeriodicBox::orthogonal([0.0; 3], [8.0, 9.0, 7.5], [true, true, false]).unwrap();
+    let wall = Wall {
+        surface: Surface::Face { axis: 2, high: true },
+        species: 1,
+        density: 2.0,
+        local_densities: Vec::new(),
+        strength: 0.7,
+        velocity: [0.0; 3],
+        drag: [None; 2],
+    };
+    let fluid = model(3, true).with_walls(vec![wall]).at(1.0).unwrap();
+    let (x, kinds) = particles(&domain, 3, 1600);
+    let mut engine = engine(&fluid, Precision::Double, 2);
+    let found = engine.evaluate(&x, &domain, &kinds).unwrap();
+    assert_eq!(engine.potentials_apart(), 5);
+    agree(&found, &plain(&fluid, &x, &domain, &kinds, None), 1e-12, "a wall");
 }
 
 /// Two particles by hand, at one point and across a period; energy and virial are those asked for, and a force that is not finite names

@@ -33,10 +33,10 @@ impl Measured {
         Measured { name: surface.name(dimensions), area, is_round: surface.round().is_some() }
     }
 
-    /// What is measured: the names, and their places among the components of [`crate::flux::OnWall`].
+    /// What is measured: the names, the most important first, and their places among the components of [`crate::flux::OnWall`].
     fn columns(&self, dimensions: usize) -> impl Iterator<Item = (&'static str, usize)> + use<> {
         let normal = self.is_round.then_some(("normal", 3));
-        AXES.into_iter().zip(0..dimensions).chain(normal)
+        normal.into_iter().chain(AXES.into_iter().zip(0..dimensions))
     }
 }
 
