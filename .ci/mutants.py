@@ -16,21 +16,23 @@ ROOT = pathlib.Path.cwd()
 WORK = ROOT / "target" / "mutants"
 COPY = WORK / "psidpd"
 
-# What is changed, and which tests of the crate try it: names that are run, then names that are left out, as they take long.
+# What is changed, and which tests try it: crates, with names that are run, then names that are left out, as they take long.
+# Meters sample particles in the tests of the crate that moves them.
+METERS = ("dynamics", ["tests::known", "tests::meters", "tests::balance", "tests::carried", "tests::a_", "tests::profiles"], ["run::", "trial::", "scene::", "checkpoint::", "freezing::"])
 GROUPS = {
-    "experiments/src/pareto": (["pareto"], []),
-    "experiments/src/check": (["check"], []),
-    "experiments/src/calibrate": (["calibrate"], []),
-    "experiments/src/liquid": (["liquid"], []),
-    "experiments/src/mixture": (["mixture", "slabs", "seek"], []),
-    "experiments/src/wall": (["wall", "slabs", "seek"], []),
-    "experiments/src/hardcases": (["hardcases"], []),
-    "report/src/run/headline.rs": (["headline"], []),
-    "dynamics/src/run/watch.rs": (["watch"], ["small_slabs"]),
-    "dynamics/src/run/advice.rs": (["advice"], []),
-    "observe/src/meter": ([], []),
-    "observe/src/series.rs": ([], []),
-    "observe/src/statistics.rs": ([], []),
+    "experiments/src/pareto": [("experiments", ["pareto"], [])],
+    "experiments/src/check": [("experiments", ["check"], [])],
+    "experiments/src/calibrate": [("experiments", ["calibrate"], [])],
+    "experiments/src/liquid": [("experiments", ["liquid"], [])],
+    "experiments/src/mixture": [("experiments", ["mixture", "slabs", "seek"], [])],
+    "experiments/src/wall": [("experiments", ["wall", "slabs", "seek"], [])],
+    "experiments/src/hardcases": [("experiments", ["hardcases"], [])],
+    "report/src/run/headline.rs": [("report", ["headline"], [])],
+    "dynamics/src/run/watch.rs": [("dynamics", ["watch"], ["small_slabs"])],
+    "dynamics/src/run/advice.rs": [("dynamics", ["advice"], [])],
+    "observe/src/meter": [("observe", [], []), METERS],
+    "observe/src/series.rs": [("observe", [], []), METERS],
+    "observe/src/statistics.rs": [("observe", [], [])],
 }
 # Ways to write a text or a debug form have no right answer.
 WORDS = ["impl (std::fmt::|fmt::)?(Display|Debug)", "-> String with"]
@@ -65,13 +67,9 @@ def group_of(change):
     return next(group for group in GROUPS if change["file"].startswith(f"validation/{group}"))
 
 
-def package_of(group):
-    return "psidpd-" + group.split("/")[0]
-
-
-def cargo_test(package, *arguments, timeout=None):
+def cargo_test(crate, *arguments, timeout=None):
     """The exit status; `None` for a test that did not end."""
-    command = ["cargo", "test", "--release", "--lib", "--quiet", "--package", package, *arguments]
+    command = ["cargo", "test", "--release", "--lib", "--quiet", "--package", f"psidpd-{crate}", *arguments]
     settings = {"cwd": COPY, "env": os.environ | ENVIRONMENT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, start_new_session=True, **settings) as run:
         try:
@@ -84,17 +82,18 @@ def cargo_test(package, *arguments, timeout=None):
 
 def attempt(change):
     """What becomes of a change: it does not compile, a test catches it, or none does."""
-    group = group_of(change)
-    run, without = GROUPS[group]
-    names = ["--", *run, *(word for name in without for word in ("--skip", name))]
     path = COPY / change["file"]
     before = path.read_bytes()
     # cargo-mutants can be told which changes to try by a pattern, but tries all that leave out a field of a struct beside them.
     subprocess.run(["patch", "--silent", "--no-backup-if-mismatch", str(path)], input=change["diff"], text=True, check=True)
     try:
-        if cargo_test(package_of(group), "--no-run") != 0:
-            return "unviable"
-        return "missed" if cargo_test(package_of(group), *names, timeout=120) == 0 else "caught"
+        for crate, run, without in GROUPS[group_of(change)]:
+            if cargo_test(crate, "--no-run") != 0:
+                return "unviable"
+            names = ["--", *run, *(word for name in without for word in ("--skip", name))]
+            if cargo_test(crate, *names, timeout=120) != 0:
+                return "caught"
+        return "missed"
     finally:
         path.write_bytes(before)
 
@@ -113,9 +112,9 @@ def main(seed, most):
     drawn.sort(key=lambda one: one[:2])
     print(f"{len(drawn)} of {len(changes)} changes", file=sys.stderr, flush=True)
     # What no change touches; the first time this takes a quarter of an hour.
-    for package in sorted({package_of(group) for group in by_group}):
-        if cargo_test(package, "--no-run") != 0:
-            sys.exit(f"{package} does not compile without a change")
+    for crate in sorted({crate for group in by_group for crate, _, _ in GROUPS[group]}):
+        if cargo_test(crate, "--no-run") != 0:
+            sys.exit(f"{crate} does not compile without a change")
     begin = time.monotonic()
     found = collections.Counter()
     by_file = collections.defaultdict(list)

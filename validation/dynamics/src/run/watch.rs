@@ -420,6 +420,17 @@ mod tests {
         assert!(!falls(&[3.0, 2.0, 1.0]) && !falls(&[]));
     }
 
+    /// Of samples that are as often below as above, all are above once in two to the power of their number; 1.02 is tolerated.
+    #[test]
+    fn all_must_be_too_high_and_many() {
+        let enough = (-ALARM.log2()).floor() as usize + 1;
+        assert!(is_above(&vec![1.021; enough]) && !is_above(&vec![1.021; enough - 1]));
+        assert!(!is_above(&vec![1.019; 50]));
+        let mut one_lower = vec![1.5; 50];
+        one_lower[31] = 1.01;
+        assert!(!is_above(&one_lower));
+    }
+
     /// Of 4000 correct means of independent numbers 4 raise a false alarm in the limit of a small tolerance.
     /// The tolerance of 2 % with errors of 1 % leaves fewer.
     #[test]

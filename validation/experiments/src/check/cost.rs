@@ -27,6 +27,14 @@ const SAMPLE: usize = 20_000;
 const TRIAL: Duration = Duration::from_millis(250);
 
 pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
+    by_trial(scene, &trial)
+}
+
+/// The cost by the seconds of a step that a trial says.
+pub(super) fn by_trial(
+    scene: &Scene,
+    trial: &dyn Fn(&Scene) -> Result<f64, RunError>,
+) -> Result<Cost, RunError> {
     let particles = scene.initial.count();
     let steps = scene.steps();
     let each = if particles > LARGE {

@@ -17,6 +17,67 @@ fn spline(repulsion: f64) -> String {
     )
 }
 
+/// At other densities warnings are told once and with their place, notes are not, and what is worst comes first.
+#[test]
+fn warnings_at_other_densities_are_told_once() {
+    let warning = |id, severity, message: &str| Warning { id, severity, message: message.into() };
+    let mut findings = found(&spline(19.0), 0.5, Some(vec![12.5]));
+    findings.warnings = vec![warning("known", Severity::Warning, "it is known")];
+    assert!(findings.works());
+    let names = ["A".to_owned(), "B".to_owned()];
+    let other = vec![
+        warning("known", Severity::Warning, "it is known"),
+        warning("known", Severity::Warning, "it is another"),
+        warning("small", Severity::Note, "it is small"),
+        warning("bad", Severity::Error, "it is known"),
+    ];
+    findings.add_at(&names, &[1.0, 2.5], other.clone());
+    findings.add_at(&names, &[3.0, 2.5], other);
+    let said: Vec<_> = findings.warnings.iter().map(|w| (w.id, w.severity, w.message.as_str())).collect();
+    let place = "at densities A 1.0000, B 2.5000: ";
+    assert_eq!(
+        said,
+        [
+            ("bad", Severity::Error, &*format!("{place}it is known")),
+            ("known", Severity::Warning, "it is known"),
+            ("known", Severity::Warning, &*format!("{place}it is another")),
+        ]
+    );
+    assert!(!findings.works());
+}
+
+/// A scene costs what a step of it does; of a large one a small box is tried. Here a step takes a nanosecond for each particle.
+#[test]
+fn a_scene_costs_what_its_steps_do() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), crate::models::STANDARD).unwrap();
+    let of = |edge: f64| {
+        let text = format!(
+            "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = {edge}\ndensity = 3.0\nequilibrate = 7\nsteps = 13\ndt = 0.02\n\
+             precision = \"double\"\n[initial]\nkind = \"lattice\"\n"
+        );
+        psidpd_dynamics::scene::Scene::parse("cost", &text, folder.path()).unwrap()
+    };
+    for (edge, tried) in [(10.0, 3000), (40.0, 192_000), (50.0, 20_000)] {
+        let trial = |scene: &psidpd_dynamics::scene::Scene| {
+            let particles = scene.initial.count();
+            assert!((particles as f64 / f64::from(tried) - 1.0).abs() < 0.01, "{edge}: {particles}");
+            assert_eq!(scene.precision(), psidpd_core::engine::Precision::Double);
+            assert_eq!(scene.stages[0].dt, 0.02);
+            Ok(1e-9 * particles as f64)
+        };
+        let cost = cost::by_trial(&of(edge), &trial).unwrap();
+        assert_eq!((cost.particles, cost.steps), ((3.0 * edge.powi(3)) as usize, 20));
+        assert!((cost.seconds / (20e-9 * cost.particles as f64) - 1.0).abs() < 0.01, "{cost:?}");
+        // More than positions and velocities in double precision; a small run has 20 MB of its own.
+        let each = cost.bytes / cost.particles as f64;
+        assert!(each > 48.0 && cost.bytes < 5000.0 * cost.particles as f64 + 3e7, "{each}");
+    }
+    let mut scene = of(10.0);
+    scene.stages[1].steps = 3;
+    assert!(cost(&scene).is_ok_and(|cost| cost.seconds > 0.0 && cost.seconds < 60.0));
+}
+
 /// Wang and Chen print 17.0 where a = 9.5 and A = 2.0 give 19.0; the fluid with 17.0 collapses.
 #[test]
 fn the_misprint_of_the_spline_paper_is_caught() {

@@ -531,13 +531,20 @@ fn lines_of_a_scene_are_read_back() {
         }
     }
     assert!(all.len() > 100);
-    for physics in all.into_iter().filter(|physics| physics.integrator.has_time()) {
+    for mut physics in all.into_iter().filter(|physics| physics.integrator.has_time()) {
         let setting = Setting { host: Host::Native, physics, threads: NonZeroUsize::MIN };
         let lines = recommend::scene_lines(0.0375, &setting);
         let text = format!("model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 3.0\nsteps = 5\n{lines}");
         let scene = Scene::parse("again", &text, folder.path()).unwrap_or_else(|e| panic!("{e}\n{lines}"));
         assert_eq!((scene.stages[0].integrator, scene.stages[0].dt), (physics.integrator, 0.0375), "{lines}");
         assert_eq!(scene.precision(), physics.precision, "{lines}");
+        // What is left out is what a scene without the line does, and one thread is not asked for.
+        let every = physics.integrator.settings().coupling.map_or(1, |coupling| coupling.every);
+        assert_eq!(lines.contains("thermostat_every"), every > 1, "{lines}");
+        assert!(!lines.contains("--threads"), "{lines}");
+        let more =
+            recommend::scene_lines(0.0375, &Setting { threads: NonZeroUsize::new(3).unwrap(), ..setting });
+        assert_eq!(more, format!("{lines}# run with --threads 3\n"));
     }
 }
 

@@ -51,7 +51,8 @@ mod tests {
             let slices = (0..4000).map(|k| (f64::from(k) + 0.5) / 4000.0 * height);
             let area = slices.map(wide).sum::<f64>() * height / 4000.0;
             assert!((2.0 * across * top / area - 1.0).abs() < 1e-3, "{angle}: {area}");
-            assert!(top + ROOM <= edges[1] + 1e-9 && 2.0 * across * top >= AREA - 1e-9);
+            assert!((edges[1] - ROOM - height.max(top)).abs() < 1e-9, "{angle}: {edges:?}");
+            assert!((across / widest - 0.85).abs() < 1e-9 && 2.0 * across * top >= AREA - 1e-9);
         }
     }
 }

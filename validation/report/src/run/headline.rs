@@ -375,13 +375,74 @@ mod tests {
         let units = ["density", "temperature", "pressure"].map(|name| value(name).unit.as_str());
         assert_eq!(units, ["1/length^3", "energy", "energy/length^3"]);
         assert!(found.notes.is_empty(), "{:?}", found.notes);
+    }
+
+    /// The table for a page has what is known of each value, and no column that nothing is in; notes have a table of their own.
+    #[test]
+    fn a_page_begins_with_what_is_known() {
+        use super::super::super::Align::{Left, Right};
+        let value = |name: &str, mean_field, published| HeadlineValue {
+            name: name.into(),
+            value: 1.25,
+            error: Some(0.02),
+            unit: "r_c".into(),
+            source: "a file".into(),
+            mean_field,
+            published,
+        };
+        let mut found = Headline::default();
+        assert!(found.section().is_none());
+        found.values = vec![value("one", None, None), value("two", None, None)];
+        let Section { heading, items } = found.section().unwrap();
+        assert!(heading == "Results" && matches!(items[..], [Item::Table(_), Item::Prose(_)]));
         let table = found.table();
-        assert_eq!(table.align.len(), table.header.len());
-        let rows = table.rows;
-        assert!(
-            rows.iter().any(|row| row[0] == "pressure" && row.contains(&with_error(1.24, Some(0.03)))),
-            "{rows:?}"
-        );
+        let unit = super::super::super::text::typeset("r_c");
+        let measured = with_error(1.25, Some(0.02));
+        assert_eq!(table.header, ["result", "value ± error", "unit", "from"]);
+        assert_eq!(table.align, [Left, Right, Left, Left]);
+        assert_eq!(table.rows[1], ["two", &measured, &unit, "a file"]);
+        found.values[0].published = Some([1.24, 0.03]);
+        found.values[1].mean_field = Some(1.5);
+        let table = found.table();
+        assert_eq!(table.header, ["result", "value ± error", "mean field", "published", "unit", "from"]);
+        assert_eq!(table.align, [Left, Right, Right, Right, Left, Left]);
+        let published = with_error(1.24, Some(0.03));
+        assert_eq!(table.rows[0], ["one", &measured, "", &published, &unit, "a file"]);
+        assert_eq!(table.rows[1], ["two", &measured, "1.5", "", &unit, "a file"]);
+        assert_eq!(found.get("two"), Some(&found.values[1]));
+        assert_eq!(found.get("three"), None);
+        found.notes = vec!["a note".into(), "another".into()];
+        let items = found.section().unwrap().items;
+        let [Item::Table(_), Item::Table(notes), Item::Prose(_)] = &items[..] else {
+            panic!("{}", items.len())
+        };
+        assert_eq!(notes.rows, [["a note"], ["another"]]);
+        found.values.clear();
+        assert!(found.section().is_some());
+    }
+
+    /// What is not in the folder is not among the results; the number of particles is that of the summary.
+    #[test]
+    fn results_are_those_of_the_files_that_exist() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(headline(folder.path()), Headline::default());
+        let about = super::super::tests::about();
+        std::fs::write(folder.path().join("about.json"), serde_json::to_string(&about).unwrap()).unwrap();
+        assert_eq!(headline(folder.path()).values, []);
+        std::fs::write(folder.path().join("summary.json"), "{\"particles\": 60}").unwrap();
+        let rows: String = (1..=40).map(|k| format!("{k},0.5,-1,2\n")).collect();
+        std::fs::write(
+            folder.path().join("thermo.csv"),
+            format!("step,temperature,potential,pressure\n{rows}"),
+        )
+        .unwrap();
+        let observables = serde_json::to_string(&[drop(1.5)]).unwrap();
+        std::fs::write(folder.path().join("observables.json"), observables).unwrap();
+        let found = headline(folder.path());
+        let value = |name: &str| found.get(name).unwrap().value;
+        let volume: f64 = (0..3).map(|k| about.box_edges[k][k]).product();
+        assert!((value("density") - 60.0 / volume).abs() < 1e-12);
+        assert_eq!([value("temperature"), value("radius")], [0.5, 1.5]);
     }
 
     /// At kT = 0.7 a temperature that is off by 2 % is noticed with its sign and part, one that is off by less than 1 % or by less

@@ -71,6 +71,14 @@ fn straight(bulk: &Bulk, factor: f64) -> [f64; 2] {
     let rho = bulk.densities[0];
     let n = (rho - 0.5) / 1.1;
     let (value, derivative) = correction(bulk).map_or((rho, DUMMY_SLOPE), |p| p.at(n));
+    if correction(bulk).is_none() {
+        // The first guess has the force of the bulk at any density.
+        let theory = MeanField::new(&bulk.model.at(KT).unwrap()).unwrap();
+        for x in [0.5, rho] {
+            let found = theory.excess_slopes(0, &[x])[0];
+            assert!((found - DUMMY_SLOPE * slope(rho)).abs() < 1e-6, "{rho} {x}: {found}");
+        }
+    }
     [n, KT * rho - rho * rho + factor * rho * rho * slope(value) * derivative]
 }
 
