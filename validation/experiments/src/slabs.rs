@@ -2,10 +2,9 @@
 //! r √(m/kT).
 
 use crate::bulk::Observed;
-use crate::liquid::{Trouble, stopped};
 use crate::seek::rounded;
 use crate::steps::{FIRST, STEP};
-use crate::{ExperimentError, jobs, steps};
+use crate::{ExperimentError, Trouble, jobs, steps};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::{RunError, run_scene};
@@ -36,6 +35,33 @@ pub struct Units {
     /// The number density of the liquid.
     pub density: f64,
     pub dt: f64,
+}
+
+/// A liquid beside its vapour, in units of its model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Slab {
+    pub tension: Measured,
+    /// The number density of the liquid.
+    pub density: Measured,
+}
+
+impl Slab {
+    /// What a run of [`Setting::slab`] has observed.
+    pub fn of(observed: &Observed) -> Slab {
+        Slab {
+            tension: observed.scalar("surface_tension", "free_energy"),
+            density: observed.scalar("interface_width", "liquid"),
+        }
+    }
+}
+
+impl Units {
+    /// Takes the density of the liquid from a slab of it.
+    pub fn learn(&mut self, slab: &Slab) {
+        if slab.density.value > 0.0 {
+            self.density = slab.density.value;
+        }
+    }
 }
 
 /// A box, and where liquid is in it.
@@ -125,11 +151,22 @@ pub fn run(runs: &[Run], folder: &Path) -> Result<Vec<Observed>, Trouble> {
         Observed::read(&folder)
     };
     let all = jobs::each(runs.iter().enumerate().collect(), one);
-    all.into_iter().collect::<Result<_, _>>().map_err(stopped)
+    Ok(all.into_iter().collect::<Result<_, _>>()?)
+}
+
+/// The seeds of the runs of a result, none of which a search or another round has.
+pub fn seeds_of_result(seed: u64, round: u64) -> [u64; 3] {
+    [0, 1, 2].map(|number| seed.wrapping_add(1000 + 10 * round + number))
 }
 
 pub fn mean([a, b]: [Measured; 2]) -> Measured {
     a.plus(b).times(0.5)
+}
+
+/// The value of a profile at the place that is nearest.
+pub fn nearest(profile: &[(f64, Measured)], z: f64) -> Measured {
+    let nearest = profile.iter().min_by(|a, b| (a.0 - z).abs().total_cmp(&(b.0 - z).abs()));
+    nearest.map_or(Measured::NONE, |(_, value)| *value)
 }
 
 /// The units of a liquid of one species with this mass, settled, at about this density or that of theory. `named` is what errors call it,
@@ -162,6 +199,29 @@ fn guess(fluid: &Fluid) -> Result<Option<f64>, ExperimentError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn runs_of_results_have_seeds_of_their_own() {
+        for seed in [0, 7, u64::MAX] {
+            let search = [seed, seed.wrapping_add(1)];
+            let mut all: Vec<u64> =
+                (0..5).flat_map(|round| seeds_of_result(seed, round)).chain(search).collect();
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), 17);
+        }
+    }
+
+    #[test]
+    fn the_value_at_the_nearest_place_counts() {
+        let profile: Vec<_> =
+            (0..4).map(|k| (f64::from(k) - 0.5, Measured::from(f64::from(10 + k)))).collect();
+        for (z, expected) in [(-3.0, 10.0), (-0.1, 10.0), (0.1, 11.0), (1.4, 12.0), (2.1, 13.0), (40.0, 13.0)]
+        {
+            assert_eq!(nearest(&profile, z).value, expected, "{z}");
+        }
+        assert!(nearest(&[], 1.0).value.is_nan());
+    }
 
     /// Lengths four times as long make the density of a liquid 64 times as small, and time steps four times as long; its guess is that
     /// of Warren's liquid, 6.05, within a few percent.

@@ -1,11 +1,11 @@
 //! Measures by runs: the homogeneous liquid at three densities, a slab of it in its vapour, and two flows side by side.
 
 use super::fluid::{Drag, Strengths, USUAL, text};
-use super::instrument::{Care, Equilibrium, Flow, Instrument, Trouble};
+use super::instrument::{Care, Equilibrium, Flow, Instrument};
 use super::sheet::Liquid;
 use crate::bulk::Observed;
 use crate::steps::{self, ADVISED, FIRST, STEP};
-use crate::{ExperimentError, jobs};
+use crate::{ExperimentError, Trouble, jobs};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, run_scene};
 use psidpd_dynamics::scene::Scene;
@@ -96,7 +96,7 @@ impl Runs<'_> {
     fn piece(&self, model: &Model) -> Result<Piece, Trouble> {
         let densities = [self.liquid.goals.density];
         let of = Composition { model, masses: &[1.0], kt: 1.0, densities: &densities, seed: self.seed };
-        match Piece::settled(&of).map_err(stopped)? {
+        match Piece::settled(&of)? {
             Ok(piece) => Ok(piece),
             Err(why) => Err(Trouble::Stopped(why.to_string())),
         }
@@ -109,7 +109,7 @@ impl Runs<'_> {
     /// The longest step with errors of about a percent.
     pub fn longest_step(&self, fluid: &Strengths, drag: &Drag) -> Result<Option<f64>, Trouble> {
         let piece = self.piece(&self.model(fluid, drag)?)?;
-        Ok(piece.longest(ADVISED).map_err(stopped)?.map(|(dt, _)| dt))
+        Ok(piece.longest(ADVISED)?.map(|(dt, _)| dt))
     }
 
     fn seed(&self, care: Care) -> u64 {
@@ -128,7 +128,7 @@ impl Runs<'_> {
             Observed::read(&folder)
         };
         let all = jobs::each(settings.iter().enumerate().collect(), run);
-        let all: Vec<Observed> = all.into_iter().collect::<Result<_, _>>().map_err(stopped)?;
+        let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
         match all.iter().flat_map(|o| &o.0).find(|o| o.note.contains("are a crystal")) {
             Some(crystal) => Err(Trouble::Frozen(crystal.note.clone())),
             None => Ok(all),
@@ -198,11 +198,6 @@ pub fn slab_time(care: Care, tension: Option<f64>) -> f64 {
         _ => 1.0,
     };
     faint * longer(care, TIMES[1])
-}
-
-/// A run that stops says something of the fluid; another error does not.
-pub fn stopped(error: RunError) -> Trouble {
-    if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
 }
 
 const OF_BULK: &str = "every = 5\npressure = true\nmsd = { every = 25, length = 10 }\n";
