@@ -3,16 +3,15 @@
 
 use crate::bulk::Observed;
 use crate::seek::rounded;
-use crate::steps::{FIRST, STEP};
-use crate::{ExperimentError, Trouble, jobs, steps};
+use crate::steps::FIRST;
+use crate::{ExperimentError, Trouble, bulk, steps};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
-use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::Scene;
 use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_observe::Measured;
 use serde::Serialize;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Edges along surfaces, and the thickness of a film or half of a slab.
@@ -111,24 +110,17 @@ impl Setting {
     /// The scene, with a model of this name and without the section on output.
     pub fn text(&self, model: &str, units: &Units, seed: u64) -> String {
         let Units { kt, range, dt, .. } = *units;
-        let steps = |time: f64| (time * range / kt.sqrt() / dt).ceil().max(100.0);
         let edges = self.edges.map(|edge| shown(edge * range));
-        let mut text = format!(
+        let head = format!(
             "title = \"{}\"\nmodel = {}\nkT    = {kt:?}\nseed  = {seed}\n\n[box]\nlengths  = {edges:?}\n{}\n{}",
             self.title,
             toml::Value::String(model.to_owned()),
             self.lines,
             self.parts,
         );
-        for (name, steps, dt) in [
-            ("begin", 400.0, FIRST * dt),
-            ("settle", steps(self.settle), dt),
-            ("measure", steps(self.time), dt),
-        ] {
-            let dt = rounded(dt);
-            let _ = write!(text, "\n[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
-        }
-        text + "\n[observe]\nstages = [\"measure\"]\n" + &self.observe
+        let times = [self.settle, self.time].map(|time| time * range / kt.sqrt());
+        let stages = steps::stages([FIRST * dt, dt].map(rounded), times);
+        head + &stages + "\n[observe]\nstages = [\"measure\"]\n" + &self.observe
     }
 }
 
@@ -142,16 +134,12 @@ pub struct Run {
 
 /// Runs scenes side by side; the last is the longest.
 pub fn run(runs: &[Run], folder: &Path) -> Result<Vec<Observed>, Trouble> {
-    let one = |(number, run): (usize, &Run)| -> Result<Observed, RunError> {
+    let scene = |run: &Run| -> Result<Scene, RunError> {
         let model = std::path::absolute(&run.model).unwrap_or_else(|_| run.model.clone());
         let text = run.setting.text(&model.display().to_string(), &run.units, run.seed) + OUTPUT;
-        let scene = Scene::parse(&run.setting.title, &text, Path::new(""))?;
-        let folder = folder.join(format!("run-{number}"));
-        run_scene(&scene, &folder, &mut |_| ())?;
-        Observed::read(&folder)
+        Ok(Scene::parse(&run.setting.title, &text, Path::new(""))?)
     };
-    let all = jobs::each(runs.iter().enumerate().collect(), one);
-    Ok(all.into_iter().collect::<Result<_, _>>()?)
+    Ok(bulk::side_by_side(runs.iter().map(scene).collect::<Result<_, _>>()?, folder)?)
 }
 
 /// The seeds of the runs of a result, none of which a search or another round has.

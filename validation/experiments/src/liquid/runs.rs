@@ -3,11 +3,11 @@
 use super::fluid::{Drag, Strengths, USUAL, text};
 use super::instrument::{Care, Equilibrium, Flow, Instrument};
 use super::sheet::Liquid;
-use crate::bulk::Observed;
-use crate::steps::{self, ADVISED, FIRST, STEP};
-use crate::{ExperimentError, Trouble, jobs};
+use crate::bulk::{self, Observed};
+use crate::steps::{self, ADVISED, FIRST};
+use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::Scene;
 use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_formats::files::{Existing, write_bytes};
@@ -63,7 +63,6 @@ struct Setting<'a> {
 
 impl Setting<'_> {
     fn text(&self, seed: u64) -> String {
-        let steps = |time: f64| (time / self.dt).ceil().max(100.0);
         let mut text = format!(
             "title = \"{}\"\nmodel = \"liquid.toml\"\nkT = 1.0\nseed = {seed}\nbox = {:?}\n{}",
             self.title, self.edges, self.initial
@@ -75,12 +74,7 @@ impl Setting<'_> {
                 self.acceleration
             );
         }
-        let mut stage = |name: &str, steps: f64, dt: f64| {
-            let _ = write!(text, "[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
-        };
-        stage("begin", 400.0, FIRST * self.dt);
-        stage("settle", steps(self.settle), self.dt);
-        stage("measure", steps(self.time), self.dt);
+        text += &steps::stages([FIRST * self.dt, self.dt], [self.settle, self.time]);
         text + "[output]\nthermo = 0\ncheckpoint = 0\n[observe]\n" + self.observe
     }
 }
@@ -119,16 +113,14 @@ impl Runs<'_> {
         }
     }
 
+    fn scenes(&self, settings: &[Setting], care: Care) -> Result<Vec<Scene>, RunError> {
+        let parse = |s: &Setting| Ok(Scene::parse(s.title, &s.text(self.seed(care)), self.folder)?);
+        settings.iter().map(parse).collect()
+    }
+
     /// Runs scenes side by side; the last is the longest.
     fn run(&self, settings: &[Setting], care: Care) -> Result<Vec<Observed>, Trouble> {
-        let run = |(number, setting): (usize, &Setting)| -> Result<Observed, RunError> {
-            let scene = Scene::parse(setting.title, &setting.text(self.seed(care)), self.folder)?;
-            let folder = self.folder.join(format!("run-{number}"));
-            run_scene(&scene, &folder, &mut |_| ())?;
-            Observed::read(&folder)
-        };
-        let all = jobs::each(settings.iter().enumerate().collect(), run);
-        let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let all = bulk::side_by_side(self.scenes(settings, care)?, self.folder)?;
         match all.iter().flat_map(|o| &o.0).find(|o| o.note.contains("are a crystal")) {
             Some(crystal) => Err(Trouble::Frozen(crystal.note.clone())),
             None => Ok(all),
@@ -180,10 +172,7 @@ impl Runs<'_> {
         care: Care,
     ) -> Vec<Scene> {
         self.model(fluid, drag).unwrap();
-        let scene = |setting: &Setting| {
-            Scene::parse(setting.title, &setting.text(self.seed(care)), self.folder).unwrap()
-        };
-        self.flows(guess, dt, care).iter().map(scene).collect()
+        self.scenes(&self.flows(guess, dt, care), care).unwrap()
     }
 }
 
