@@ -304,21 +304,20 @@ fn the_schema_refuses_unknown_and_missing_keys() {
     }
 }
 
-/// Puts a value of a type that no key has into the table at `path`; false if the table lacks the key.
-fn spoil(value: &mut toml::Value, path: &str, key: &str) -> bool {
+/// Puts another value for a key into the table at `path`, or takes the key away; false if the table lacks it.
+fn put(value: &mut toml::Value, path: &str, key: &str, new: Option<&toml::Value>) -> bool {
     let is_chosen = |name: &str| name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase());
     match value {
-        toml::Value::Array(items) => items.iter_mut().any(|item| spoil(item, path, key)),
+        toml::Value::Array(items) => items.iter_mut().any(|item| put(item, path, key, new)),
         toml::Value::Table(table) => {
             let (name, rest) = path.split_once('.').unwrap_or((path, ""));
             let (name, rest) = if path.is_empty() { (key, None) } else { (name, Some(rest)) };
-            let mut found = table.iter_mut().filter(|(k, _)| *k == name || is_chosen(name));
-            found.any(|(_, inner)| match rest {
-                Some(rest) => spoil(inner, rest, key),
-                None => {
-                    *inner = toml::Value::Array(vec![toml::Value::Array(Vec::new())]);
-                    true
-                }
+            let found: Vec<String> =
+                table.keys().filter(|k| *k == name || is_chosen(name)).cloned().collect();
+            found.into_iter().any(|k| match (rest, new) {
+                (Some(rest), _) => put(&mut table[&k], rest, key, new),
+                (None, Some(new)) => table.insert(k, new.clone()).is_some(),
+                (None, None) => table.remove(&k).is_some(),
             })
         }
         _ => false,
@@ -329,10 +328,12 @@ fn spoil(value: &mut toml::Value, path: &str, key: &str) -> bool {
 #[test]
 fn every_key_is_read() {
     let folder = folder();
+    // Of a type that no key has.
+    let wrong = toml::Value::Array(vec![toml::Value::Array(Vec::new())]);
     for table in TABLES {
         for key in table.keys {
             let mut scene: toml::Value = toml::from_str(&completed(key.example)).unwrap();
-            assert!(spoil(&mut scene, table.path, key.name), "{}", key.example);
+            assert!(put(&mut scene, table.path, key.name, Some(&wrong)), "{}", key.example);
             let text = toml::to_string(&scene).unwrap();
             let error = Scene::parse("s.toml", &text, folder.path()).expect_err(&text).to_string();
             let is_chosen = key.name == key.name.to_uppercase();
@@ -350,4 +351,56 @@ fn each_form_has_its_own_keys() {
         error.contains("radius") && error.ends_with("known here: file, frozen_ids, kind, velocities"),
         "{error}"
     );
+}
+
+/// A number, a flag or a name in words.
+fn literal(word: &str) -> Option<toml::Value> {
+    let word = word.trim_end_matches(',');
+    let value = match word.strip_prefix('`').and_then(|w| w.strip_suffix('`')) {
+        Some(name) => format!("{:?}", name.trim_matches('"')),
+        None => word.to_owned(),
+    };
+    toml::from_str::<toml::Table>(&format!("x = {value}")).ok()?.remove("x")
+}
+
+/// A key that is left out has the value that its description states.
+#[test]
+fn keys_that_are_left_out_have_the_values_that_are_stated() {
+    let folder = folder();
+    let parse = |text: &str| Scene::parse("s.toml", text, folder.path());
+    let mut checked = Vec::new();
+    for (table, key) in TABLES.iter().flat_map(|table| table.keys.iter().map(move |key| (table, key))) {
+        let Some((before, _)) = key.about.split_once(" if left out") else { continue };
+        // As in "Number of steps between frames; 0, no frames, if left out", or "Factor, 1 if left out".
+        let first = before.rsplit_once("; ").and_then(|(_, words)| words.split(' ').next());
+        let words = [first, before.split(' ').next_back()];
+        let Some(value) = words.into_iter().flatten().find_map(literal) else { continue };
+        let of = |change: &dyn Fn(&mut toml::Value) -> bool| {
+            let mut scene: toml::Value = toml::from_str(&completed(key.example)).unwrap();
+            assert!(change(&mut scene), "{}", key.example);
+            let text = toml::to_string(&scene).unwrap();
+            let s = parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            let walls = s.model.at(s.kt).unwrap().walls;
+            let precision = s.precision.unwrap_or_default();
+            format!("{:?}", (s.seed, precision, s.device, s.domain, s.initial, s.stages, s.output, walls))
+        };
+        let left_out = of(&|scene| put(scene, table.path, key.name, None));
+        let stated = of(&|scene| put(scene, table.path, key.name, Some(&value)));
+        assert_eq!(left_out, stated, "{}: {value}", key.name);
+        assert_ne!(left_out, of(&|_| true), "the example has the value that is stated: {}", key.example);
+        checked.push(key.name);
+    }
+    for table in observe::request::tables() {
+        let read = |line: &str| parse(&completed(&format!("[observe.{}]\n{line}\n", table.path)));
+        // Some observables need a flow, or a drop.
+        let Ok(left_out) = read("").map(|scene| scene.observe) else { continue };
+        for key in table.keys {
+            let Some(value) = literal(key.default()) else { continue };
+            let of = |value: &str| read(&format!("{} = {value}", key.name)).unwrap().observe;
+            assert_eq!(of(&value.to_string()), left_out, "{}.{}", table.path, key.name);
+            assert_ne!(of(key.example), left_out, "{}.{}", table.path, key.name);
+            checked.push(key.name);
+        }
+    }
+    assert!(checked.len() > 25, "{checked:?}");
 }

@@ -1,7 +1,8 @@
 //! A homogeneous fluid in a periodic box, run natively: what an equation of state is measured with.
 
+use crate::jobs;
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::{Begin, RunError, Runner};
+use psidpd_dynamics::run::{Begin, RunError, Runner, run_scene};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::PathError;
 use psidpd_formats::files::read_json_if_there;
@@ -101,6 +102,16 @@ pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) ->
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
     runner.run_to_end(&mut |p| bar.set(p.step))?;
     Observed::read(folder)
+}
+
+/// Runs scenes side by side, each in a folder within `folder`, and reads what they observed; the last is the longest.
+pub fn side_by_side(scenes: Vec<Scene>, folder: &Path) -> Result<Vec<Observed>, RunError> {
+    let one = |(number, scene): (usize, Scene)| {
+        let folder = folder.join(format!("run-{number}"));
+        run_scene(&scene, &folder, &mut |_| ())?;
+        Observed::read(&folder)
+    };
+    jobs::each(scenes.into_iter().enumerate().collect(), one).into_iter().collect()
 }
 
 #[derive(Debug, Clone)]

@@ -89,6 +89,33 @@ pub enum ExperimentError {
     Densities { given: usize, species: usize },
 }
 
+/// Why a fluid could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum Trouble {
+    #[error("it freezes: {0}")]
+    Frozen(String),
+    #[error("it does not run: {0}")]
+    Stopped(String),
+    #[error(transparent)]
+    Failed(#[from] ExperimentError),
+}
+
+/// A run that stops says something of the fluid; another error does not.
+impl From<RunError> for Trouble {
+    fn from(error: RunError) -> Trouble {
+        if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
+    }
+}
+
+/// What was measured, or what the fluid does instead.
+pub fn value_or_why<T>(measured: Result<T, Trouble>) -> Result<Result<T, String>, ExperimentError> {
+    match measured {
+        Ok(value) => Ok(Ok(value)),
+        Err(Trouble::Failed(error)) => Err(error),
+        Err(trouble) => Ok(Err(trouble.to_string())),
+    }
+}
+
 impl ExperimentError {
     /// For `map_err` of what is done with the file or folder `path`.
     pub fn at<E: ToString>(path: &Path) -> impl FnOnce(E) -> ExperimentError {

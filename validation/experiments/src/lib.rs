@@ -32,7 +32,7 @@ pub mod sweep;
 pub mod theory_page;
 pub mod wall;
 
-pub use error::ExperimentError;
+pub use error::{ExperimentError, Trouble};
 
 #[cfg(test)]
 #[path = "../../dynamics/src/tests/support.rs"]

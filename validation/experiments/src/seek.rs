@@ -1,6 +1,7 @@
 //! The strength at which a measured quantity, which grows with it, has a value: by two measurements at a time, until a straight line
 //! through those near the goal has it.
 
+use crate::Trouble;
 use psidpd_observe::Measured;
 
 /// A strength that was tried, and what was measured; `None` is below every value.
@@ -20,7 +21,7 @@ pub struct Goal {
     pub first: [f64; 2],
 }
 
-pub enum Next {
+enum Next {
     Found(f64),
     Try([f64; 2]),
     /// The goal is beyond the ends of what is tried.
@@ -39,14 +40,33 @@ const NEAR: f64 = 0.45;
 const CURVED: f64 = 0.2;
 
 /// How many pairs are tried at most.
-pub const PAIRS: usize = 7;
+const PAIRS: usize = 7;
 
 /// Four digits, as a file has it.
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-pub fn next(points: &[Point], goal: &Goal) -> Next {
+/// Seeks the strength; `trials` has what is known already, and what `pair` measures comes to it. `None` if the goal is beyond all.
+pub fn seek<T>(
+    goal: &Goal,
+    trials: &mut Vec<T>,
+    point: impl Fn(&T) -> Point,
+    mut pair: impl FnMut([f64; 2]) -> Result<[T; 2], Trouble>,
+) -> Result<Option<f64>, Trouble> {
+    let points = |trials: &[T]| trials.iter().map(&point).collect::<Vec<_>>();
+    for _ in 0..PAIRS {
+        match next(&points(trials), goal) {
+            Next::Found(strength) => return Ok(Some(strength)),
+            Next::Beyond => break,
+            Next::Try(strengths) => trials.extend(pair(strengths)?),
+        }
+    }
+    // The best line that there is.
+    Ok(line(&points(trials), goal.value).map(|(strength, _)| strength))
+}
+
+fn next(points: &[Point], goal: &Goal) -> Next {
     let [least, most] = ENDS;
     let is_below = |p: &&Point| p.value.is_none_or(|value| value.value < goal.value);
     let order = |a: &&Point, b: &&Point| a.strength.total_cmp(&b.strength);
@@ -81,7 +101,7 @@ pub fn next(points: &[Point], goal: &Goal) -> Next {
 
 /// The strength at which the straight line through the values near the goal has it, and the standard error of the line there; `None`
 /// unless there are values on both sides.
-pub fn line(points: &[Point], goal: f64) -> Option<(f64, f64)> {
+fn line(points: &[Point], goal: f64) -> Option<(f64, f64)> {
     let near: Vec<[f64; 3]> = points
         .iter()
         .filter_map(|p| {

@@ -2,18 +2,16 @@
 //! r √(m/kT).
 
 use crate::bulk::Observed;
-use crate::liquid::{Trouble, stopped};
 use crate::seek::rounded;
-use crate::steps::{FIRST, STEP};
-use crate::{ExperimentError, jobs, steps};
+use crate::steps::FIRST;
+use crate::{ExperimentError, Trouble, bulk, steps};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
-use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::Scene;
 use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_observe::Measured;
 use serde::Serialize;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Edges along surfaces, and the thickness of a film or half of a slab.
@@ -36,6 +34,33 @@ pub struct Units {
     /// The number density of the liquid.
     pub density: f64,
     pub dt: f64,
+}
+
+/// A liquid beside its vapour, in units of its model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Slab {
+    pub tension: Measured,
+    /// The number density of the liquid.
+    pub density: Measured,
+}
+
+impl Slab {
+    /// What a run of [`Setting::slab`] has observed.
+    pub fn of(observed: &Observed) -> Slab {
+        Slab {
+            tension: observed.scalar("surface_tension", "free_energy"),
+            density: observed.scalar("interface_width", "liquid"),
+        }
+    }
+}
+
+impl Units {
+    /// Takes the density of the liquid from a slab of it.
+    pub fn learn(&mut self, slab: &Slab) {
+        if slab.density.value > 0.0 {
+            self.density = slab.density.value;
+        }
+    }
 }
 
 /// A box, and where liquid is in it.
@@ -85,24 +110,17 @@ impl Setting {
     /// The scene, with a model of this name and without the section on output.
     pub fn text(&self, model: &str, units: &Units, seed: u64) -> String {
         let Units { kt, range, dt, .. } = *units;
-        let steps = |time: f64| (time * range / kt.sqrt() / dt).ceil().max(100.0);
         let edges = self.edges.map(|edge| shown(edge * range));
-        let mut text = format!(
+        let head = format!(
             "title = \"{}\"\nmodel = {}\nkT    = {kt:?}\nseed  = {seed}\n\n[box]\nlengths  = {edges:?}\n{}\n{}",
             self.title,
             toml::Value::String(model.to_owned()),
             self.lines,
             self.parts,
         );
-        for (name, steps, dt) in [
-            ("begin", 400.0, FIRST * dt),
-            ("settle", steps(self.settle), dt),
-            ("measure", steps(self.time), dt),
-        ] {
-            let dt = rounded(dt);
-            let _ = write!(text, "\n[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
-        }
-        text + "\n[observe]\nstages = [\"measure\"]\n" + &self.observe
+        let times = [self.settle, self.time].map(|time| time * range / kt.sqrt());
+        let stages = steps::stages([FIRST * dt, dt].map(rounded), times);
+        head + &stages + "\n[observe]\nstages = [\"measure\"]\n" + &self.observe
     }
 }
 
@@ -116,20 +134,27 @@ pub struct Run {
 
 /// Runs scenes side by side; the last is the longest.
 pub fn run(runs: &[Run], folder: &Path) -> Result<Vec<Observed>, Trouble> {
-    let one = |(number, run): (usize, &Run)| -> Result<Observed, RunError> {
+    let scene = |run: &Run| -> Result<Scene, RunError> {
         let model = std::path::absolute(&run.model).unwrap_or_else(|_| run.model.clone());
         let text = run.setting.text(&model.display().to_string(), &run.units, run.seed) + OUTPUT;
-        let scene = Scene::parse(&run.setting.title, &text, Path::new(""))?;
-        let folder = folder.join(format!("run-{number}"));
-        run_scene(&scene, &folder, &mut |_| ())?;
-        Observed::read(&folder)
+        Ok(Scene::parse(&run.setting.title, &text, Path::new(""))?)
     };
-    let all = jobs::each(runs.iter().enumerate().collect(), one);
-    all.into_iter().collect::<Result<_, _>>().map_err(stopped)
+    Ok(bulk::side_by_side(runs.iter().map(scene).collect::<Result<_, _>>()?, folder)?)
+}
+
+/// The seeds of the runs of a result, none of which a search or another round has.
+pub fn seeds_of_result(seed: u64, round: u64) -> [u64; 3] {
+    [0, 1, 2].map(|number| seed.wrapping_add(1000 + 10 * round + number))
 }
 
 pub fn mean([a, b]: [Measured; 2]) -> Measured {
     a.plus(b).times(0.5)
+}
+
+/// The value of a profile at the place that is nearest.
+pub fn nearest(profile: &[(f64, Measured)], z: f64) -> Measured {
+    let nearest = profile.iter().min_by(|a, b| (a.0 - z).abs().total_cmp(&(b.0 - z).abs()));
+    nearest.map_or(Measured::NONE, |(_, value)| *value)
 }
 
 /// The units of a liquid of one species with this mass, settled, at about this density or that of theory. `named` is what errors call it,
@@ -162,6 +187,29 @@ fn guess(fluid: &Fluid) -> Result<Option<f64>, ExperimentError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn runs_of_results_have_seeds_of_their_own() {
+        for seed in [0, 7, u64::MAX] {
+            let search = [seed, seed.wrapping_add(1)];
+            let mut all: Vec<u64> =
+                (0..5).flat_map(|round| seeds_of_result(seed, round)).chain(search).collect();
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), 17);
+        }
+    }
+
+    #[test]
+    fn the_value_at_the_nearest_place_counts() {
+        let profile: Vec<_> =
+            (0..4).map(|k| (f64::from(k) - 0.5, Measured::from(f64::from(10 + k)))).collect();
+        for (z, expected) in [(-3.0, 10.0), (-0.1, 10.0), (0.1, 11.0), (1.4, 12.0), (2.1, 13.0), (40.0, 13.0)]
+        {
+            assert_eq!(nearest(&profile, z).value, expected, "{z}");
+        }
+        assert!(nearest(&[], 1.0).value.is_nan());
+    }
 
     /// Lengths four times as long make the density of a liquid 64 times as small, and time steps four times as long; its guess is that
     /// of Warren's liquid, 6.05, within a few percent.

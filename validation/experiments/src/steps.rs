@@ -4,7 +4,7 @@ use psidpd_dynamics::integrator::{Coupling, Integrator};
 use psidpd_dynamics::trial::{Piece, two_digits};
 
 /// The lines of the step in a stage of a scene, without dt.
-pub const STEP: &str = "integrator = \"force-gradient\"\nlambda = 0.17\nthermostat_every = 2\n";
+const STEP: &str = "integrator = \"force-gradient\"\nlambda = 0.17\nthermostat_every = 2\n";
 
 pub const ADVISED: Integrator = Integrator::ForceGradient {
     lambda: 0.17,
@@ -17,6 +17,15 @@ const STRIDE: f64 = 0.9;
 
 /// A start that is no liquid yet needs short steps: their share of dt.
 pub const FIRST: f64 = 0.15;
+
+/// The stages of a run: with the first of two time steps it begins, with the second it settles and is measured for two times.
+pub fn stages([first, dt]: [f64; 2], times: [f64; 2]) -> String {
+    let [settle, measure] = times.map(|time| (time / dt).ceil().max(100.0));
+    let stage = |(name, steps, dt): (&str, f64, f64)| {
+        format!("\n[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}")
+    };
+    [("begin", 400.0, first), ("settle", settle, dt), ("measure", measure, dt)].map(stage).concat()
+}
 
 pub fn dt(piece: &Piece) -> f64 {
     two_digits(STRIDE / piece.frequency)

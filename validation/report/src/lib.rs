@@ -24,7 +24,7 @@ pub use progress::{Bar, Overall, Progress, to_stderr};
 pub use results::{Check, Results};
 pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
-pub use text::typeset;
+pub use text::{named, typeset};
 
 /// The lowest and the highest of the values that are finite; infinity and its negative if there are none.
 pub fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -77,6 +77,14 @@ pub(super) fn of_lengths(unit: &str, dimensions: usize) -> String {
     }
 }
 
+/// A name with its unit, unless it is a pure number.
+pub fn named(name: &str, unit: &str) -> String {
+    match unit {
+        "" | "1" => name.to_owned(),
+        unit => format!("{name} [{}]", typeset(unit)),
+    }
+}
+
 /// Powers as superscripts: `r_c^-3` becomes `r_c⁻³`. Other exponents stay unchanged.
 pub fn typeset(text: &str) -> String {
     let mut out = String::new();

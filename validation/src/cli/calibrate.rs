@@ -161,8 +161,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
 /// The command line that repeats the calibration.
 fn command(a: &Arguments) -> String {
     let [low, high] = a.density;
-    let name = |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
-    let mut text = format!("psidpd calibrate {} --kT {} --density {low}:{high}", name(&a.model), a.kt);
+    let mut text = format!("psidpd calibrate {} --kT {} --density {low}:{high}", file_name(&a.model), a.kt);
     let mut add = |option: String| {
         text.push(' ');
         text.push_str(&option);
@@ -184,7 +183,7 @@ fn command(a: &Arguments) -> String {
         a.steps,
         a.runs.dt,
         a.runs.seed,
-        name(&a.out)
+        file_name(&a.out)
     ));
     text
 }

@@ -278,6 +278,11 @@ fn shown(path: impl AsRef<Path>) -> String {
     path.as_ref().display().to_string()
 }
 
+/// The last part of a path, for the command in the head of a file.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+}
+
 /// Writes the results of a verb as [`write_json`] does, and ends it: well, or with a failed check.
 fn conclude(told: Told, value: &impl Serialize, good: bool) -> Result<Verdict, Failure> {
     write_json(told, value)?;

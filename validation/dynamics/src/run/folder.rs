@@ -3,8 +3,9 @@ use psidpd_formats::PathError;
 use std::fs::{File, TryLockError, create_dir_all};
 use std::path::{Path, PathBuf};
 
-/// The folder of a run, locked against other runs. The lock ends with the process, even if that is killed.
-pub(super) struct Folder {
+/// The folder of a run or of a sweep, locked against others. The lock ends with the process, even if that is killed.
+#[derive(Debug)]
+pub struct Folder {
     pub path: PathBuf,
     _lock: File,
 }
@@ -16,7 +17,7 @@ impl Folder {
         let lock = File::open(path).map_err(PathError::at("write", path))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => Err(RunError::Busy { folder: path.to_owned() }),
-            // Some file systems have no locks; a run there has none.
+            // Some file systems have no locks; what is there has none.
             _ => Ok(Folder { path: path.to_owned(), _lock: lock }),
         }
     }

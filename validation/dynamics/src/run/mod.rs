@@ -35,6 +35,7 @@ pub use crate::particles::{BodyForce, State, StateError, Tags};
 pub use advice::Advice;
 pub(crate) use bounds::Surfaces;
 pub use error::RunError;
+pub use folder::Folder;
 pub use length::Length;
 pub use live::Live;
 pub use memory::{bytes, check_memory};

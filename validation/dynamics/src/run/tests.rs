@@ -16,6 +16,7 @@ mod held;
 mod hot;
 mod integrators;
 mod live;
+mod matter;
 mod monte_carlo;
 mod order;
 mod rates;

@@ -165,10 +165,16 @@ fn conserved(scene: &Scene, integrator: Integrator) -> Result<Found, ExperimentE
 
 #[cfg(test)]
 mod tests {
+    use super::super::case::judge;
     use super::super::{Extent, cases};
     use super::*;
     use crate::test_support::IDEAL;
     use psidpd_core::engine::Fault;
+
+    fn carried_out(case: &Case) -> Found {
+        let folder = tempfile::tempdir().unwrap();
+        carry_out(case, Integrator::VelocityVerlet, Precision::Double, folder.path()).unwrap()
+    }
 
     /// Masses of 1 and 3: 3 and −3 cancel, and both along x are the whole of Σ m |v|; at a right angle they are 1/√2 of it.
     #[test]
@@ -190,14 +196,12 @@ mod tests {
     fn a_gas_that_drifts_is_not_right() {
         let part =
             "[[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.0]\nhigh = [4.0, 4.0, 4.0]\ndensity = 3.0\n";
-        let must = super::super::case::Must::Right(0.04);
+        let must = Must::Right(0.04);
         let judged = |drift: &str| {
             let run = Inputs::new(IDEAL, 4.0, format!("box = 4.0\n{part}{drift}"), 0.02, [200, 2000]);
             let case = Case::new("drift", run, must);
-            let folder = tempfile::tempdir().unwrap();
-            let integrator = Integrator::VelocityVerlet;
-            let found = carry_out(&case, integrator, Precision::Double, folder.path()).unwrap();
-            (super::super::case::judge(must, &found, false), found)
+            let found = carried_out(&case);
+            (judge(must, &found, false), found)
         };
         let (right, found) = judged("");
         assert_eq!(right, Ok(()), "{found:?}");
@@ -224,11 +228,8 @@ mod tests {
         ] {
             let case = named(words);
             for fault in [None, Some(fault)] {
-                let folder = tempfile::tempdir().unwrap();
-                let integrator = Integrator::VelocityVerlet;
-                let carried = || carry_out(&case, integrator, Precision::Double, folder.path());
-                let found = Fault::during(fault, carried).unwrap();
-                let judged = super::super::case::judge(case.must, &found, false);
+                let found = Fault::during(fault, || carried_out(&case));
+                let judged = judge(case.must, &found, false);
                 assert_eq!(judged.is_err(), fault.is_some(), "{words}: {fault:?}: {found:?}");
                 // As a part of the largest force, which is not 1 here.
                 if let (Some(_), Found::Differs(part)) = (fault, &found) {
@@ -244,11 +245,9 @@ mod tests {
         let case = cases(Extent::Quick).into_iter().find(|case| case.group == "long runs").unwrap();
         let judged = |model: String| {
             let case = Case { run: Inputs { model, ..case.run.clone() }, ..case.clone() };
-            let folder = tempfile::tempdir().unwrap();
-            let integrator = Integrator::VelocityVerlet;
-            let found = carry_out(&case, integrator, Precision::Double, folder.path()).unwrap();
+            let found = carried_out(&case);
             let Found::Changed { energy, .. } = found else { panic!("{found:?}") };
-            (super::super::case::judge(case.must, &found, false).is_ok(), energy)
+            (judge(case.must, &found, false).is_ok(), energy)
         };
         let model = case.run.model.clone();
         let lucy = model.replace("kernel = \"quadratic\"", "kernel = \"lucy\"\nforce_kernel = \"quadratic\"");

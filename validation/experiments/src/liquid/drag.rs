@@ -1,9 +1,9 @@
 //! The drag with which a liquid has its viscosity.
 
 use super::fluid::{Drag, Strengths, USUAL};
-use super::instrument::{Care, Flow, Instrument, Trouble};
+use super::instrument::{Care, Flow, Instrument};
 use super::sheet::Goals;
-use crate::ExperimentError;
+use crate::Trouble;
 use serde::Serialize;
 
 /// Weights by rising viscosity at the same strength.
@@ -49,16 +49,12 @@ pub fn search(
     tolerance: f64,
     instrument: &mut dyn Instrument,
     told: &mut dyn FnMut(&str),
-) -> Result<Result<Vec<Tried>, String>, ExperimentError> {
+) -> Result<Vec<Tried>, Trouble> {
     let mut trials: Vec<Tried> = Vec::new();
     let mut drag = USUAL;
     let mut guess = 2.0 + per_gamma(&drag, goals.density) * drag.gamma;
     for _ in 0..TRIALS {
-        let flow = match instrument.flow(fluid, &drag, guess, Care::Search) {
-            Ok(flow) => flow,
-            Err(Trouble::Failed(error)) => return Err(error),
-            Err(trouble) => return Ok(Err(trouble.to_string())),
-        };
+        let flow = instrument.flow(fluid, &drag, guess, Care::Search)?;
         told(&format!(
             "gamma = {:.3} (range {}, exponent {}): viscosity {:.2}({:.2})",
             drag.gamma, drag.range, drag.exponent, flow.viscosity.value, flow.viscosity.error
@@ -75,7 +71,7 @@ pub fn search(
         let off = |tried: &Tried| (tried.flow.viscosity.value / goal).ln().abs();
         trials.sort_by(|a, b| off(b).total_cmp(&off(a)));
     }
-    Ok(Ok(trials))
+    Ok(trials)
 }
 
 /// The next drag: of the weight that reaches the goal in comfort, between two trials of this weight by the straight line in logarithms.

@@ -1,7 +1,7 @@
 //! What measures a fluid: runs, or in tests a fluid that is known.
 
 use super::fluid::{Drag, Strengths};
-use crate::ExperimentError;
+use crate::Trouble;
 use psidpd_observe::Measured;
 use serde::Serialize;
 
@@ -32,17 +32,6 @@ pub enum Care {
     Search,
     /// Longer runs from another seed.
     Result(u64),
-}
-
-/// Why a fluid could not be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum Trouble {
-    #[error("it freezes: {0}")]
-    Frozen(String),
-    #[error("it does not run: {0}")]
-    Stopped(String),
-    #[error(transparent)]
-    Failed(#[from] ExperimentError),
 }
 
 pub trait Instrument {

@@ -23,13 +23,13 @@ mod theory;
 pub use drag::Tried;
 pub use error::{LiquidError, Refusal};
 pub use fluid::{Drag, Strengths};
-pub use instrument::{Care, Equilibrium, Flow, Instrument, Trouble};
+pub use instrument::{Care, Equilibrium, Flow, Instrument};
 pub use numbers::{Number, Properties, Scales};
-pub(crate) use runs::stopped;
 pub use search::Trial;
 pub use sheet::{ENTRIES, Entries, Entry, Goals, Liquid, TOLERANCE, Tolerance};
 
-use crate::ExperimentError;
+use crate::error::value_or_why;
+use crate::{ExperimentError, Trouble};
 use psidpd_formats::files::temporary_folder;
 use psidpd_observe::Measured;
 use search::End;
@@ -136,11 +136,13 @@ fn model_by(
         found.rows = rows(liquid, None, None);
         return Ok(found);
     }
-    let equilibrium = equilibrium(liquid, instrument, &mut found, told)?;
+    let equilibrium = value_or_why(equilibrium(liquid, instrument, &mut found, told))?;
+    let equilibrium = found.unless_refused(equilibrium);
     let flow = match equilibrium {
-        Some(_) => flow(liquid, instrument, &mut found, told)?,
-        None => None,
+        Some(_) => value_or_why(flow(liquid, instrument, &mut found, told))?,
+        None => Ok(None),
     };
+    let flow = found.unless_refused(flow);
     found.rows = rows(liquid, equilibrium.as_ref(), flow.as_ref());
     found.numbers = compared(liquid, &found.rows);
     found.good = found.refusals.is_empty() && found.rows.iter().all(Row::is_met) && flow.is_some();
@@ -197,7 +199,7 @@ fn equilibrium(
     instrument: &mut dyn Instrument,
     found: &mut Found,
     told: &mut dyn FnMut(&str),
-) -> Result<Option<Equilibrium>, ExperimentError> {
+) -> Result<Option<Equilibrium>, Trouble> {
     let goals = &liquid.goals;
     let mut result = None;
     for round in 0..ROUNDS {
@@ -210,14 +212,7 @@ fn equilibrium(
         };
         found.fluid = best.fluid;
         told("measuring the result, three times as long and from another seed");
-        let again = match instrument.equilibrium(&best.fluid, Care::Result(round)) {
-            Ok(again) => again,
-            Err(Trouble::Failed(error)) => return Err(error),
-            Err(trouble) => {
-                found.refusals.push(Refusal::NoLiquid { why: trouble.to_string() });
-                return Ok(None);
-            }
-        };
+        let again = instrument.equilibrium(&best.fluid, Care::Result(round))?;
         result = Some(again);
         let met = search::score(&again, goals, &TOLERANCE) <= 1.0;
         match end {
@@ -275,30 +270,15 @@ fn flow(
     instrument: &mut dyn Instrument,
     found: &mut Found,
     told: &mut dyn FnMut(&str),
-) -> Result<Option<Flow>, ExperimentError> {
+) -> Result<Option<Flow>, Trouble> {
     let goals = &liquid.goals;
-    let tried = drag::search(goals, &found.fluid, 0.5 * TOLERANCE.viscosity, instrument, told)?;
-    let last = match &tried {
-        Ok(tried) => tried.last().copied(),
-        Err(why) => {
-            found.refusals.push(Refusal::NoLiquid { why: why.clone() });
-            None
-        }
-    };
-    let Some(Tried { drag, flow: first }) = last else { return Ok(None) };
-    found.drags = tried.unwrap_or_default();
+    found.drags = drag::search(goals, &found.fluid, 0.5 * TOLERANCE.viscosity, instrument, told)?;
+    let Some(Tried { drag, flow: first }) = found.drags.last().copied() else { return Ok(None) };
     found.drag = drag;
     let mut guess = first.viscosity.value;
     let mut flow = None;
     for round in 0..ROUNDS {
-        let again = match instrument.flow(&found.fluid, &found.drag, guess, Care::Result(round)) {
-            Ok(again) => again,
-            Err(Trouble::Failed(error)) => return Err(error),
-            Err(trouble) => {
-                found.refusals.push(Refusal::NoLiquid { why: trouble.to_string() });
-                return Ok(None);
-            }
-        };
+        let again = instrument.flow(&found.fluid, &found.drag, guess, Care::Result(round))?;
         flow = Some(again);
         guess = again.viscosity.value;
         let Some(goal) = goals.viscosity else { break };
@@ -387,6 +367,14 @@ fn compared(liquid: &Liquid, rows: &[Row]) -> Vec<Number> {
 }
 
 impl Found {
+    /// What was measured; what the fluid does instead is a refusal.
+    fn unless_refused<T>(&mut self, measured: Result<Option<T>, String>) -> Option<T> {
+        measured.unwrap_or_else(|why| {
+            self.refusals.push(Refusal::NoLiquid { why });
+            None
+        })
+    }
+
     /// The step to take, in words.
     pub fn advice(&self) -> Option<String> {
         let (step, [.., time]) = (self.step?, self.units);

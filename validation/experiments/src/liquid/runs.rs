@@ -1,13 +1,13 @@
 //! Measures by runs: the homogeneous liquid at three densities, a slab of it in its vapour, and two flows side by side.
 
 use super::fluid::{Drag, Strengths, USUAL, text};
-use super::instrument::{Care, Equilibrium, Flow, Instrument, Trouble};
+use super::instrument::{Care, Equilibrium, Flow, Instrument};
 use super::sheet::Liquid;
-use crate::bulk::Observed;
-use crate::steps::{self, ADVISED, FIRST, STEP};
-use crate::{ExperimentError, jobs};
+use crate::bulk::{self, Observed};
+use crate::steps::{self, ADVISED, FIRST};
+use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::Scene;
 use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_formats::files::{Existing, write_bytes};
@@ -63,7 +63,6 @@ struct Setting<'a> {
 
 impl Setting<'_> {
     fn text(&self, seed: u64) -> String {
-        let steps = |time: f64| (time / self.dt).ceil().max(100.0);
         let mut text = format!(
             "title = \"{}\"\nmodel = \"liquid.toml\"\nkT = 1.0\nseed = {seed}\nbox = {:?}\n{}",
             self.title, self.edges, self.initial
@@ -75,12 +74,7 @@ impl Setting<'_> {
                 self.acceleration
             );
         }
-        let mut stage = |name: &str, steps: f64, dt: f64| {
-            let _ = write!(text, "[[stage]]\nname = \"{name}\"\nsteps = {steps}\ndt = {dt:?}\n{STEP}");
-        };
-        stage("begin", 400.0, FIRST * self.dt);
-        stage("settle", steps(self.settle), self.dt);
-        stage("measure", steps(self.time), self.dt);
+        text += &steps::stages([FIRST * self.dt, self.dt], [self.settle, self.time]);
         text + "[output]\nthermo = 0\ncheckpoint = 0\n[observe]\n" + self.observe
     }
 }
@@ -96,7 +90,7 @@ impl Runs<'_> {
     fn piece(&self, model: &Model) -> Result<Piece, Trouble> {
         let densities = [self.liquid.goals.density];
         let of = Composition { model, masses: &[1.0], kt: 1.0, densities: &densities, seed: self.seed };
-        match Piece::settled(&of).map_err(stopped)? {
+        match Piece::settled(&of)? {
             Ok(piece) => Ok(piece),
             Err(why) => Err(Trouble::Stopped(why.to_string())),
         }
@@ -109,7 +103,7 @@ impl Runs<'_> {
     /// The longest step with errors of about a percent.
     pub fn longest_step(&self, fluid: &Strengths, drag: &Drag) -> Result<Option<f64>, Trouble> {
         let piece = self.piece(&self.model(fluid, drag)?)?;
-        Ok(piece.longest(ADVISED).map_err(stopped)?.map(|(dt, _)| dt))
+        Ok(piece.longest(ADVISED)?.map(|(dt, _)| dt))
     }
 
     fn seed(&self, care: Care) -> u64 {
@@ -119,16 +113,14 @@ impl Runs<'_> {
         }
     }
 
+    fn scenes(&self, settings: &[Setting], care: Care) -> Result<Vec<Scene>, RunError> {
+        let parse = |s: &Setting| Ok(Scene::parse(s.title, &s.text(self.seed(care)), self.folder)?);
+        settings.iter().map(parse).collect()
+    }
+
     /// Runs scenes side by side; the last is the longest.
     fn run(&self, settings: &[Setting], care: Care) -> Result<Vec<Observed>, Trouble> {
-        let run = |(number, setting): (usize, &Setting)| -> Result<Observed, RunError> {
-            let scene = Scene::parse(setting.title, &setting.text(self.seed(care)), self.folder)?;
-            let folder = self.folder.join(format!("run-{number}"));
-            run_scene(&scene, &folder, &mut |_| ())?;
-            Observed::read(&folder)
-        };
-        let all = jobs::each(settings.iter().enumerate().collect(), run);
-        let all: Vec<Observed> = all.into_iter().collect::<Result<_, _>>().map_err(stopped)?;
+        let all = bulk::side_by_side(self.scenes(settings, care)?, self.folder)?;
         match all.iter().flat_map(|o| &o.0).find(|o| o.note.contains("are a crystal")) {
             Some(crystal) => Err(Trouble::Frozen(crystal.note.clone())),
             None => Ok(all),
@@ -180,10 +172,7 @@ impl Runs<'_> {
         care: Care,
     ) -> Vec<Scene> {
         self.model(fluid, drag).unwrap();
-        let scene = |setting: &Setting| {
-            Scene::parse(setting.title, &setting.text(self.seed(care)), self.folder).unwrap()
-        };
-        self.flows(guess, dt, care).iter().map(scene).collect()
+        self.scenes(&self.flows(guess, dt, care), care).unwrap()
     }
 }
 
@@ -198,11 +187,6 @@ pub fn slab_time(care: Care, tension: Option<f64>) -> f64 {
         _ => 1.0,
     };
     faint * longer(care, TIMES[1])
-}
-
-/// A run that stops says something of the fluid; another error does not.
-pub fn stopped(error: RunError) -> Trouble {
-    if error.is_stop() { Trouble::Stopped(error.to_string()) } else { Trouble::Failed(error.into()) }
 }
 
 const OF_BULK: &str = "every = 5\npressure = true\nmsd = { every = 25, length = 10 }\n";

@@ -5,10 +5,11 @@
 //! that is off by a half needs one or two steps more.
 
 use super::fluid::Strengths;
-use super::instrument::{Care, Equilibrium, Instrument, Trouble};
+use super::instrument::{Care, Equilibrium, Instrument};
 use super::sheet::{Goals, Tolerance};
 use super::theory::{free, start, theory};
 use crate::ExperimentError;
+use crate::error::value_or_why;
 use nalgebra::{DMatrix, DVector};
 use psidpd_observe::Measured;
 use serde::Serialize;
@@ -134,10 +135,9 @@ fn measured(
 ) -> Result<Result<Equilibrium, String>, ExperimentError> {
     let mut why = String::new();
     for _ in 0..3 {
-        match instrument.equilibrium(next, Care::Search) {
+        match value_or_why(instrument.equilibrium(next, Care::Search))? {
             Ok(found) => return Ok(Ok(found)),
-            Err(Trouble::Failed(error)) => return Err(error),
-            Err(trouble) => why = trouble.to_string(),
+            Err(trouble) => why = trouble,
         }
         told(&format!("A = {:.2}, c1 = {:.3}, c2 = {:.4}: {why}", next.attraction, next.linear, next.square));
         // Without a result yet: toward Warren's liquid.

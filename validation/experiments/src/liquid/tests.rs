@@ -23,7 +23,18 @@ const WATER: [(&str, f64); 6] = [
 ];
 
 fn water(more: &[(&str, f64)]) -> Result<Liquid, LiquidError> {
-    Liquid::new("water", &entries(&[&WATER[..], more].concat()))
+    water_without(&[], more)
+}
+
+fn water_without(keys: &[&str], more: &[(&str, f64)]) -> Result<Liquid, LiquidError> {
+    let rest = WATER.iter().filter(|(key, _)| !keys.contains(key)).chain(more);
+    Liquid::new("water", &entries(&rest.copied().collect::<Vec<_>>()))
+}
+
+/// A liquid with the usual density and this number of particles in r_c³.
+fn of_number_density(number_density: f64) -> Liquid {
+    let all = [("density", 1000.0), ("temperature", 300.0), ("rc", 1e-9), ("number_density", number_density)];
+    Liquid::new("w", &entries(&all)).unwrap()
 }
 
 fn close(found: f64, expected: f64, share: f64) {
@@ -50,10 +61,7 @@ fn units_are_those_of_si() {
     let drop = water(&[("drop", 2e-8), ("particles", 4.18879e-24 / 9.00114e-29)]).unwrap();
     close(drop.molecules().unwrap(), 3.0, 1e-3);
     // c² = 1/ρκ.
-    let fast: Vec<_> = WATER.iter().copied().filter(|(key, _)| *key != "compressibility").collect();
-    let fast =
-        Liquid::new("w", &entries(&[&fast[..], &[("sound_speed", 1488.8), ("molecules", 3.0)]].concat()))
-            .unwrap();
+    let fast = water_without(&["compressibility"], &[("sound_speed", 1488.8), ("molecules", 3.0)]).unwrap();
     close(fast.goals.stiffness.unwrap(), 48.32, 1e-3);
 }
 
@@ -119,9 +127,7 @@ fn impossible_numbers_name_the_nearest_possible_ones() {
     };
     // Of the same particles with that compressibility, and of particles with that volume.
     let of = |kappa: f64, more: (&'static str, f64)| {
-        let rest: Vec<_> =
-            WATER.iter().copied().filter(|(key, _)| !["compressibility", "tension"].contains(key)).collect();
-        Liquid::new("w", &entries(&[&rest[..], &[("compressibility", kappa), more]].concat())).unwrap()
+        water_without(&["compressibility", "tension"], &[("compressibility", kappa), more]).unwrap()
     };
     assert_eq!(refused(&of(1.001 * nearest_compressibility, ("molecules", 50.0))), None);
     assert!(refused(&of(0.999 * nearest_compressibility, ("molecules", 50.0))).is_some());
@@ -134,8 +140,7 @@ fn impossible_numbers_name_the_nearest_possible_ones() {
         panic!()
     };
     assert_eq!(refused(&water(&[("molecules", 1.001 * more)]).unwrap()), None);
-    let free: Vec<_> = WATER.iter().copied().filter(|(key, _)| *key != "compressibility").collect();
-    let of = |n: f64| Liquid::new("w", &entries(&[&free[..], &[("molecules", n)]].concat())).unwrap();
+    let of = |n: f64| water_without(&["compressibility"], &[("molecules", n)]).unwrap();
     let Some(Refusal::TooTense { nearest_molecules: Some(fewer), nearest_tension, .. }) = refused(&of(1e3))
     else {
         panic!()
@@ -143,8 +148,7 @@ fn impossible_numbers_name_the_nearest_possible_ones() {
     assert_eq!(refused(&of(0.999 * fewer)), None);
     // 1000 molecules of a liquid with that tension, whose compressibility is free.
     let of = |sigma: f64| {
-        let rest: Vec<_> = free.iter().copied().filter(|(key, _)| *key != "tension").collect();
-        Liquid::new("w", &entries(&[&rest[..], &[("tension", sigma), ("molecules", 1e3)]].concat())).unwrap()
+        water_without(&["compressibility", "tension"], &[("tension", sigma), ("molecules", 1e3)]).unwrap()
     };
     assert_eq!(refused(&of(0.999 * nearest_tension)), None);
     assert!(refused(&of(1.001 * nearest_tension)).is_some());
@@ -445,8 +449,7 @@ fn the_model_says_its_step_and_what_it_measured() {
 /// the drag that is asked for. Five standard errors and the 5 % of shear thinning and of the size of boxes.
 #[test]
 fn flows_have_the_viscosity_of_their_drag() {
-    let sheet = [("density", 1000.0), ("temperature", 300.0), ("rc", 1e-9), ("number_density", 3.0)];
-    let liquid = Liquid::new("standard DPD", &entries(&sheet)).unwrap();
+    let liquid = of_number_density(3.0);
     let folder = temporary_folder().unwrap();
     let mut runs = runs::Runs { liquid: &liquid, folder: folder.path(), seed: 3 };
     let fluid = Strengths { attraction: 25.0, linear: 0.0, square: 0.0 };
@@ -459,8 +462,7 @@ fn flows_have_the_viscosity_of_their_drag() {
 /// come from another seed and runs that are three times as long, and from the liquid at rest, at its density.
 #[test]
 fn flows_are_slow_and_results_longer() {
-    let sheet = [("density", 1000.0), ("temperature", 300.0), ("rc", 1e-9), ("number_density", 5.0)];
-    let liquid = Liquid::new("w", &entries(&sheet)).unwrap();
+    let liquid = of_number_density(5.0);
     let folder = temporary_folder().unwrap();
     let runs = runs::Runs { liquid: &liquid, folder: folder.path(), seed: 3 };
     let fluid = Strengths { attraction: -40.0, linear: 0.0, square: 0.8 };
@@ -536,8 +538,7 @@ fn dimensionless_numbers_are_those_of_textbooks() {
 /// times the attraction is a crystal.
 #[test]
 fn runs_measure_a_published_liquid_and_see_a_crystal() {
-    let of_set6 = [("density", 1000.0), ("temperature", 300.0), ("rc", 1e-9), ("number_density", 6.05)];
-    let liquid = Liquid::new("set 6", &entries(&of_set6)).unwrap();
+    let liquid = of_number_density(6.05);
     let folder = temporary_folder().unwrap();
     let mut runs = runs::Runs { liquid: &liquid, folder: folder.path(), seed: 5 };
     let unit = std::f64::consts::PI / 30.0 * RANGE.powi(4);

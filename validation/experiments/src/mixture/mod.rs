@@ -12,9 +12,10 @@ mod tests;
 
 pub use merge::Liquid;
 
-use crate::ExperimentError;
-use crate::liquid::Trouble;
-use crate::seek::{Goal, Next, PAIRS, Point, line, next, rounded};
+use crate::error::value_or_why;
+use crate::seek::{Goal, Point, rounded, seek};
+use crate::slabs::Slab;
+use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Units;
 use psidpd_formats::files::temporary_folder;
 use psidpd_observe::Measured;
@@ -43,13 +44,6 @@ pub struct Sought {
     pub seed: u64,
 }
 
-/// A liquid beside its vapour, in units of the models.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Alone {
-    pub tension: Measured,
-    pub density: Measured,
-}
-
 /// A pair of layers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Layers {
@@ -66,7 +60,7 @@ pub struct Trial {
 
 /// What measures: runs, or in tests liquids that are known.
 trait Instrument {
-    fn alone(&mut self) -> Result<[Alone; 2], Trouble>;
+    fn alone(&mut self) -> Result<[Slab; 2], Trouble>;
     /// Layers for these strengths, side by side.
     fn layers(&mut self, cross: [f64; 2]) -> Result<[Layers; 2], Trouble>;
     /// The mean of two longer runs from other seeds.
@@ -84,7 +78,7 @@ pub struct Found {
     pub cross: f64,
     /// The mass of a particle of the second liquid in the models' unit.
     pub mass: f64,
-    pub alone: [Alone; 2],
+    pub alone: [Slab; 2],
     pub layers: Option<Layers>,
     pub trials: Vec<Trial>,
     /// Why there is no such mixture.
@@ -147,15 +141,6 @@ fn conditions(why: String) -> ExperimentError {
     ExperimentError::Conditions(why)
 }
 
-/// What stopped a measurement, if it is no error.
-fn known<T>(measured: Result<T, Trouble>, what: &str) -> Result<Result<T, String>, ExperimentError> {
-    match measured {
-        Ok(value) => Ok(Ok(value)),
-        Err(Trouble::Failed(error)) => Err(error),
-        Err(trouble) => Ok(Err(format!("{what}: {trouble}"))),
-    }
-}
-
 /// Finds the mixture with what `instrument` measures.
 fn mixture_by(
     sought: &Sought,
@@ -166,8 +151,9 @@ fn mixture_by(
     let (units, mass) = merge::units([a, b])?;
     let unit = units.map_or(1.0, |units: Units| units.energy / units.length.powi(2));
     let species = [a.name.clone(), b.name.clone()];
-    let alone = known(instrument.alone(), "a slab of one liquid")?.map_err(conditions)?;
-    for (name, Alone { tension, density }) in species.iter().zip(&alone) {
+    let alone = value_or_why(instrument.alone())?
+        .map_err(|why| conditions(format!("a slab of one liquid: {why}")))?;
+    for (name, Slab { tension, density }) in species.iter().zip(&alone) {
         if tension.value.is_nan() || tension.value <= 0.0 {
             let why = format!(
                 "{name} has a tension of {:.2}: it is no liquid beside its vapour; lower kT, or give --densities",
@@ -206,20 +192,11 @@ fn mixture_by(
         return Ok(found);
     }
     for round in 0..ROUNDS {
-        match search(sum, &mut found, instrument, told)? {
-            Ok(cross) => found.cross = rounded(cross),
-            Err(why) => {
-                found.refusal = Some(why);
-                return Ok(found);
-            }
+        if let Err(why) = value_or_why(attempt(sum, &mut found, instrument, round, told))? {
+            found.refusal = Some(format!("both liquids: {why}"));
         }
-        told(&format!("measuring cross = {}: longer, from other seeds", found.cross));
-        match known(instrument.result(found.cross, round), "both liquids")? {
-            Ok(layers) => found.layers = Some(layers),
-            Err(why) => {
-                found.refusal = Some(why);
-                return Ok(found);
-            }
+        if found.refusal.is_some() {
+            return Ok(found);
         }
         found.good = found.meets();
         if found.good {
@@ -232,43 +209,37 @@ fn mixture_by(
     Ok(found)
 }
 
-/// Seeks the strength at which `1 − γ_AB/(γ_A + γ_B)`, which grows with it, has its value; why not if there is none.
-fn search(
+/// Seeks the strength at which `1 − γ_AB/(γ_A + γ_B)`, which grows with it, has its value, and measures it longer.
+fn attempt(
     sum: f64,
     found: &mut Found,
     instrument: &mut dyn Instrument,
+    round: u64,
     told: &mut dyn FnMut(&str),
-) -> Result<Result<f64, String>, ExperimentError> {
-    let wanted = found.wanted / found.unit;
+) -> Result<(), Trouble> {
+    let (unit, wanted) = (found.unit, found.wanted / found.unit);
     let goal = Goal { value: 1.0 - wanted / sum, tolerance: CONTENT * wanted / sum, first: FIRST };
-    let points = |trials: &[Trial]| -> Vec<Point> {
-        let value = |t: &Trial| Measured { value: 1.0 - t.tension.value / sum, error: t.tension.error / sum };
-        trials.iter().map(|t| Point { strength: t.cross, value: Some(value(t)) }).collect()
+    let point = |t: &Trial| {
+        let value = Measured { value: 1.0 - t.tension.value / sum, error: t.tension.error / sum };
+        Point { strength: t.cross, value: Some(value) }
     };
-    for _ in 0..PAIRS {
-        let cross = match next(&points(&found.trials), &goal) {
-            Next::Found(cross) => return Ok(Ok(cross)),
-            Next::Beyond => break,
-            Next::Try(cross) => cross,
-        };
-        let layers = match known(instrument.layers(cross), "both liquids")? {
-            Ok(layers) => layers,
-            Err(why) => return Ok(Err(why)),
-        };
-        for (cross, Layers { tension, .. }) in cross.into_iter().zip(layers) {
-            let trial = Trial { cross, tension };
-            told(&said(&trial, found.unit));
-            found.trials.push(trial);
-        }
-    }
-    let best = line(&points(&found.trials), goal.value);
-    // The best line that there is.
-    Ok(best.map(|(cross, _)| cross).ok_or_else(|| {
+    let cross = seek(&goal, &mut found.trials, point, |cross| {
+        let layers = instrument.layers(cross)?;
+        let pair = [0, 1].map(|k| Trial { cross: cross[k], tension: layers[k].tension });
+        pair.iter().for_each(|trial| told(&said(trial, unit)));
+        Ok(pair)
+    })?;
+    let Some(cross) = cross else {
         let off = |t: &&Trial| (t.tension.value - wanted).abs();
         let nearest = found.trials.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-        let nearest = nearest.map_or(String::new(), |t| format!("; the nearest: {}", said(t, found.unit)));
-        format!("no attraction that was tried has this tension{nearest}")
-    }))
+        let nearest = nearest.map_or(String::new(), |t| format!("; the nearest: {}", said(t, unit)));
+        found.refusal = Some(format!("no attraction that was tried has this tension{nearest}"));
+        return Ok(());
+    };
+    found.cross = rounded(cross);
+    told(&format!("measuring cross = {}: longer, from other seeds", found.cross));
+    found.layers = Some(instrument.result(found.cross, round)?);
+    Ok(())
 }
 
 fn said(trial: &Trial, unit: f64) -> String {

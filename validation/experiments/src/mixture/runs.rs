@@ -1,11 +1,10 @@
 //! Measures by runs: a slab of each liquid, and layers of both.
 
 use super::merge::{self, Liquid};
-use super::{Alone, Instrument, Layers, Sought};
+use super::{Instrument, Layers, Slab, Sought};
 use crate::bulk::Observed;
-use crate::liquid::Trouble;
-use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, mean, part, slab};
-use crate::{ExperimentError, slabs};
+use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, mean, nearest, part, seeds_of_result, slab};
+use crate::{ExperimentError, Trouble, slabs};
 use psidpd_core::model::Model;
 use psidpd_formats::files::{Existing, write_bytes};
 use psidpd_observe::Measured;
@@ -88,9 +87,9 @@ impl<'a> Runs<'a> {
     }
 
     fn results(&self, cross: f64, round: u64) -> Result<[Run; 2], ExperimentError> {
-        let seed = |k: u64| self.sought.seed.wrapping_add(1000 + 10 * round + k);
-        let run = |k: u64| Runs::layers(self, (cross, seed(k)), RESULT, "result.toml");
-        Ok([run(0)?, run(1)?])
+        let [a, b, _] = seeds_of_result(self.sought.seed, round);
+        let run = |seed: u64| Runs::layers(self, (cross, seed), RESULT, "result.toml");
+        Ok([run(a)?, run(b)?])
     }
 
     fn measured(&self, runs: &[Run]) -> Result<[Layers; 2], Trouble> {
@@ -113,23 +112,11 @@ fn read(observed: &Observed, range: f64, first: &str) -> Layers {
     }
 }
 
-fn nearest(profile: &[(f64, Measured)], z: f64) -> Measured {
-    let nearest = profile.iter().min_by(|a, b| (a.0 - z).abs().total_cmp(&(b.0 - z).abs()));
-    nearest.map_or(Measured::NONE, |(_, value)| *value)
-}
-
 impl Instrument for Runs<'_> {
-    fn alone(&mut self) -> Result<[Alone; 2], Trouble> {
+    fn alone(&mut self) -> Result<[Slab; 2], Trouble> {
         let found = slabs::run(&self.slabs(), self.folder)?;
-        let alone = [0, 1].map(|k| Alone {
-            tension: found[k].scalar("surface_tension", "free_energy"),
-            density: found[k].scalar("interface_width", "liquid"),
-        });
-        for (units, alone) in self.units.iter_mut().zip(&alone) {
-            if alone.density.value > 0.0 {
-                units.density = alone.density.value;
-            }
-        }
+        let alone = [0, 1].map(|k| Slab::of(&found[k]));
+        self.units.iter_mut().zip(&alone).for_each(|(units, slab)| units.learn(slab));
         Ok(alone)
     }
 
@@ -228,16 +215,5 @@ mod tests {
         let seeds: Vec<u64> =
             (0..2).flat_map(|round| runs.results(0.6, round).unwrap().map(|run| run.seed)).collect();
         assert_eq!(seeds, [1007, 1008, 1017, 1018]);
-    }
-
-    #[test]
-    fn the_value_at_the_nearest_place_counts() {
-        let profile: Vec<_> =
-            (0..4).map(|k| (f64::from(k) - 0.5, Measured::from(f64::from(10 + k)))).collect();
-        for (z, expected) in [(-3.0, 10.0), (-0.1, 10.0), (0.1, 11.0), (1.4, 12.0), (2.1, 13.0), (40.0, 13.0)]
-        {
-            assert_eq!(nearest(&profile, z).value, expected, "{z}");
-        }
-        assert!(nearest(&[], 1.0).value.is_nan());
     }
 }

@@ -142,8 +142,8 @@ impl Known {
 }
 
 impl Instrument for Known {
-    fn alone(&mut self) -> Result<[Alone; 2], Trouble> {
-        Ok(OWN.map(|tension| Alone { tension: tension.into(), density: 6.0.into() }))
+    fn alone(&mut self) -> Result<[Slab; 2], Trouble> {
+        Ok(OWN.map(|tension| Slab { tension: tension.into(), density: 6.0.into() }))
     }
 
     fn layers(&mut self, cross: [f64; 2]) -> Result<[Layers; 2], Trouble> {

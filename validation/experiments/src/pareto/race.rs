@@ -115,6 +115,11 @@ mod tests {
     use psidpd_observe::Measured;
     use rand::{RngExt, SeedableRng};
 
+    /// An energy that is off.
+    fn off(value: f64, error: f64) -> Vec<Deviation> {
+        vec![Deviation::new(Class::Energy, "u", Measured { value, error }, value, error)]
+    }
+
     /// A code whose energy is off by what is known, and whose unit of time costs what is known. One sample scatters by one; errors
     /// are those of the mean.
     struct Fake {
@@ -137,8 +142,7 @@ mod tests {
         }
 
         fn errors(&self) -> Vec<Deviation> {
-            let measured = Measured { value: self.sum / self.samples, error: self.samples.powf(-0.5) };
-            vec![Deviation::new(Class::Energy, "u", measured, measured.value, measured.error)]
+            off(self.sum / self.samples, self.samples.powf(-0.5))
         }
     }
 
@@ -200,18 +204,12 @@ mod tests {
     /// quantity of one setting the margin of one race in 20 is 1.96, for a thousand 4.06.
     #[test]
     fn margins_are_those_of_all_looks() {
-        for off in [0.005, -0.005] {
-            let measured = Measured { value: off, error: 0.001 };
-            let errors = vec![Deviation::new(Class::Energy, "u", measured, off, 0.001)];
-            margins_hold(&errors);
-        }
+        margins_hold(&off(0.005, 0.001));
+        margins_hold(&off(-0.005, 0.001));
         // Energies that are too low are as wrong as those that are too high.
         let tolerances = ["u=1%".parse().unwrap()];
         let rule = Rule::new(&tolerances, 1, 1, 1);
-        let of = |off: f64| {
-            let measured = Measured { value: off, error: 0.001 };
-            rule.standing(&[Deviation::new(Class::Energy, "u", measured, off, 0.001)])
-        };
+        let of = |value: f64| rule.standing(&off(value, 0.001));
         assert_eq!(
             [of(-0.02), of(-0.0101), of(-0.002)],
             [Standing::Beyond, Standing::Open, Standing::Within]
@@ -245,15 +243,9 @@ mod tests {
     fn a_verdict_stands() {
         let tolerances = ["u=1%".parse().unwrap()];
         let rule = Rule::new(&tolerances, 3, 1, 3);
-        let look = |round: &usize| {
-            let error = |off: f64, error: f64| {
-                let measured = Measured { value: off, error };
-                Some(vec![Deviation::new(Class::Energy, "u", measured, off, error)])
-            };
-            match round {
-                0 => vec![error(0.05, 0.001), error(0.005, 0.01), error(0.0, 0.001)],
-                _ => vec![error(0.0, 0.001), error(0.005, 0.01), None],
-            }
+        let look = |round: &usize| match round {
+            0 => vec![Some(off(0.05, 0.001)), Some(off(0.005, 0.01)), Some(off(0.0, 0.001))],
+            _ => vec![Some(off(0.0, 0.001)), Some(off(0.005, 0.01)), None],
         };
         let costs = [Some(1.0), Some(2.0), Some(3.0)];
         let (mut round, mut asked) = (0, Vec::new());

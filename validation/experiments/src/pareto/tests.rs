@@ -1,11 +1,22 @@
 use super::*;
+use crate::models::{SET6, STANDARD};
 use std::path::Path;
 
-fn tiny(folder: &Path) -> Scene {
-    let model = crate::models::SET6;
-    std::fs::write(folder.join("m.toml"), model).unwrap();
-    let text = "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = 4.0\ndensity = 6.05\nequilibrate = 200\nsteps = 500\ndt = 0.01\n";
-    Scene::parse("tiny", text, folder).unwrap()
+/// A scene of a model from the seed 3.
+fn scene(model: &str, text: &str) -> Scene {
+    let text = format!("model = \"m.toml\"\nseed = 3\n{text}");
+    crate::test_support::scene(model, &text).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+const TINY: &str = "kT = 1.0\nbox = 4.0\ndensity = 6.05\nequilibrate = 200\nsteps = 500\ndt = 0.01\n";
+
+fn tiny() -> Scene {
+    scene(SET6, TINY)
+}
+
+/// Where runs of a scene begin, after at most so many seconds.
+fn origin(scene: &Scene, seconds: f64) -> Origin<'_> {
+    Origin::of(scene, Duration::from_secs_f64(seconds), NonZeroUsize::MIN).unwrap()
 }
 
 fn options(folder: &Path, tolerances: &[&str]) -> Options {
@@ -26,8 +37,7 @@ fn options(folder: &Path, tolerances: &[&str]) -> Options {
 #[test]
 fn longer_steps_err_more_and_all_results_agree() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = tiny(folder.path());
-    let outcome = run(&scene, &options(folder.path(), &["T=10%", "u=10%"]), &Progress::new()).unwrap();
+    let outcome = run(&tiny(), &options(folder.path(), &["T=10%", "u=10%"]), &Progress::new()).unwrap();
     let of = |name: &str, dt: f64| {
         outcome.points.iter().find(|p| p.integrator.starts_with(name) && p.dt == dt).unwrap()
     };
@@ -62,8 +72,7 @@ fn longer_steps_err_more_and_all_results_agree() {
         assert!(!p.is_within(tolerances) || cost(p) >= cost(best));
     }
     let lines = &recommended.scene;
-    let text = format!("model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 5\n{lines}");
-    let again = Scene::parse("again", &text, folder.path()).unwrap();
+    let again = scene(SET6, &format!("kT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 5\n{lines}"));
     assert_eq!(again.stages[0].integrator, best.setting.physics.integrator);
     assert_eq!((again.stages[0].dt, again.precision()), (best.dt, best.setting.physics.precision));
     assert!(page::recommendation(&outcome).contains(lines));
@@ -108,8 +117,7 @@ fn longer_steps_err_more_and_all_results_agree() {
 #[test]
 fn all_that_is_resolved_is_judged() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = tiny(folder.path());
-    let outcome = run(&scene, &options(folder.path(), &[]), &Progress::new()).unwrap();
+    let outcome = run(&tiny(), &options(folder.path(), &[]), &Progress::new()).unwrap();
     assert!(outcome.unresolved.contains(&"D".to_owned()), "{:?}", outcome.unresolved);
     for t in &outcome.tolerances {
         assert!((0.01..=0.2).contains(&t.bound) && !outcome.unresolved.contains(&t.name), "{t:?}");
@@ -120,20 +128,18 @@ fn all_that_is_resolved_is_judged() {
 #[test]
 fn what_is_not_measured_has_no_tolerance() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = tiny(folder.path());
     let mut options = options(folder.path(), &["sigma=1%"]);
     options.fixed = Some((Effort::Samples(4), Pace { rounds: 1, seconds: 0.001 }));
     assert!(
-        matches!(run(&scene, &options, &Progress::new()), Err(ExperimentError::Unmeasured(name)) if name == "sigma")
+        matches!(run(&tiny(), &options, &Progress::new()), Err(ExperimentError::Unmeasured(name)) if name == "sigma")
     );
 }
 
 /// Lines of a script are there for the steps that LAMMPS has, and for no others.
 #[test]
 fn lammps_lines_are_those_that_lammps_can_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = tiny(folder.path());
-    let origin = Origin::of(&scene, Duration::from_secs(1), NonZeroUsize::MIN).unwrap();
+    let scene = tiny();
+    let origin = origin(&scene, 1.0);
     for physics in setting::physics(Choice::Few) {
         let lines = recommend::lammps_lines(&origin, &physics);
         match physics.integrator {
@@ -158,8 +164,7 @@ fn lammps_lines_are_those_that_lammps_can_run() {
 #[test]
 fn a_script_can_have_another_style_and_more_output() {
     use psidpd_lammps_host::export::lammps::{Script, script_of};
-    let folder = tempfile::tempdir().unwrap();
-    let scene = tiny(folder.path());
+    let scene = tiny();
     let usual = script_of(&scene, Script::default()).unwrap();
     let [own, more] = ["pair_style mdpd\n", "thermo 7\n"];
     let script =
@@ -280,37 +285,27 @@ fn tolerances_that_nobody_keeps_are_doubled() {
 /// What is known of a scene: ρkT of 192 particles in a box of 4³ at kT = 2; temperatures, unless it flows.
 #[test]
 fn what_is_known_follows_from_the_scene() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), crate::models::STANDARD).unwrap();
-    let of = |more: &str| {
-        let text = format!("model = \"m.toml\"\nkT = 2.0\nseed = 3\nbox = 4.0\ndensity = 3.0\n{more}");
-        Scene::parse("known", &text, folder.path()).unwrap()
-    };
+    let of = |more: &str| scene(STANDARD, &format!("kT = 2.0\nbox = 4.0\ndensity = 3.0\n{more}"));
     let stages = "[[stage]]\nname = \"first\"\nsteps = 20\ndt = 0.01\n[[stage]]\nname = \"second\"\nsteps = 20\ndt = 0.005\n\
                   [[stage]]\nname = \"alone\"\nsteps = 20\ndt = 0.01\nthermostat = false\n";
     let rest = of(stages);
-    let origin = Origin::of(&rest, Duration::from_secs(60), NonZeroUsize::MIN).unwrap();
+    let at_rest = origin(&rest, 60.0);
     // The last stage with a thermostat is measured.
-    assert_eq!((origin.stage.name.as_str(), origin.stage.dt), ("second", 0.005));
-    let found = known(&origin).unwrap();
+    assert_eq!((at_rest.stage.name.as_str(), at_rest.stage.dt), ("second", 0.005));
+    let found = known(&at_rest).unwrap();
     assert!(found.temperature && (found.ideal_pressure - 6.0).abs() < 1e-12, "{found:?}");
     let flow =
         of("steps = 20\ndt = 0.01\n[[body_force]]\nacceleration = [0.1, 0.0, 0.0]\nreversed_along = \"z\"\n");
-    let origin = Origin::of(&flow, Duration::from_secs(60), NonZeroUsize::MIN).unwrap();
-    assert!(!known(&origin).unwrap().temperature);
+    assert!(!known(&origin(&flow, 60.0)).unwrap().temperature);
 }
 
 /// Velocity Verlet at a quarter of the step for standard DPD: without thermostat the energy stays, with one it would scatter by
 /// √(3/2N) = 0.09 kT of a particle. 32 energies, every 96 steps of 0.0025.
 #[test]
 fn energy_is_followed_without_thermostat_over_its_time() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), crate::models::STANDARD).unwrap();
-    let text = "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = 4.0\ndensity = 3.0\nequilibrate = 100\nsteps = 200\ndt = 0.01\n";
-    let scene = Scene::parse("drift", text, folder.path()).unwrap();
-    let origin = Origin::of(&scene, Duration::from_secs(60), NonZeroUsize::MIN).unwrap();
+    let text = "kT = 1.0\nbox = 4.0\ndensity = 3.0\nequilibrate = 100\nsteps = 200\ndt = 0.01\n";
     let physics = Physics { multiple: 0.25, ..setting::physics(Choice::Few)[0] };
-    let found = drift::drift(&origin, &physics, Effort::Samples(32)).unwrap();
+    let found = drift::drift(&origin(&scene(STANDARD, text), 60.0), &physics, Effort::Samples(32)).unwrap();
     assert!(found.largest.unwrap() < 0.01, "{found:?}");
     assert!((found.time - 31.0 * 96.0 * 0.0025).abs() < 1e-9, "{found:?}");
 }
@@ -318,16 +313,7 @@ fn energy_is_followed_without_thermostat_over_its_time() {
 /// Where the scene's step is far too long for its lightest particles, the steps that are tried begin lower.
 #[test]
 fn steps_begin_where_the_fluid_allows_them() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), crate::models::SET6).unwrap();
-    let unit = |mass: f64| {
-        let text = format!(
-            "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = 4.0\ndensity = 6.05\nequilibrate = 200\nsteps = 200\n\
-             dt = 0.01\n[masses]\nF = {mass:?}\n"
-        );
-        let scene = Scene::parse("light", &text, folder.path()).unwrap();
-        Origin::of(&scene, Duration::from_secs(60), NonZeroUsize::MIN).unwrap().unit
-    };
+    let unit = |mass: f64| origin(&scene(SET6, &format!("{TINY}[masses]\nF = {mass:?}\n")), 60.0).unit;
     // The step of a mass goes with its root: 1 % at 0.06 and 0.03, a quarter of that or the scene's.
     let (heavy, light) = (unit(1.0), unit(0.25));
     assert!(heavy == 0.01 && (0.006..0.009).contains(&light), "{heavy} {light}");
@@ -430,11 +416,8 @@ fn usual_tolerances_are_those_of_most_native_points() {
 /// More time goes to what is open and to the references, to that of dynamics where it is asked for, and to nobody else.
 #[test]
 fn more_time_is_for_what_is_open() {
-    let folder = tempfile::tempdir().unwrap();
-    let tiny = tiny(folder.path());
-    let text = tiny.source.text().replace("box = 4.0", "box = 3.0");
-    let scene = Scene::parse("tiny", &text, folder.path()).unwrap();
-    let origin = Origin::of(&scene, Duration::from_millis(100), NonZeroUsize::MIN).unwrap();
+    let scene = scene(SET6, &TINY.replace("box = 4.0", "box = 3.0"));
+    let origin = origin(&scene, 0.1);
     let physics = [0.5, 1.0, 0.75].map(|multiple| Physics {
         integrator: Integrator::VelocityVerlet,
         multiple,
@@ -459,13 +442,11 @@ fn more_time_is_for_what_is_open() {
 /// that are not ours have no forces, and Monte Carlo has no time.
 #[test]
 fn what_the_scene_asks_of_interfaces_is_observed() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), crate::models::SET6).unwrap();
-    let text = "model = \"m.toml\"\nkT = 1.0\nbox = [4.0, 4.0, 12.0]\nsteps = 50\ndt = 0.01\n[initial]\nkind = \"slab\"\n\
+    let text = "kT = 1.0\nbox = [4.0, 4.0, 12.0]\nsteps = 50\ndt = 0.01\n[initial]\nkind = \"slab\"\n\
                 thickness = 5.0\ndensity = 6.0\n[observe]\nevery = 5\ninterface_width = true\nsurface_tension = true\n\
                 density_profile = true\nviscosity = true\n";
-    let scene = Scene::parse("slab", text, folder.path()).unwrap();
-    let origin = Origin::of(&scene, Duration::from_millis(50), NonZeroUsize::MIN).unwrap();
+    let scene = scene(SET6, text);
+    let origin = origin(&scene, 0.05);
     let name = |request: &psidpd_observe::Request| {
         let whole = format!("{:?}", request.meter);
         whole.split('(').next().unwrap_or_default().to_owned()
@@ -492,13 +473,10 @@ fn what_the_scene_asks_of_interfaces_is_observed() {
 /// there are 24 of the shortest.
 #[test]
 fn samples_have_their_energy_and_their_time() {
-    let folder = tempfile::tempdir().unwrap();
     let model = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[excess_free_energy]\n\
                  F = \"3.0 + 0*n\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
-    std::fs::write(folder.path().join("m.toml"), model).unwrap();
-    let text = "model = \"m.toml\"\nkT = 2.0\nseed = 3\nbox = 4.0\ndensity = 3.0\nsteps = 50\ndt = 0.01\n";
-    let scene = Scene::parse("constant", text, folder.path()).unwrap();
-    let origin = Origin::of(&scene, Duration::from_millis(50), NonZeroUsize::MIN).unwrap();
+    let scene = scene(model, "kT = 2.0\nbox = 4.0\ndensity = 3.0\nsteps = 50\ndt = 0.01\n");
+    let origin = origin(&scene, 0.05);
     for (physics, steps) in [(setting::physics(Choice::Few)[1], 6.0), (Physics::reference(), 1.0)] {
         let run = Sampler::settled(&origin, physics, Effort::Samples(1)).unwrap().more(Effort::Samples(30));
         let made = run.sampled().unwrap();
@@ -520,8 +498,6 @@ fn samples_have_their_energy_and_their_time() {
 /// What is recommended is read back as it was: every setting, with noise of either law and thermostats that wait.
 #[test]
 fn lines_of_a_scene_are_read_back() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), crate::models::STANDARD).unwrap();
     let mut all = setting::physics(Choice::Full);
     for physics in all.clone() {
         let mut integrator = physics.integrator;
@@ -534,8 +510,7 @@ fn lines_of_a_scene_are_read_back() {
     for mut physics in all.into_iter().filter(|physics| physics.integrator.has_time()) {
         let setting = Setting { host: Host::Native, physics, threads: NonZeroUsize::MIN };
         let lines = recommend::scene_lines(0.0375, &setting);
-        let text = format!("model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 3.0\nsteps = 5\n{lines}");
-        let scene = Scene::parse("again", &text, folder.path()).unwrap_or_else(|e| panic!("{e}\n{lines}"));
+        let scene = scene(STANDARD, &format!("kT = 1.0\nbox = 4.0\ndensity = 3.0\nsteps = 5\n{lines}"));
         assert_eq!((scene.stages[0].integrator, scene.stages[0].dt), (physics.integrator, 0.0375), "{lines}");
         assert_eq!(scene.precision(), physics.precision, "{lines}");
         // What is left out is what a scene without the line does, and one thread is not asked for.
@@ -553,22 +528,18 @@ fn lines_of_a_scene_are_read_back() {
 #[test]
 fn drifts_are_parts_of_kt() {
     let of = |energy: f64, time: f64| {
-        let folder = tempfile::tempdir().unwrap();
-        let model = crate::models::STANDARD
+        let model = STANDARD
             .replace("a  = 25.0", &format!("a  = {:?}", 25.0 * energy))
             .replace("gamma = 4.5", &format!("gamma = {:?}", 4.5 * energy * time));
-        std::fs::write(folder.path().join("m.toml"), model).unwrap();
+        let dt = 0.015625 * time;
         let text = format!(
-            "model = \"m.toml\"\nkT = {energy:?}\nseed = 3\nbox = 4.0\ndensity = 3.0\nequilibrate = 100\nsteps = 200\ndt = {:?}\n",
-            0.015625 * time
+            "kT = {energy:?}\nbox = 4.0\ndensity = 3.0\nequilibrate = 100\nsteps = 200\ndt = {dt:?}\n"
         );
-        let scene = Scene::parse("drift", &text, folder.path()).unwrap();
-        let origin = Origin::of(&scene, Duration::from_secs(60), NonZeroUsize::MIN).unwrap();
-        let physics = setting::physics(Choice::Few)[0];
-        let unit = origin.unit;
-        let origin = Origin { unit: 0.015625 * time, ..origin };
-        assert!(unit > 0.0);
-        drift::drift(&origin, &physics, Effort::Samples(40)).unwrap()
+        let scene = scene(&model, &text);
+        let origin = origin(&scene, 60.0);
+        assert!(origin.unit > 0.0);
+        let origin = Origin { unit: dt, ..origin };
+        drift::drift(&origin, &setting::physics(Choice::Few)[0], Effort::Samples(40)).unwrap()
     };
     let (one, four) = (of(1.0, 1.0), of(4.0, 0.5));
     let [a, b] = [&one, &four].map(|d| d.largest.unwrap());
@@ -580,16 +551,9 @@ fn drifts_are_parts_of_kt() {
 /// A model with Warren's parameters and another energy is not LAMMPS's style, though it differs by a hundredth alone.
 #[test]
 fn only_the_same_forces_are_a_style_of_lammps() {
-    let folder = tempfile::tempdir().unwrap();
-    let of = |model: &str| {
-        let scene = tiny(folder.path());
-        std::fs::write(folder.path().join("m.toml"), model).unwrap();
-        let scene = Scene::parse("tiny", scene.source.text(), folder.path()).unwrap();
-        let origin = Origin::of(&scene, Duration::from_millis(50), NonZeroUsize::MIN).unwrap();
-        own_style::own_style(&origin).unwrap().is_some()
-    };
-    let other = crate::models::SET6.replace("pi/30 *", "1.01*pi/30 *");
-    assert!(other != crate::models::SET6 && of(crate::models::SET6) && !of(&other));
+    let of = |model: &str| own_style::own_style(&origin(&scene(model, TINY), 0.05)).unwrap().is_some();
+    let other = SET6.replace("pi/30 *", "1.01*pi/30 *");
+    assert!(other != SET6 && of(SET6) && !of(&other));
 }
 
 /// Plots are in percent: an error of 3 % of kT, its bar of 0.1, and a tolerance of 2 % as a line; of an error that is not resolved its

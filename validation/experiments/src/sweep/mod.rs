@@ -9,12 +9,11 @@ pub use page::{page, table};
 use crate::ExperimentError;
 use crate::jobs;
 use psidpd_dynamics::checkpoint::Caller;
-use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
+use psidpd_dynamics::run::{Begin, Folder, Outcome, RunError, Runner};
 use psidpd_dynamics::scene::{Edit, Scene};
 use psidpd_formats::files::{Existing, PathError, may_replace, read_if_there, replace_inside};
 use psidpd_report::{Headline, headline};
 use serde::Serialize;
-use std::fs::{File, TryLockError, create_dir_all};
 use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -70,7 +69,7 @@ pub fn run(
     let points = combinations(&options.axes)?;
     // What is wrong with the scene itself is said at once, and not once for each run.
     Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
-    let _lock = lock(&options.out)?;
+    let _locked = Folder::open(&options.out)?;
     refuse_other_grid(options, &points)?;
     refuse_results(options)?;
     let ended = AtomicUsize::new(0);
@@ -87,17 +86,6 @@ pub fn run(
         });
     write(options, &points)?;
     Ok(points)
-}
-
-/// Creates the folder of a sweep if it is missing, and locks it against other sweeps. The lock ends with the process.
-fn lock(out: &Path) -> Result<File, ExperimentError> {
-    create_dir_all(out).map_err(PathError::at("write", out))?;
-    let lock = File::open(out).map_err(PathError::at("write", out))?;
-    match lock.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(RunError::Busy { folder: out.to_owned() }.into()),
-        // Some file systems have no locks.
-        _ => Ok(lock),
-    }
 }
 
 /// A table or a page that no sweep made is not replaced.

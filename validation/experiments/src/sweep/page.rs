@@ -2,7 +2,7 @@
 
 use super::{Axis, Point};
 use psidpd_report::quantity::with_error;
-use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table, distinct, typeset};
+use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table, distinct, named};
 
 /// Names of the results that any run has, in the order in which they come first. A key whose values are given, such as the
 /// density, is not a result.
@@ -115,11 +115,7 @@ fn plot<'a>(name: &str, x: usize, axes: &[Axis], points: &'a [Point]) -> Plot {
         series[0].name = "measured".into();
         series.push(Series::new("mean field", theory, Style::Dashed));
     }
-    let y_label = match unit {
-        "" | "1" => name.to_owned(),
-        unit => format!("{name} [{}]", typeset(unit)),
-    };
-    Plot::new(name, [axes[x].key.clone(), y_label], series)
+    Plot::new(name, [axes[x].key.clone(), named(name, unit)], series)
 }
 
 #[cfg(test)]

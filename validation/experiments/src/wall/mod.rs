@@ -12,16 +12,15 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use crate::slabs::Units;
+pub use crate::slabs::{Slab, Units};
 pub use search::Trial;
 
-use crate::ExperimentError;
-use crate::liquid::Trouble;
+use crate::error::value_or_why;
 use crate::seek::rounded;
+use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
 use psidpd_formats::files::temporary_folder;
 use psidpd_observe::Measured;
-use search::End;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -47,15 +46,7 @@ pub struct Sought {
     pub seed: u64,
 }
 
-/// Tensions at the wall and of the liquid, in units of the model.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Slab {
-    pub tension: Measured,
-    /// The number density of the liquid.
-    pub density: Measured,
-}
-
-/// A film on the wall.
+/// A film on the wall, with tensions in units of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Film {
     /// γ_WL; `None` if the film left the wall.
@@ -134,19 +125,15 @@ fn wall_by(
     instrument: &mut dyn Instrument,
     told: &mut dyn FnMut(&str),
 ) -> Result<Found, ExperimentError> {
-    let slab = match instrument.slab() {
-        Ok(slab) if slab.tension.value > 0.0 => slab,
-        Ok(slab) => {
-            let why = format!(
-                "the slab has a tension of {:.2}: it is no liquid beside its vapour; lower kT, or give the density of the liquid, \
-                 --density",
-                slab.tension.value
-            );
-            return Err(conditions(why));
-        }
-        Err(Trouble::Failed(error)) => return Err(error),
-        Err(trouble) => return Err(conditions(format!("a slab of the liquid: {trouble}"))),
-    };
+    let slab =
+        value_or_why(instrument.slab())?.map_err(|why| conditions(format!("a slab of the liquid: {why}")))?;
+    if slab.tension.value.is_nan() || slab.tension.value <= 0.0 {
+        return Err(conditions(format!(
+            "the slab has a tension of {:.2}: it is no liquid beside its vapour; lower kT, or give the density of the liquid, \
+             --density",
+            slab.tension.value
+        )));
+    }
     told(&format!(
         "the liquid: density {:.3}({:.3}), tension {:.2}({:.2})",
         slab.density.value, slab.density.error, slab.tension.value, slab.tension.error
@@ -164,21 +151,20 @@ fn wall_by(
         units: instrument.units(),
     };
     for round in 0..ROUNDS {
-        let strength = match search::search(sought.angle, &slab, instrument, &mut found.trials, told)? {
-            End::Found(strength) => rounded(strength),
-            End::None(why) => {
-                found.refusal = Some(why);
-                return Ok(found);
-            }
+        let strength =
+            value_or_why(search::search(sought.angle, &slab, instrument, &mut found.trials, told))?
+                .map_err(|why| conditions(format!("a film on a wall: {why}")))?;
+        let Some(strength) = strength.map(rounded) else {
+            found.refusal = Some(search::beyond(&found.trials, sought.angle));
+            return Ok(found);
         };
         found.strength = strength;
         told(&format!("measuring strength = {strength}: longer films from other seeds, and a ridge"));
-        let (film, ridge) = match instrument.result(strength, search::surface(&found.trials, strength), round)
-        {
+        let surface = search::surface(&found.trials, strength);
+        let (film, ridge) = match value_or_why(instrument.result(strength, surface, round))? {
             Ok(result) => result,
-            Err(Trouble::Failed(error)) => return Err(error),
-            Err(trouble) => {
-                found.refusal = Some(trouble.to_string());
+            Err(why) => {
+                found.refusal = Some(why);
                 return Ok(found);
             }
         };

@@ -4,9 +4,8 @@ use super::scene::{HEIGHT, wall};
 use super::search::attracts;
 use super::{Film, Instrument, Slab, Sought, conditions};
 use crate::bulk::Observed;
-use crate::liquid::Trouble;
-use crate::slabs::{FILM, Run, Setting, Units, mean};
-use crate::{ExperimentError, slabs};
+use crate::slabs::{FILM, Run, Setting, Units, mean, nearest, seeds_of_result};
+use crate::{ExperimentError, Trouble, slabs};
 use psidpd_observe::Measured;
 use std::path::Path;
 
@@ -69,10 +68,7 @@ pub fn split(
     [height, film]: [f64; 2],
     of_liquid: f64,
 ) -> Film {
-    let below = |z: f64| {
-        let nearest = integral.iter().min_by(|a, b| (a.0 - z).abs().total_cmp(&(b.0 - z).abs()));
-        nearest.map_or(Measured::NONE, |(_, value)| *value)
-    };
+    let below = |z: f64| nearest(integral, z);
     // The variance of the whole is that of both parts.
     let above = |z: f64| {
         let error = (whole.error.powi(2) - below(z).error.powi(2)).abs().sqrt();
@@ -125,14 +121,9 @@ impl Instrument for Runs<'_> {
         let seed = self.sought.seed;
         let found =
             self.run([seed, seed.wrapping_add(1)].map(|seed| (Setting::slab(&self.units), seed)).into())?;
-        let mean = |name: &str, column: &str| mean([0, 1].map(|k| found[k].scalar(name, column)));
-        let slab = Slab {
-            tension: mean("surface_tension", "free_energy"),
-            density: mean("interface_width", "liquid"),
-        };
-        if slab.density.value > 0.0 {
-            self.units.density = slab.density.value;
-        }
+        let [a, b] = [0, 1].map(|k| Slab::of(&found[k]));
+        let slab = Slab { tension: mean([a.tension, b.tension]), density: mean([a.density, b.density]) };
+        self.units.learn(&slab);
         Ok(slab)
     }
 
@@ -155,27 +146,10 @@ impl Instrument for Runs<'_> {
     }
 }
 
-/// The seeds of the runs of a result, none of which a search or another round has.
-fn seeds_of_result(seed: u64, round: u64) -> [u64; 3] {
-    [0, 1, 2].map(|number| seed.wrapping_add(1000 + 10 * round + number))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use psidpd_observe::{Kind, Observation, Series};
-
-    #[test]
-    fn runs_of_results_have_seeds_of_their_own() {
-        for seed in [0, 7, u64::MAX] {
-            let search = [seed, seed.wrapping_add(1)];
-            let mut all: Vec<u64> =
-                (0..5).flat_map(|round| seeds_of_result(seed, round)).chain(search).collect();
-            all.sort_unstable();
-            all.dedup();
-            assert_eq!(all.len(), 17);
-        }
-    }
 
     /// A film of a liquid of density 6 at kT = 0.7 on the lower wall, of ranges of 2: its particles have a pressure of 4.2, which is
     /// that of the liquid, so it touches; the tensions are those of the integral on either side of its surface.

@@ -1,9 +1,8 @@
 //! The strength of the wall at which cos θ has a value, by films.
 
-use super::{Film, Instrument, Slab, conditions};
-use crate::ExperimentError;
-use crate::liquid::Trouble;
-use crate::seek::{Goal, Next, PAIRS, Point, line, next};
+use super::{Film, Instrument, Slab};
+use crate::Trouble;
+use crate::seek::{Goal, Point, seek};
 use psidpd_core::model::pair::PairForm as _;
 use psidpd_core::model::wall::MatterIntegral;
 use psidpd_core::model::{Fluid, PairTerm};
@@ -40,17 +39,6 @@ impl Trial {
     pub fn of(strength: f64, film: &Film, slab: &Slab) -> Trial {
         Trial { strength, cosine: film.cosine(slab), surface: film.surface }
     }
-
-    fn point(&self) -> Point {
-        Point { strength: self.strength, value: self.cosine }
-    }
-}
-
-#[derive(Debug, PartialEq)]
-pub enum End {
-    Found(f64),
-    /// No wall has the angle, and why.
-    None(String),
 }
 
 /// The first strengths.
@@ -74,41 +62,22 @@ pub fn surface(trials: &[Trial], strength: f64) -> f64 {
     held.min_by(|a, b| off(a).total_cmp(&off(b))).map_or(0.0, |t| t.surface)
 }
 
-/// Seeks the strength; `trials` has what is known already, and what is measured comes to it.
+/// Seeks the strength; `trials` has what is known already, and what is measured comes to it. `None` if no wall has the angle.
 pub fn search(
     wanted: f64,
     slab: &Slab,
     instrument: &mut dyn Instrument,
     trials: &mut Vec<Trial>,
     told: &mut dyn FnMut(&str),
-) -> Result<End, ExperimentError> {
-    let goal = Goal {
-        value: wanted.to_radians().cos(),
-        tolerance: CONTENT.to_radians() * wanted.to_radians().sin(),
-        first: FIRST,
-    };
-    let points = |trials: &[Trial]| trials.iter().map(Trial::point).collect::<Vec<_>>();
-    for _ in 0..PAIRS {
-        let strengths = match next(&points(trials), &goal) {
-            Next::Found(strength) => return Ok(End::Found(strength)),
-            Next::Beyond => return Ok(End::None(beyond(trials, goal.value))),
-            Next::Try(strengths) => strengths,
-        };
-        let films = match instrument.films(strengths) {
-            Ok(films) => films,
-            Err(Trouble::Failed(error)) => return Err(error),
-            Err(trouble) => return Err(conditions(format!("a film on a wall: {trouble}"))),
-        };
-        for (strength, film) in strengths.into_iter().zip(films) {
-            let trial = Trial::of(strength, &film, slab);
-            told(&said(&trial));
-            trials.push(trial);
-        }
-    }
-    // The best line that there is.
-    Ok(match line(&points(trials), goal.value) {
-        Some((strength, _)) => End::Found(strength),
-        None => End::None(beyond(trials, goal.value)),
+) -> Result<Option<f64>, Trouble> {
+    let wanted = wanted.to_radians();
+    let goal = Goal { value: wanted.cos(), tolerance: CONTENT.to_radians() * wanted.sin(), first: FIRST };
+    let point = |trial: &Trial| Point { strength: trial.strength, value: trial.cosine };
+    seek(&goal, trials, point, |strengths| {
+        let films = instrument.films(strengths)?;
+        let pair = [0, 1].map(|k| Trial::of(strengths[k], &films[k], slab));
+        pair.iter().for_each(|trial| told(&said(trial)));
+        Ok(pair)
     })
 }
 
@@ -124,13 +93,10 @@ fn said(trial: &Trial) -> String {
     }
 }
 
-/// The nearest wall that was tried, in words.
-fn beyond(trials: &[Trial], goal: f64) -> String {
+/// Why no wall has an angle: the nearest that was tried.
+pub fn beyond(trials: &[Trial], wanted: f64) -> String {
+    let goal = wanted.to_radians().cos();
     let off = |t: &&Trial| t.cosine.map_or(goal + 1.0, |c| (c.value - goal).abs());
-    match trials.iter().min_by(|a, b| off(a).total_cmp(&off(b))) {
-        Some(nearest) => {
-            format!("no wall that was tried has this angle; the nearest: {}", said(nearest))
-        }
-        None => "no film was measured".into(),
-    }
+    let nearest = trials.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    format!("no wall that was tried has this angle; the nearest: {}", nearest.map_or(String::new(), said))
 }

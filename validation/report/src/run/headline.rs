@@ -106,9 +106,11 @@ impl Headline {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::about;
     use super::content::WITHOUT_FLOW;
     use super::*;
     use psidpd_formats::{AboutStage, Expected};
+    use psidpd_observe::{Kind, Measured, Series};
 
     fn table(values: &[f64]) -> series::Table {
         let n = values.len();
@@ -176,50 +178,47 @@ mod tests {
         assert!((error / (0.75f64 / 400.0).sqrt() - 1.0).abs() < 0.25, "{temperature:?}");
     }
 
+    /// An observable with scalars of a name, a unit, a value and its error.
+    fn scalars(name: &str, columns: &[(&str, &str, f64, f64)]) -> Observation {
+        let none = Observation::new(name, name, Kind::Scalar, &Series::new(1));
+        columns.iter().fold(none, |all, &(name, unit, value, error)| {
+            all.column(name, unit, [Measured { value, error }])
+        })
+    }
+
+    /// The same with a tenth of each value as its error.
+    fn observed(name: &str, columns: &[(&str, &str, f64)]) -> Observation {
+        let columns: Vec<_> =
+            columns.iter().map(|&(name, unit, value)| (name, unit, value, 0.1 * value)).collect();
+        scalars(name, &columns)
+    }
+
     fn drop(radius: f64) -> Observation {
-        let column = |name: &str, value: f64| serde_json::json!({"name": name, "unit": "length", "values": [value], "errors": [0.1]});
-        serde_json::from_value(serde_json::json!({
-            "name": "drop", "kind": "scalar", "note": "It percolates.",
-            "columns": [column("radius", radius), column("width", 0.5), column("tension", 3.0)]
-        }))
-        .unwrap()
+        let columns = [("radius", radius), ("width", 0.5), ("tension", 3.0)];
+        let columns = columns.map(|(name, value)| (name, "length", value, 0.1));
+        Observation { note: "It percolates.".into(), ..scalars("drop", &columns) }
+    }
+
+    fn values(found: &Headline) -> Vec<(&str, f64, &str)> {
+        found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect()
     }
 
     /// Of two routes to one tension the one with the smaller error counts and is named, and a width says what it is a width of.
     #[test]
     fn the_better_tension_is_named() {
-        let slab = |stress: f64, free_energy: f64| -> [Observation; 2] {
-            let column = |name: &str, error: f64| serde_json::json!({"name": name, "values": [7.0 + error], "errors": [error]});
-            let read = |value| serde_json::from_value(value).unwrap();
-            [
-                read(serde_json::json!({
-                    "name": "surface_tension", "kind": "scalar",
-                    "columns": [column("stress", stress), column("free_energy", free_energy)]
-                })),
-                read(serde_json::json!({
-                    "name": "interface_width", "kind": "scalar", "columns": [column("width", 0.1)]
-                })),
-            ]
+        let slab = |errors: [f64; 2]| {
+            let column = |name, error: f64| (name, "", 7.0 + error, error);
+            let tensions = [column("stress", errors[0]), column("free_energy", errors[1])];
+            [scalars("surface_tension", &tensions), scalars("interface_width", &[column("width", 0.1)])]
         };
         for (errors, source, value) in
             [([0.1, 0.2], "surface_tension.stress", 7.1), ([0.2, 0.1], "surface_tension.free_energy", 7.1)]
         {
-            let found = gather(None, None, None, &slab(errors[0], errors[1]));
+            let found = gather(None, None, None, &slab(errors));
             let tension = found.get("tension").unwrap();
             assert_eq!((tension.source.as_str(), tension.value, tension.error), (source, value, Some(0.1)));
             assert_eq!(found.get("width").unwrap().source, "interface_width.width: 2 d of tanh(z/d)");
         }
-    }
-
-    /// An observable with scalars of a name, a unit and a value, whose error is a tenth of it.
-    fn observed(name: &str, columns: &[(&str, &str, Option<f64>)]) -> Observation {
-        let column = |(name, unit, value): &(&str, &str, Option<f64>)| {
-            let error = value.map(|value| 0.1 * value);
-            serde_json::json!({"name": name, "unit": unit, "values": [value], "errors": [error]})
-        };
-        let columns: Vec<_> = columns.iter().map(column).collect();
-        serde_json::from_value(serde_json::json!({"name": name, "kind": "scalar", "columns": columns}))
-            .unwrap()
     }
 
     /// Each observable has a number among the results, in one spelling of units; a mixture has all compositions. Numbers that
@@ -227,30 +226,25 @@ mod tests {
     #[test]
     fn every_observable_has_a_result() {
         let all = [
-            observed(
-                "poiseuille",
-                &[("viscosity", "mass/(r_c time)", Some(0.8)), ("deviation", "1", Some(0.1))],
-            ),
-            observed("coexistence", &[("rich_oil", "1", Some(0.9)), ("poor_oil", "1", Some(0.2))]),
+            observed("poiseuille", &[("viscosity", "mass/(r_c time)", 0.8), ("deviation", "1", 0.1)]),
+            observed("coexistence", &[("rich_oil", "1", 0.9), ("poor_oil", "1", 0.2)]),
             observed(
                 "diffusion",
-                &[("diffusion_oil", "r_c^2/time", Some(0.3)), ("diffusion_water", "r_c^2/time", None)],
+                &[("diffusion_oil", "r_c^2/time", 0.3), ("diffusion_water", "r_c^2/time", f64::NAN)],
             ),
-            observed("rdf_peak", &[("height", "1", Some(2.1)), ("at", "length", Some(0.8))]),
-            observed("velocity_profile_mean", &[("x", "r_c/time", Some(0.5)), ("y", "r_c/time", Some(0.1))]),
-            observed("clusters", &[("count", "1", Some(3.0)), ("largest", "1", Some(40.0))]),
-            observed("contact_angle", &[("angle", "degree", Some(100.0)), ("liquid", "1/volume", Some(6.0))]),
-            observed("interface_width", &[("liquid", "1/volume", None)]),
+            observed("rdf_peak", &[("height", "1", 2.1), ("at", "length", 0.8)]),
+            observed("velocity_profile_mean", &[("x", "r_c/time", 0.5), ("y", "r_c/time", 0.1)]),
+            observed("clusters", &[("count", "1", 3.0), ("largest", "1", 40.0)]),
+            observed("contact_angle", &[("angle", "degree", 100.0), ("liquid", "1/volume", 6.0)]),
+            observed("interface_width", &[("liquid", "1/volume", f64::NAN)]),
         ];
-        let mut about = super::super::tests::about();
+        let mut about = about();
         for (dimensions, volume) in [(3, "1/length^3"), (2, "1/length^2")] {
             about.dimensions = dimensions;
             about.stages.clear();
             let found = gather(Some(&about), None, None, &all);
-            let names: Vec<_> =
-                found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect();
             assert_eq!(
-                names,
+                values(&found),
                 [
                     ("liquid", 6.0, volume),
                     ("contact_angle", 100.0, "degree"),
@@ -274,7 +268,7 @@ mod tests {
     fn a_driven_flow_is_not_blamed_on_the_step() {
         let mut hot = table(&[0.0; 80]);
         hot.columns[1] = (0..80).map(|k| 1.4 + 0.01 * noise(k)).collect();
-        let mut about = super::super::tests::about();
+        let mut about = about();
         for (body_forces, says) in
             [(false, "a smaller time step than 0.01"), (true, "`temperature_profile` in [observe]")]
         {
@@ -285,12 +279,7 @@ mod tests {
             assert!(temperature.len() == 1 && temperature[0].contains(says), "{notes:?}");
         }
         // Without the flow the temperature is that of the profile, and what is off then is the step's.
-        let profile = |value: f64| -> Observation {
-            let column =
-                serde_json::json!({"name": "mean", "unit": "energy", "values": [value], "errors": [0.002]});
-            let all = serde_json::json!({"name": WITHOUT_FLOW, "kind": "scalar", "columns": [column]});
-            serde_json::from_value(all).unwrap()
-        };
+        let profile = |value: f64| scalars(WITHOUT_FLOW, &[("mean", "energy", value, 0.002)]);
         let kt = about.stages.last().unwrap().kt;
         for (value, says) in [(kt, None), (1.2 * kt, Some("a smaller time step"))] {
             let found = gather(Some(&about), None, Some(&hot), &[profile(value)]);
@@ -306,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_drop_that_reaches_its_image_is_noticed() {
-        let about = super::super::tests::about();
+        let about = about();
         let side = about.box_edges[0][0];
         let found = |radius: f64| gather(Some(&about), Some(100.0), None, &[drop(radius)]);
         assert!(found(0.48 * side).notes.iter().any(|n| n.contains("touches its image")));
@@ -319,7 +308,7 @@ mod tests {
     /// A stage at kT = 0.7 whose temperature is what is given, constant but for what it scatters by; the rows of the stage before are
     /// far off.
     fn run_at(temperature: f64, scatter: f64) -> (About, series::Table) {
-        let mut about = super::super::tests::about();
+        let mut about = about();
         about.stages.iter_mut().for_each(|s| s.kt = 0.7);
         about.box_edges = [[4.0, 0.0, 0.0], [1.0, 5.0, 0.0], [0.5, -0.5, 6.0]];
         let of = |before: f64, value: f64, scatter: f64| -> Vec<f64> {
@@ -472,11 +461,8 @@ mod tests {
     fn a_temperature_within_four_errors_is_not_off() {
         let about = run_at(0.7, 0.0).0;
         let noted = |value: f64| {
-            let observed: Observation = serde_json::from_value(serde_json::json!({
-                "name": "temperature", "kind": "scalar", "stage": "produce",
-                "columns": [{"name": "kinetic", "values": [value], "errors": [0.005]}]
-            }))
-            .unwrap();
+            let observed = scalars("temperature", &[("kinetic", "", value, 0.005)]);
+            let observed = Observation { stage: "produce".into(), ..observed };
             let mut before = Observation { stage: "equilibrate".into(), ..observed.clone() };
             before.columns[0].values[0] = 9.0;
             let found = gather(Some(&about), None, None, &[before, observed]);
@@ -490,7 +476,7 @@ mod tests {
     #[test]
     fn observables_have_their_names_in_the_headline() {
         let of = |name: &str, columns: &[(&str, f64)]| {
-            let columns: Vec<_> = columns.iter().map(|(name, value)| (*name, "", Some(*value))).collect();
+            let columns: Vec<_> = columns.iter().map(|(name, value)| (*name, "", *value)).collect();
             observed(name, &columns)
         };
         let slab = [
@@ -500,8 +486,6 @@ mod tests {
             of("contact_angle", &[("angle", 80.0)]),
         ];
         let found = gather(None, None, None, &slab);
-        let values: Vec<(&str, f64, &str)> =
-            found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect();
         let expected = [
             ("temperature", 2.0, "energy"),
             ("pressure", 4.0, "energy/length^3"),
@@ -510,17 +494,15 @@ mod tests {
             ("width", 7.0, "length"),
             ("contact_angle", 80.0, "degree"),
         ];
-        assert_eq!(values, expected);
+        assert_eq!(values(&found), expected);
         assert!(found.values.iter().all(|v| v.error == Some(0.1 * v.value)), "{found:?}");
         let drop = of(
             "drop",
             &[("radius", 1.0), ("liquid", 2.0), ("vapour", 3.0), ("width", 4.0), ("tension", 5.0)],
         );
-        let mut plane = super::super::tests::about();
+        let mut plane = about();
         plane.dimensions = 2;
         let found = gather(Some(&plane), None, None, &[drop]);
-        let values: Vec<(&str, f64, &str)> =
-            found.values.iter().map(|v| (v.name.as_str(), v.value, v.unit.as_str())).collect();
         let expected = [
             ("liquid", 2.0, "1/length^2"),
             ("vapour", 3.0, "1/length^2"),
@@ -528,14 +510,14 @@ mod tests {
             ("width", 4.0, "length"),
             ("radius", 1.0, "length"),
         ];
-        assert_eq!(values, expected);
+        assert_eq!(values(&found), expected);
     }
 
     /// A drop is as wide as twice its radius and its interface; it touches its image where less than the longest range of the model
     /// is left of the narrowest periodic edge.
     #[test]
     fn a_drop_needs_the_range_of_its_model_beside_it() {
-        let mut about = super::super::tests::about();
+        let mut about = about();
         about.box_edges = [[9.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 4.0]];
         about.box_periodic = [true, true, false];
         let touches = |about: &About, radius: f64| {

@@ -1,7 +1,7 @@
 //! The content of `observables.json`: each observable as a number with its error, or as a plot.
 
 use super::super::figure::{Figure, Outline, field_of_values};
-use super::super::text::typeset;
+use super::super::text::{named, typeset};
 use super::super::{Plot, Series, Style, Table};
 use super::{Item, Observation, Section, with_error};
 use psidpd_observe::Kind;
@@ -75,14 +75,6 @@ fn label(o: &Observation) -> String {
 fn caption(o: &Observation) -> String {
     let stage = if o.stage.is_empty() { String::new() } else { format!("Stage “{}”, ", o.stage) };
     format!("{stage}{} samples. {}", o.samples, o.note).trim().to_owned()
-}
-
-/// A name with its unit, unless it is a pure number.
-fn named(name: &str, unit: &str) -> String {
-    match unit {
-        "" | "1" => name.to_owned(),
-        unit => format!("{name} [{}]", typeset(unit)),
-    }
 }
 
 fn figure(o: &Observation, plot: Result<String, super::ReportError>) -> Item {

@@ -1,6 +1,6 @@
 //! Totals against time, and their means.
 
-use super::super::text::typeset;
+use super::super::text::{named, typeset};
 use super::super::{Plot, Series, Style, extremes};
 use super::{About, FormatError, Item, Path, Section, with_error};
 use psidpd_formats::THERMO;
@@ -110,10 +110,7 @@ impl<'a> Curves<'a> {
 
     /// A label with the unit of a column.
     fn label(&self, symbol: &str, name: &str) -> String {
-        match self.column(name).1 {
-            unit if unit.is_empty() => symbol.to_owned(),
-            unit => format!("{symbol} [{}]", typeset(&unit)),
-        }
+        named(symbol, &self.column(name).1)
     }
 
     /// The title and the unit of a column.

@@ -1,6 +1,5 @@
 use super::*;
 use psidpd_experiments::liquid::{ENTRIES, Entries, Found, Liquid, LiquidError, Row, model};
-use psidpd_report::quantity::with_error;
 
 #[derive(Debug, clap::Args)]
 pub struct OfLiquid {
@@ -143,7 +142,7 @@ fn print(found: &Found) {
         table.push([
             format!("{name}, {unit}"),
             wanted.map_or("free".to_owned(), |x| format!("{x:.4e}")),
-            if got.value.is_finite() { with_error(got.value, Some(got.error)) } else { "-".to_owned() },
+            shown(*got),
             wanted.filter(|_| got.value.is_finite()).map_or("".to_owned(), |x| percent(got.value / x - 1.0)),
             wanted
                 .and(*tolerance)

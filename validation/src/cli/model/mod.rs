@@ -84,11 +84,6 @@ impl Search {
     }
 }
 
-/// The last part of a path, for the command in the head of a file.
-fn file_name(path: &Path) -> String {
-    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
-}
-
 fn positive(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()

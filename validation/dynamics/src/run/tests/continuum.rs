@@ -1,20 +1,18 @@
 //! Walls as a half-space of matter.
 
+use super::matter::{
+    STAGE, assert_same_bytes, assert_slices_add_up, assert_temperatures, balanced, deviation, named,
+    observed, rough,
+};
 use super::*;
-use crate::run::runner::{Begin, Runner};
-use crate::run::tests::resume::{assert_same, finished, until};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{PeriodicBox, faces};
-use psidpd_core::model::wall::{SURPLUS, Surface, Wall};
+use psidpd_core::model::wall::{SURPLUS, Surface};
 use psidpd_observe::Recorded;
 use psidpd_observe::frame::{Frame, View};
-use std::num::NonZeroUsize;
-use std::sync::atomic::AtomicUsize;
 
 const BOX: &str =
     "[box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
-
-const STAGE: &str = "[[stage]]\nname = \"run\"\nsteps = 1\n";
 
 /// Set 6 between a wall at rest and one that moves.
 fn between(rest: &str) -> Scene {
@@ -44,23 +42,8 @@ fn energy_between_walls_is_conserved_to_second_order() {
             run.state().clone()
         })
         .collect();
-    let deviation = |dt: f64| {
-        let (mut squares, mut count) = (0.0, 0.0);
-        for start in &starts {
-            let mut run = scene.simulation(start.clone()).unwrap();
-            run.set_thermostat(false);
-            run.prepare(dt, Want::TOTALS).unwrap();
-            let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
-            let first = energy(&run);
-            for _ in 0..(0.4 / dt).round() as usize {
-                run.step(dt, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
-                squares += (energy(&run) - first).powi(2);
-                count += 1.0;
-            }
-        }
-        (squares / count).sqrt() / starts[0].len() as f64
-    };
-    let [coarse, fine] = [0.01, 0.00125].map(deviation);
+    let of = |dt: f64| deviation(&scene, &starts, Integrator::VelocityVerlet, [dt, 0.4]);
+    let [coarse, fine] = [0.01, 0.00125].map(of);
     assert!(coarse < 3e-3 && fine < coarse / 25.0, "{coarse} {fine}");
 }
 
@@ -70,15 +53,7 @@ fn energy_between_walls_is_conserved_to_second_order() {
 #[test]
 fn noise_of_a_wall_has_the_covariance_of_its_friction() {
     let (kt, dt, mass) = (0.7, 0.3, 1.7);
-    let wall = Wall {
-        surface: Surface::Face { axis: 2, high: true },
-        species: 0,
-        density: 3.0,
-        local_densities: Vec::new(),
-        strength: 1.0,
-        velocity: [0.4, 0.0, 0.0],
-        drag: [Some(20.0), Some(1.0)],
-    };
+    let wall = rough(Surface::Face { axis: 2, high: true }, [0.4, 0.0, 0.0]);
     let text = "title = \"g\"\nspecies = [\"A\"]\n";
     let model = Model::parse("m.toml", text).unwrap().with_walls(vec![wall]);
     let domain = PeriodicBox::orthogonal([0.0; 3], [4.0, 4.0, 6.0], [true, true, false]).unwrap();
@@ -110,8 +85,7 @@ fn noise_of_a_wall_has_the_covariance_of_its_friction() {
     }
 }
 
-/// Beside walls an ideal gas has the temperature of its stage, however strong the drag, with every integrator whose thermostat is
-/// exact: the mean of 20 blocks, of which Student's t exceeds 6 less than once in 10^5 seeds.
+/// Beside walls an ideal gas has the temperature of its stage, however strong the drag, with every integrator whose thermostat is exact.
 #[test]
 fn a_gas_beside_walls_has_its_temperature() {
     let text = format!(
@@ -120,64 +94,16 @@ fn a_gas_beside_walls_has_its_temperature() {
     );
     let scene = support::scene(IDEAL, &text).unwrap();
     for name in ["peters", "shardlow-s1", "aboba", "baoab", "two-stage", "force-gradient"] {
-        let integrator = Integrator::ALL.iter().find(|(other, _)| *other == name).unwrap().1;
-        let mut run = scene.simulation(scene.initial_state()).unwrap();
-        let dt = 0.1;
-        run.prepare_for(integrator, dt, Want::FORCES).unwrap();
-        run.advance(30, dt, integrator).unwrap();
-        let blocks: Vec<[f64; 2]> = (0..20)
-            .map(|_| {
-                let (mut near, mut all) = ([0.0; 2], 0.0);
-                for _ in 0..12 {
-                    run.step(dt, integrator, Want::FORCES).unwrap();
-                    all += run.temperature() / 12.0;
-                    let state = run.state();
-                    for (_, v) in state.x.iter().zip(&state.v).filter(|(x, _)| x[2] < 0.5 || x[2] > 4.5) {
-                        near[0] += v.iter().map(|v| v * v).sum::<f64>();
-                        near[1] += 3.0;
-                    }
-                }
-                [all, near[0] / near[1]]
-            })
-            .collect();
-        for k in 0..2 {
-            let n = blocks.len() as f64;
-            let mean = blocks.iter().map(|b| b[k]).sum::<f64>() / n;
-            let variance = blocks.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
-            let error = (variance / n).sqrt();
-            assert!((mean - 1.0).abs() < 6.0 * error && error < 0.02, "{name} {k}: {mean} +- {error}");
-        }
+        assert_temperatures(&scene, name, |x| x[2] < 0.5 || x[2] > 4.5, 0.02);
     }
 }
 
-/// What walls take is what the fluid loses, by forces, drag, noise and reflection. Where a step has one kick, step by step to
-/// rounding; where kicks are shared with the next step, but for the kicks at both ends.
 #[test]
 fn walls_take_the_momentum_that_the_fluid_loses() {
     let scene = between(STAGE);
     let start = settled(&scene).state().clone();
-    for (name, integrator) in Integrator::ALL.iter().filter(|(_, integrator)| integrator.has_time()) {
-        let mut run = scene.simulation(start.clone()).unwrap();
-        let dt = 0.01;
-        run.prepare_for(*integrator, dt, Want::TOTALS).unwrap();
-        run.record_flux(Recorded::Sum);
-        let first = momentum(&run);
-        let (mut given, mut before, mut worst) = ([0.0; 3], first, 0.0f64);
-        for _ in 0..200 {
-            run.step(dt, *integrator, Want::TOTALS).unwrap();
-            let on_walls = run.flux().unwrap().on_walls(2);
-            let taken: [f64; 3] = std::array::from_fn(|c| dt * (on_walls[0][c] + on_walls[1][c]));
-            let now = momentum(&run);
-            for c in 0..3 {
-                given[c] += taken[c];
-                worst = worst.max((now[c] - before[c] + taken[c]).abs());
-            }
-            before = now;
-        }
-        // The force on all particles together is below 300 in this run.
-        let off = (0..3).map(|c| (before[c] - first[c] + given[c]).abs()).fold(0.0, f64::max);
-        let [limit, step_limit] = if *name == "aboba" { [1e-9; 2] } else { [300.0 * dt; 2] };
-        assert!(off < limit && worst < step_limit, "{name}: {off} {worst}");
+    for (name, _) in Integrator::ALL.iter().filter(|(_, integrator)| integrator.has_time()) {
+        let (given, _) = balanced(&scene, &start, name, 200);
         assert!(given.iter().any(|p| p.abs() > 1.0), "{name}: {given:?}");
     }
 }
@@ -189,15 +115,7 @@ fn walls_take_the_momentum_that_the_fluid_loses() {
 fn friction_of_a_wall_is_in_the_pressure() {
     let (mass, dt, z) = (3.0, 0.3, 0.2);
     for high in [false, true] {
-        let wall = Wall {
-            surface: Surface::Face { axis: 1, high },
-            species: 0,
-            density: 3.0,
-            local_densities: Vec::new(),
-            strength: 1.0,
-            velocity: [0.0; 3],
-            drag: [Some(20.0), Some(1.0)],
-        };
+        let wall = rough(Surface::Face { axis: 1, high }, [0.0; 3]);
         let text = "title = \"g\"\nspecies = [\"A\", \"B\"]\n";
         let model = Model::parse("m.toml", text).unwrap().with_walls(vec![wall]);
         let y = if high { 7.0 - z } else { 2.0 + z };
@@ -212,7 +130,7 @@ fn friction_of_a_wall_is_in_the_pressure() {
             image: vec![[0; 3]],
         };
         for name in ["velocity-verlet", "baoab", "aboba", "force-gradient"] {
-            let integrator = Integrator::ALL.iter().find(|(other, _)| *other == name).unwrap().1;
+            let integrator = named(name);
             let mut run = Simulation::new(&model, 1e-60, state.clone(), 7).unwrap();
             run.record_flux(Recorded::Lines);
             run.prepare_for(integrator, dt, Want::TOTALS).unwrap();
@@ -297,23 +215,11 @@ fn the_meter_of_walls_has_the_momentum_that_the_fluid_loses() {
             velocity[..dimensions].join(", ")
         );
         let scene = support::scene(&model, &text).unwrap();
-        let stage = &scene.stages[0];
-        let mut run = scene.simulation(scene.initial_state()).unwrap();
-        scene.enter(stage, &mut run).unwrap();
-        run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
-        run.record_flux(Recorded::Sum);
-        let mut observers = psidpd_observe::Observers::new(&scene.observe, ["run"]);
-        let first = momentum(&run);
-        for _ in 0..60 {
-            run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
-            observers.sample(run.view(0.0), "run");
-        }
-        let out = observers.finish();
-        let last = momentum(&run);
+        let (out, lost, _) = observed(&scene, Recorded::Sum);
         for (c, axis) in ["x", "y", "z"].into_iter().enumerate().take(dimensions) {
             let on = |face: &str| out[0].scalar(&format!("{face}_{axis}")).unwrap().value;
             let taken = (on(low) + on(high)) * area * 0.6;
-            let lost = first[c] - last[c];
+            let lost = lost[c];
             assert!((taken - lost).abs() < 1e-9 && lost.abs() > 1e-3, "{low} {axis}: {taken} {lost}");
             // Fluids push walls apart.
             assert!(!low.starts_with(axis) || on(low) < -1.0 && on(high) > 1.0, "{low} {axis}");
@@ -342,66 +248,14 @@ fn the_configurational_temperature_knows_walls() {
     assert!((sums[0] / sums[1] / kt - 1.0).abs() < 2e-3 && forces > 1.0, "{}", sums[0] / sums[1]);
 }
 
-/// By what share the mean of the slices of `stress_profile`, after the steps of a scene, differs from that column of `pressure`.
-pub fn slices_off_flux(scene: &Scene, column: &str) -> f64 {
-    let stage = &scene.stages[0];
-    let mut run = scene.simulation(scene.initial_state()).unwrap();
-    scene.enter(stage, &mut run).unwrap();
-    run.prepare_for(stage.integrator, stage.dt, Want::FORCES).unwrap();
-    run.record_flux(Recorded::Lines);
-    let mut observers = psidpd_observe::Observers::new(&scene.observe, [stage.name.as_str()]);
-    for _ in 0..stage.steps {
-        run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
-        observers.sample(run.view(0.0), &stage.name);
-    }
-    let out = observers.finish();
-    let of = |name: &str| out.iter().find(|o| o.name == name).unwrap();
-    let normal = &of("stress_profile").get("normal").unwrap().values;
-    let mean = normal.iter().sum::<f64>() / normal.len() as f64;
-    (mean / of("pressure").get(column).unwrap().values[0] - 1.0).abs()
-}
-
-/// Slices of stress add up to the momentum flux of the step, walls included, with every integrator.
 #[test]
 fn slices_between_walls_add_up_to_the_momentum_flux() {
-    for (name, integrator) in Integrator::ALL {
-        for (axis, column) in [("x", "carried_xx"), ("z", "carried_zz")] {
-            let steps = format!("[[stage]]\nname = \"run\"\nsteps = 8\nintegrator = \"{name}\"\n");
-            let dt = if integrator.has_time() { "dt = 0.02\n" } else { "" };
-            let scene = between(&format!(
-                "{steps}{dt}[observe]\nevery = 1\npressure = true\nstress_profile = {{ axis = \"{axis}\", bins = 7 }}\n"
-            ));
-            let off = slices_off_flux(&scene, column);
-            assert!(off < 1e-10, "{name} {axis}: {off}");
-        }
-    }
+    assert_slices_add_up(between, 8, 1e-10);
 }
 
-/// Runs with walls that are stopped and go on end in the same bytes, and so do runs on any number of threads.
 #[test]
 fn runs_between_walls_end_in_the_same_bytes() {
-    let scene = between(
-        "[[stage]]\nname = \"a\"\nsteps = 6\ndt = 0.01\n\
-         [[stage]]\nname = \"b\"\nsteps = 5\nintegrator = \"aboba\"\nthermostat_every = 2\ndt = 0.02\n\
-         [[stage]]\nname = \"c\"\nsteps = 4\nintegrator = \"force-gradient\"\ndt = 0.02\n\
-         [[stage]]\nname = \"d\"\nsteps = 3\nintegrator = \"monte-carlo\"\n\
-         [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n\
-         [observe]\nevery = 2\nstages = [\"a\", \"b\", \"c\"]\npressure = true\nstress_profile = true\nwall_force = true\n",
-    );
-    let folder = tempfile::tempdir().unwrap();
-    let whole = folder.path().join("whole");
-    finished(&scene, &whole, Begin::New);
-    for at in [3, 7, 10, 13, 16] {
-        let out = folder.path().join(at.to_string());
-        until(&scene, &out, Begin::New, at).unwrap();
-        finished(&scene, &out, Begin::Resume);
-        assert_same(&whole, &out, &format!("after step {at}"));
-    }
-    let out = folder.path().join("threads");
-    let mut runner = Runner::begin(&scene, &out, Begin::New).unwrap();
-    runner.set_threads(NonZeroUsize::new(3).unwrap()).unwrap();
-    runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
-    assert_same(&whole, &out, "on three threads");
+    assert_same_bytes(between);
 }
 
 /// A GPU refuses walls, with the reason.

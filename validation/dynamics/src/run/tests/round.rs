@@ -3,19 +3,16 @@
 mod flows;
 mod scenes;
 
-use super::continuum::slices_off_flux;
+use super::matter::{
+    STAGE, assert_same_bytes, assert_slices_add_up, assert_temperatures, balanced, deviation, named,
+    observed, rough,
+};
 use super::*;
-use crate::run::runner::{Begin, Runner};
-use crate::run::tests::resume::{assert_same, finished, until};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::Evaluator;
-use psidpd_core::model::wall::{Round, Surface, Wall};
+use psidpd_core::model::wall::{Round, Surface};
 use psidpd_observe::Recorded;
 use psidpd_observe::frame::{Frame, View};
-use std::num::NonZeroUsize;
-use std::sync::atomic::AtomicUsize;
-
-const STAGE: &str = "[[stage]]\nname = \"run\"\nsteps = 1\n";
 
 const CAPILLARY: &str =
     "shape = \"cylinder\"\nradius = 2.2\nfluid = \"inside\"\nvelocity = [0.0, 0.0, 0.3]\nviscosity = 7.8\n";
@@ -41,10 +38,6 @@ fn settled(scene: &Scene) -> Simulation {
     run
 }
 
-fn named(name: &str) -> Integrator {
-    Integrator::ALL.iter().find(|(other, _)| *other == name).unwrap().1
-}
-
 /// The deviations of the energy fall with Δt² where drag and noise are off, beside every surface, and with every integrator that keeps it.
 #[test]
 fn energy_beside_round_walls_is_conserved_to_second_order() {
@@ -52,56 +45,24 @@ fn energy_beside_round_walls_is_conserved_to_second_order() {
     let cases = ALL.map(|wall| (wall, "velocity-verlet"));
     for (wall, name) in cases.into_iter().chain(of_capillary) {
         let scene = beside(wall, STAGE);
-        let start = settled(&scene).state().clone();
-        let deviation = |dt: f64| {
-            let (mut squares, mut count) = (0.0, 0.0);
-            let mut run = scene.simulation(start.clone()).unwrap();
-            run.set_thermostat(false);
-            run.prepare_for(named(name), dt, Want::TOTALS).unwrap();
-            let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
-            let first = energy(&run);
-            for _ in 0..(0.3 / dt).round() as usize {
-                run.step(dt, named(name), Want::TOTALS).unwrap();
-                squares += (energy(&run) - first).powi(2);
-                count += 1.0;
-            }
-            (squares / count).sqrt() / start.len() as f64
-        };
-        let [coarse, fine] = [0.01, 0.0025].map(deviation);
+        let starts = [settled(&scene).state().clone()];
+        let of = |dt: f64| deviation(&scene, &starts, named(name), [dt, 0.3]);
+        let [coarse, fine] = [0.01, 0.0025].map(of);
         // Force-gradient is of fourth order away from the surface.
         let [most, falls] = if name == "force-gradient" { [1e-3, 3.0] } else { [6e-3, 7.0] };
         assert!(coarse < most && fine < coarse / falls, "{wall} {name}: {coarse} {fine}");
     }
 }
 
-/// What walls take is what the fluid loses, by forces, drag, noise and reflection: where a step has one kick, step by step to rounding;
-/// where kicks are shared with the next step, but for the kicks at both ends. No particle gets into the matter.
+/// No particle gets into the matter.
 #[test]
 fn round_walls_take_the_momentum_that_the_fluid_loses() {
     for wall in ALL {
         let scene = beside(wall, STAGE);
         let start = settled(&scene).state().clone();
-        for (name, integrator) in Integrator::ALL.iter().filter(|(_, integrator)| integrator.has_time()) {
-            let mut run = scene.simulation(start.clone()).unwrap();
-            let dt = 0.01;
-            run.prepare_for(*integrator, dt, Want::TOTALS).unwrap();
-            run.record_flux(Recorded::Sum);
-            let first = momentum(&run);
-            let (mut given, mut before, mut worst) = ([0.0; 3], first, 0.0f64);
-            for _ in 0..60 {
-                run.step(dt, *integrator, Want::TOTALS).unwrap();
-                let on_wall = run.flux().unwrap().on_walls(1)[0];
-                let now = momentum(&run);
-                for c in 0..3 {
-                    given[c] += dt * on_wall[c];
-                    worst = worst.max((now[c] - before[c] + dt * on_wall[c]).abs());
-                }
-                before = now;
-            }
-            let off = (0..3).map(|c| (before[c] - first[c] + given[c]).abs()).fold(0.0, f64::max);
-            let [limit, step_limit] = if *name == "aboba" { [1e-9; 2] } else { [300.0 * dt; 2] };
-            assert!(off < limit && worst < step_limit, "{wall} {name}: {off} {worst}");
-            assert!(given.iter().any(|p| p.abs() > 0.1), "{name}: {given:?}");
+        for (name, _) in Integrator::ALL.iter().filter(|(_, integrator)| integrator.has_time()) {
+            let (given, run) = balanced(&scene, &start, name, 60);
+            assert!(given.iter().any(|p| p.abs() > 0.1), "{wall} {name}: {given:?}");
             let surfaces = crate::run::Surfaces::of(&scene.model.at(1.0).unwrap().walls, &scene.domain);
             assert!(!run.state().x.iter().any(|x| surfaces.is_in_matter(x)), "{wall} {name}");
         }
@@ -199,15 +160,7 @@ fn noise_of_a_round_wall_has_the_covariance_of_its_friction() {
         let across = [0, 1, 2].map(|c| c < dimensions && Some(c) != along);
         let mut velocity = [0.0; 3];
         along.into_iter().for_each(|c| velocity[c] = 0.4);
-        let wall = Wall {
-            surface: Surface::Round(Round { across, center: [3.0; 3], radius, inside }),
-            species: 0,
-            density: 3.0,
-            local_densities: Vec::new(),
-            strength: 1.0,
-            velocity,
-            drag: [Some(20.0), Some(1.0)],
-        };
+        let wall = rough(Surface::Round(Round { across, center: [3.0; 3], radius, inside }), velocity);
         let text = format!("title = \"g\"\ndimensions = {dimensions}\nspecies = [\"A\"]\n");
         let model = Model::parse("m.toml", &text).unwrap().with_walls(vec![wall]);
         let lengths = if dimensions == 2 { [6.0, 6.0, 1.0] } else { [6.0; 3] };
@@ -271,15 +224,7 @@ fn friction_of_a_round_wall_is_in_the_pressure() {
     let (mass, dt, z) = (3.0, 0.3, 0.2);
     for inside in [true, false] {
         let round = Round { across: [true, false, true], center: [3.0; 3], radius: 1.5, inside };
-        let wall = Wall {
-            surface: Surface::Round(round),
-            species: 0,
-            density: 3.0,
-            local_densities: Vec::new(),
-            strength: 1.0,
-            velocity: [0.0; 3],
-            drag: [Some(20.0), Some(1.0)],
-        };
+        let wall = rough(Surface::Round(round), [0.0; 3]);
         let model =
             Model::parse("m.toml", "title = \"g\"\nspecies = [\"A\"]\n").unwrap().with_walls(vec![wall]);
         let domain = PeriodicBox::orthogonal([0.0; 3], [6.0; 3], [true; 3]).unwrap();
@@ -319,24 +264,10 @@ fn friction_of_a_round_wall_is_in_the_pressure() {
     }
 }
 
-/// Slices of stress add up to the momentum flux of the step, round walls included, with every integrator.
 #[test]
 fn slices_across_round_walls_add_up_to_the_momentum_flux() {
-    for ((name, integrator), wall) in
-        Integrator::ALL.iter().flat_map(|i| [CAPILLARY, BALL].map(|wall| (i, wall)))
-    {
-        for (axis, column) in [("x", "carried_xx"), ("z", "carried_zz")] {
-            let steps = format!("[[stage]]\nname = \"run\"\nsteps = 4\nintegrator = \"{name}\"\n");
-            let dt = if integrator.has_time() { "dt = 0.02\n" } else { "" };
-            let scene = beside(
-                wall,
-                &format!(
-                    "{steps}{dt}[observe]\nevery = 1\npressure = true\nstress_profile = {{ axis = \"{axis}\", bins = 7 }}\n"
-                ),
-            );
-            let off = slices_off_flux(&scene, column);
-            assert!(off < 1e-9, "{name} {axis}: {off}");
-        }
+    for wall in [CAPILLARY, BALL] {
+        assert_slices_add_up(|rest| beside(wall, rest), 4, 1e-9);
     }
 }
 
@@ -367,23 +298,11 @@ fn the_meter_of_round_walls_has_the_momentum_that_the_fluid_loses() {
              [observe]\nevery = 1\nwall_force = true\n"
         );
         let scene = support::scene(model, &text).unwrap();
-        let stage = &scene.stages[0];
-        let mut run = scene.simulation(scene.initial_state()).unwrap();
-        scene.enter(stage, &mut run).unwrap();
-        run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
-        run.record_flux(Recorded::Sum);
-        let mut observers = psidpd_observe::Observers::new(&scene.observe, ["run"]);
-        let first = momentum(&run);
-        for _ in 0..60 {
-            run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
-            observers.sample(run.view(0.0), "run");
-        }
-        let out = observers.finish();
-        let last = momentum(&run);
+        let (out, lost, run) = observed(&scene, Recorded::Sum);
         let force = if dimensions == 2 { [0.0, 0.3, 0.0] } else { [0.0, 0.2, 0.3] };
         for (c, axis) in ["x", "y", "z"].into_iter().enumerate().take(dimensions) {
             let taken = out[0].scalar(&format!("{name}_{axis}")).unwrap().value * area * 0.6;
-            let lost = first[c] - last[c] + 0.6 * force[c] * run.len() as f64;
+            let lost = lost[c] + 0.6 * force[c] * run.len() as f64;
             assert!((taken - lost).abs() < 1e-8 && lost.abs() > 1e-3, "{wall} {axis}: {taken} {lost}");
         }
         assert!(out[0].scalar(&format!("{name}_normal")).unwrap().value > 0.3, "{wall}");
@@ -432,8 +351,7 @@ fn round_walls_conserve_momentum_along_a_smooth_cylinder_alone() {
     }
 }
 
-/// Beside round walls an ideal gas has the temperature of its stage, however strong the drag: the mean of 20 blocks, of which Student's t
-/// exceeds 6 less than once in 10^5 seeds.
+/// Beside round walls an ideal gas has the temperature of its stage, however strong the drag.
 #[test]
 fn a_gas_beside_round_walls_has_its_temperature() {
     for wall in [CAPILLARY, CAVITY, BALL] {
@@ -450,67 +368,15 @@ fn a_gas_beside_round_walls_has_its_temperature() {
         let surfaces = crate::run::Surfaces::of(&scene.model.at(1.0).unwrap().walls, &scene.domain);
         let place = *surfaces.iter().next().unwrap().1;
         for name in ["shardlow-s1", "aboba", "two-stage", "force-gradient"] {
-            let integrator = named(name);
-            let mut run = scene.simulation(scene.initial_state()).unwrap();
-            let dt = 0.1;
-            run.prepare_for(integrator, dt, Want::FORCES).unwrap();
-            run.advance(30, dt, integrator).unwrap();
-            let blocks: Vec<[f64; 2]> = (0..20)
-                .map(|_| {
-                    let (mut near, mut all) = ([0.0; 2], 0.0);
-                    for _ in 0..12 {
-                        run.step(dt, integrator, Want::FORCES).unwrap();
-                        all += run.temperature() / 12.0;
-                        let state = run.state();
-                        for (_, v) in state.x.iter().zip(&state.v).filter(|(x, _)| place.distance(x) < 0.4) {
-                            near[0] += v.iter().map(|v| v * v).sum::<f64>();
-                            near[1] += 3.0;
-                        }
-                    }
-                    [all, near[0] / near[1]]
-                })
-                .collect();
-            for k in 0..2 {
-                let n = blocks.len() as f64;
-                let mean = blocks.iter().map(|b| b[k]).sum::<f64>() / n;
-                let variance = blocks.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
-                let error = (variance / n).sqrt();
-                assert!(
-                    (mean - 1.0).abs() < 6.0 * error && error < 0.03,
-                    "{wall} {name} {k}: {mean} +- {error}"
-                );
-            }
+            assert_temperatures(&scene, name, |x| place.distance(x) < 0.4, 0.03);
         }
     }
 }
 
-/// Runs beside round walls that are stopped and go on end in the same bytes, and so do runs on any number of threads.
 #[test]
 fn runs_beside_round_walls_end_in_the_same_bytes() {
     for wall in [CAPILLARY, BALL] {
-        let scene = beside(
-            wall,
-            "[[stage]]\nname = \"a\"\nsteps = 6\ndt = 0.01\n\
-             [[stage]]\nname = \"b\"\nsteps = 5\nintegrator = \"aboba\"\nthermostat_every = 2\ndt = 0.02\n\
-             [[stage]]\nname = \"c\"\nsteps = 4\nintegrator = \"force-gradient\"\ndt = 0.02\n\
-             [[stage]]\nname = \"d\"\nsteps = 3\nintegrator = \"monte-carlo\"\n\
-             [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n\
-             [observe]\nevery = 2\nstages = [\"a\", \"b\", \"c\"]\npressure = true\nstress_profile = true\nwall_force = true\n",
-        );
-        let folder = tempfile::tempdir().unwrap();
-        let whole = folder.path().join("whole");
-        finished(&scene, &whole, Begin::New);
-        for at in [3, 7, 10, 13, 16] {
-            let out = folder.path().join(at.to_string());
-            until(&scene, &out, Begin::New, at).unwrap();
-            finished(&scene, &out, Begin::Resume);
-            assert_same(&whole, &out, &format!("after step {at}"));
-        }
-        let out = folder.path().join("threads");
-        let mut runner = Runner::begin(&scene, &out, Begin::New).unwrap();
-        runner.set_threads(NonZeroUsize::new(3).unwrap()).unwrap();
-        runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
-        assert_same(&whole, &out, "on three threads");
+        assert_same_bytes(|rest| beside(wall, rest));
     }
 }
 
