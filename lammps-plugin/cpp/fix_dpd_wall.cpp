@@ -154,8 +154,7 @@ void FixDPDWall::post_integrate()
 {
   if (!pair) stop("LAMMPS has not set it up: 'run N pre no' cannot follow a new fix");
   if (splits) return;
-  beyond.assign(3 * static_cast<size_t>(atom->nlocal), 0.0);
-  reflect(0, 0.5 * update->dt, ~0, {beyond.data(), beyond.size()});
+  reflect(0, 0.5 * update->dt, ~0, {});
 }
 
 void FixDPDWall::reflect(int part, double kicked, int moved, rust::Slice<double> left)

@@ -32,7 +32,7 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   // Reflection at cylinders and spheres.
   void post_integrate() override;
   // Reflects atoms of the group that are also in the group `moved`, after a whole drift (0) or the first or the second half of one,
-  // where velocities have got `kicked` of the kick; `left` has three numbers for each atom, from the first half to the second.
+  // where velocities have got `kicked` of the kick; `left` has three numbers for each atom, from the first half to the second, and is empty for whole drifts.
   void reflect(int part, double kicked, int moved, rust::Slice<double> left);
   // Shows the virial of the forces that the pair style has added.
   void post_force(int vflag) override;
@@ -79,7 +79,6 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   // The mean force of reflections in the timestep on each wall, and what presses on its surface.
   std::vector<double> pushed;
   LAMMPS_NS::bigint pushed_at = -1;
-  std::vector<double> beyond;
   std::vector<double> masses;
 };
 

@@ -77,7 +77,7 @@ impl Style {
                 for face in &rounds {
                     let (to, moved) = (x[k].map(|x| x / scale.length), v[k].map(|v| v / scale.velocity()));
                     let from = std::array::from_fn(|c| to[c] - path.time * moved[c]);
-                    let left = || if path.shift == 0.0 { [0.0; 3] } else { beyond[k] };
+                    let left = || beyond.get(k).copied().unwrap_or_default();
                     let Way::Met(met) = path.meet(&face.place, &from, [to, moved], a, left, |_| ()) else {
                         continue;
                     };
@@ -85,7 +85,9 @@ impl Style {
                     for c in (0..3).filter(|c| round.across[*c]) {
                         (x[k][c], v[k][c]) = (scale.length * met.x[c], scale.velocity() * met.v[c]);
                     }
-                    beyond[k] = if path.shift_at_end() == 0.0 { [0.0; 3] } else { met.beyond };
+                    if let Some(beyond) = beyond.get_mut(k) {
+                        *beyond = if path.shift_at_end() == 0.0 { [0.0; 3] } else { met.beyond };
+                    }
                     let force = scale.force() * mass / dt;
                     if let Some(sums) = given.get_mut(face.index - drift.first) {
                         (0..3).for_each(|c| sums[c] -= force * met.given[c]);

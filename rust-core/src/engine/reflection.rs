@@ -60,7 +60,7 @@ impl Path {
     ) -> Way {
         let &Path { time, kicked, shift, .. } = self;
         let Some((surface, arm)) = place.arm(x) else { return Way::Free };
-        let distance = place.distance(x);
+        let distance = surface.side() * (surface.radius - square(arm).sqrt());
         let across =
             |of: &dyn Fn(usize) -> f64| [0, 1, 2].map(|c| if surface.across[c] { of(c) } else { 0.0 });
         let a = across(&|c| a[c]);

@@ -115,14 +115,14 @@ impl Place {
 const ON_SURFACE: f64 = 1e-9;
 
 /// The vector to `x` from the nearest image of the centre, across the surface.
+#[inline(always)]
 fn from_center(round: &Round, periods: &[f64; 3], x: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| {
-        let d = x[c] - round.center[c];
-        let images = (d / periods[c]).round();
-        match (round.across[c], images == 0.0) {
-            (false, _) => 0.0,
-            (true, true) => d,
-            (true, false) => d - images * periods[c],
+        let (d, period) = (x[c] - round.center[c], periods[c]);
+        match round.across[c] {
+            false => 0.0,
+            true if d.abs() < 0.5 * period => d,
+            true => d - (d / period).round() * period,
         }
     })
 }
