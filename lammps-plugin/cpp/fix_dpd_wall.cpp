@@ -159,8 +159,7 @@ void FixDPDWall::post_integrate()
 
 void FixDPDWall::reflect(int part, double kicked, int moved, rust::Slice<double> left)
 {
-  if (part < 2 && update->ntimestep != pushed_at) std::fill(pushed.begin(), pushed.end(), 0.0);
-  pushed_at = update->ntimestep;
+  if (part < 2) std::fill(pushed.begin(), pushed.end(), 0.0);
   find_masses(groupbit, moved);
   pair->bounce(masses, {part, kicked}, first, pushed, left);
 }

@@ -32,7 +32,8 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   // Reflection at cylinders and spheres.
   void post_integrate() override;
   // Reflects atoms of the group that are also in the group `moved`, after a whole drift (0) or the first or the second half of one,
-  // where velocities have got `kicked` of the kick; `left` has three numbers for each atom, from the first half to the second, and is empty for whole drifts.
+  // where velocities have got `kicked` of the kick; `left` keeps three numbers for each atom from the first half to the second, and is
+  // empty for a whole one.
   void reflect(int part, double kicked, int moved, rust::Slice<double> left);
   // Shows the virial of the forces that the pair style has added.
   void post_force(int vflag) override;
@@ -53,11 +54,11 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   // Reads a face; returns whether the word is one.
   bool read_face(const std::string &word);
+  // Reads a cylinder or a sphere at `k`, and moves `k` to its last word; returns whether there is one.
+  bool read_round(int &k, int narg, char **arg);
   // Reads the keyword at `k` and its values; returns the place of the next one.
   int read_keyword(int k, int narg, char **arg);
   double number(const char *text, const std::string &key, bool can_be_zero);
-  // Reads a cylinder or a sphere at `k`, and moves `k` to its last word; returns whether there is one.
-  bool read_round(int &k, int narg, char **arg);
   // Stops at surfaces that the box cannot have.
   void check_surfaces();
   void check_atoms();
@@ -78,7 +79,6 @@ class FixDPDWall : public LAMMPS_NS::Fix {
   std::array<double, 6> friction{};
   // The mean force of reflections in the timestep on each wall, and what presses on its surface.
   std::vector<double> pushed;
-  LAMMPS_NS::bigint pushed_at = -1;
   std::vector<double> masses;
 };
 
