@@ -52,6 +52,7 @@ fn main() {
             "cpp/pair_mdpd_psi.cpp",
             "cpp/pair_dpd_spline.cpp",
             "cpp/fix_dpd_wall.cpp",
+            "cpp/fix_dpd_wall_read.cpp",
             "cpp/fix_splitting.cpp",
             "cpp/fix_splitting_arrays.cpp",
             "cpp/fix_splitting_beside.cpp",

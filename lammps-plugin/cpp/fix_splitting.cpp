@@ -97,7 +97,7 @@ FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) :
     }
   }
   create_attribute = 1;
-  maxexchange = scheme == Scheme::force_gradient ? 9 : 6;
+  maxexchange = scheme == Scheme::two_stage ? 9 : 12;
   grow_arrays(atom->nmax);
   atom->add_callback(Atom::GROW);
 }
@@ -148,6 +148,7 @@ void FixSplitting::setup(int vflag)
   const std::string why = pair->why_not_apart();
   if (!why.empty()) stop("cannot apply drag and noise here: " + why);
   before = pair->effort();
+  holds = false;
   show_virial(vflag);
 }
 
@@ -163,13 +164,17 @@ void FixSplitting::initial_integrate(int vflag)
   vflag_of_step = vflag;
   const double dt = update->dt;
   if (scheme == Scheme::aboba) {
+    // The forces of the last timestep hold atoms at round walls, also where others were computed at its end.
+    if (holds) pair->engine().copy(flat(shifts, atom->nlocal), flat_mut(atom->f, atom->nlocal));
     drift(0.5 * dt);
+    bounce(1, 0.0);
     expect();
     evaluation = Evaluation::middle;
     return;
   }
   kick(lambda * dt);
   drift(0.5 * dt);
+  bounce(1, lambda * dt);
   reflect();
   follow();
   const bool displaces = scheme == Scheme::force_gradient && gradient > 0.0;
@@ -182,6 +187,7 @@ void FixSplitting::initial_integrate(int vflag)
   evaluation = Evaluation::end;
   kick((1.0 - 2.0 * lambda) * dt);
   drift(0.5 * dt);
+  bounce(2, (0.5 - lambda) * dt);
   expect();
 }
 
@@ -200,11 +206,14 @@ void FixSplitting::final_integrate()
   show_virial(vflag_of_step);
   kick(0.5 * dt);
   drift(0.5 * dt);
+  bounce(2, 0.5 * dt);
   reflect();
   // Fixes and computes that read the state at the end of a step find ghosts and, where asked for, energies there.
   const bigint step = update->ntimestep;
   const int eflag = (update->eflag_global == step ? 1 : 0) | (update->eflag_atom == step ? 2 : 0);
-  if (eflag || vflag_of_step) {
+  holds = eflag || vflag_of_step;
+  if (holds) {
+    pair->engine().copy(flat(atom->f, atom->nlocal), flat_mut(shifts, atom->nlocal));
     follow();
     evaluation = Evaluation::end;
     compute_forces(eflag, vflag_of_step);

@@ -67,6 +67,9 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void kick(double h);
   // x += h v of the atoms of the group.
   void drift(double h);
+  // Lets round walls of fixes dpd/wall reflect atoms after the first or the second half of a drift, where velocities have got `kicked` of
+  // the kick.
+  void bounce(int part, double kicked);
   // Lets fixes of walls reflect atoms that have moved, in addition to their own call.
   void reflect();
   // Updates positions of ghosts, and finds new ghosts where atoms have moved too far since the last search.
@@ -138,8 +141,12 @@ class FixSplitting : public LAMMPS_NS::Fix {
   Effort before{};
   // Flag of the virial of the present step.
   int vflag_of_step = 0;
-  // For force-gradient: the displacement of each atom, and its position before.
+  // How far the place of each atom that waits at a round wall in the middle of a timestep would lie behind it.
+  double **beyond = nullptr;
+  // For force-gradient: the displacement of each atom, and its position before. For aboba: the force in the middle of the last timestep.
   double **shifts = nullptr;
+  // Whether aboba has computed other forces since.
+  bool holds = false;
   std::vector<double> home;
   // Forces before a probe, or a wall, changes them.
   std::vector<double> covered;

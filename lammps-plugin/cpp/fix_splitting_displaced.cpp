@@ -47,6 +47,7 @@ void FixSplitting::shift()
   if (home.empty()) return;
   pair->engine().copy(flat(atom->x, owned), {home.data(), home.size()});
   pair->engine().shift(flat(shifts, owned), flat_mut(atom->x, owned));
+  pair->mirror();
 }
 
 void FixSplitting::restore()

@@ -1,4 +1,4 @@
-// Walls that are too stiff for the timestep.
+// Round walls that reflect atoms, and walls that are too stiff for the timestep.
 //
 // LAMMPS does not tell the potential of a wall, but its forces show. Of 10^6 atoms hardly one comes with five times the thermal
 // velocity, and a wall gives it twice that when it goes back. Where the force of a wall would give more in one timestep, the atom
@@ -6,7 +6,9 @@
 
 #include "fix_splitting.h"
 
+#include "fix_dpd_wall.h"
 #include "pair_psi.h"
+#include "slices.h"
 
 #include "atom.h"
 #include "force.h"
@@ -30,6 +32,15 @@ constexpr double HARDEST = 10.0;
 bool is_wall(const char *style) { return strncmp(style, "wall/", 5) == 0 || strncmp(style, "indent", 6) == 0; }
 
 }    // namespace
+
+void FixSplitting::bounce(int part, double kicked)
+{
+  const int owned = atom->nlocal;
+  if (part == 1 && owned > 0) std::fill_n(beyond[0], 3 * static_cast<size_t>(owned), 0.0);
+  for (int k = 0; k < modify->nfix; k++)
+    if (auto *wall = dynamic_cast<FixDPDWall *>(modify->fix[k]))
+      if (modify->fmask[k] & POST_INTEGRATE) wall->reflect(part, kicked, groupbit, flat_mut(beyond, owned));
+}
 
 bool FixSplitting::is_watched(int k) const
 {

@@ -184,6 +184,7 @@ void PairPsi::init_style()
 {
   wall_fixes = find_walls();
   refresh();
+  attempt<true>([&] { (*style)->check_room(extent()); });
   apart = has_splitting();
   check_host();
   check_callers();

@@ -70,6 +70,18 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Applies drag and noise of `count` walls from the wall `first` on to the velocities of atoms with these masses, infinite for
   // those that keep their velocities. Writes the mean force on each wall, and returns the virial of that on the atoms.
   std::array<double, 6> rub(const std::vector<double> &masses, int first, int count, std::vector<double> &given);
+  // A drift of atoms: 0 for a whole one, 1 or 2 for half of one, and how much of the kick velocities have got.
+  struct Moved {
+    int part;
+    double kicked;
+  };
+  // Lets walls from the wall `first` on reflect atoms with these masses, infinite for those that stay. Adds the mean force on each, and what
+  // presses on it, to `pushed`.
+  void bounce(const std::vector<double> &masses, const Moved &moved, int first, std::vector<double> &pushed, rust::Slice<double> left);
+  // Mirrors atoms in the matter of round walls at their surfaces.
+  void mirror();
+  // The ID of an owned atom in the matter of a round wall; -1 if there is none.
+  int64_t find_in_matter();
   // The walls of all fixes dpd/wall.
   const std::vector<WallOfFix> &walls() const { return matter; }
   // The only psidpd style of a simulation; null, with a reason to be added to a sentence, if there is none or several.

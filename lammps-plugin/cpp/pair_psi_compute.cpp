@@ -29,6 +29,7 @@ Extent PairPsi::extent() const
   Extent extent{};
   std::copy_n(domain->boxlo, 3, extent.origin.begin());
   std::copy_n(domain->h, 6, extent.edges.begin());
+  for (int k = 0; k < domain->dimension; k++) extent.periodic[k] = domain->periodicity[k];
   if (domain->deform_vremap || atom->firstgroupname) return extent;
   if (comm->nprocs > 1 && comm->layout == Comm::LAYOUT_TILED) return extent;
   for (int k = 0; k < domain->dimension; k++)

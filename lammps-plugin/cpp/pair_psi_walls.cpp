@@ -3,6 +3,7 @@
 #include "pair_psi.h"
 
 #include "fix_dpd_wall.h"
+#include "slices.h"
 
 #include "atom.h"
 #include "fix.h"
@@ -94,4 +95,30 @@ std::array<double, 6> PairPsi::rub(const std::vector<double> &masses, int first,
   return attempt([&] {
     return (*style)->rub(extent(), atoms(owned), {masses.data(), owned}, what, {given_to_walls.data(), given_to_walls.size()}, v);
   });
+}
+
+void PairPsi::bounce(const std::vector<double> &masses, const Moved &moved, int first, std::vector<double> &pushed, rust::Slice<double> left)
+{
+  const int owned = atom->nlocal;
+  Drift drift;
+  drift.part = static_cast<uint8_t>(moved.part);
+  drift.dt = update->dt;
+  drift.kicked = moved.kicked;
+  drift.first = static_cast<size_t>(first);
+  drift.count = pushed.size() / 4;
+  drift.mass = {masses.data(), masses.size()};
+  drift.f = flat(atom->f, owned);
+  attempt([&] {
+    (*style)->bounce(extent(), drift, left, {pushed.data(), pushed.size()}, flat_mut(atom->x, owned), flat_mut(atom->v, owned));
+  });
+}
+
+void PairPsi::mirror()
+{
+  attempt([&] { (*style)->mirror(extent(), flat_mut(atom->x, atom->nlocal)); });
+}
+
+int64_t PairPsi::find_in_matter()
+{
+  return attempt([&] { return (*style)->find_in_matter(extent(), atoms(atom->nlocal)); });
 }

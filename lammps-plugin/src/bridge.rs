@@ -45,6 +45,7 @@ mod ffi {
         edges: [f64; 6],
         /// Periodic directions along which this rank has all of the box.
         closed: [bool; 3],
+        periodic: [bool; 3],
     }
 
     /// The atoms of a rank, owned ones first, and ghosts if they take part. `v` may be empty if drag and noise do not act.
@@ -94,11 +95,24 @@ mod ffi {
         above: f64,
     }
 
-    /// A wall of matter at a face of the box, as fix dpd/wall describes it.
+    /// The surface of a wall.
+    enum Shape {
+        Face,
+        Cylinder,
+        Sphere,
+    }
+
+    /// A wall of matter, as fix dpd/wall describes it.
     #[derive(Clone, PartialEq)]
     struct WallOfFix {
+        shape: Shape,
+        /// The direction across a face, or along a cylinder.
         axis: usize,
         high: bool,
+        /// Those of a cylinder or a sphere, and whether the fluid is inside.
+        center: [f64; 3],
+        radius: f64,
+        inside: bool,
         /// The species of its matter, by name or, if that is empty, by type; type 0 is that of the only species.
         species: String,
         kind: i32,
@@ -117,11 +131,27 @@ mod ffi {
 
     /// What a wall takes from the atoms of a rank.
     struct OnWall {
-        /// The force across it and away from the fluid, without drag and noise.
+        /// The force across it and away from the fluid, added up over its surface, without drag and noise.
         force: f64,
+        vector: [f64; 3],
         energy: f64,
-        /// The component of the virial across it.
-        virial: f64,
+        virial: [f64; 6],
+    }
+
+    /// A drift of owned atoms that a fix has made.
+    struct Drift<'a> {
+        /// 0 for a whole timestep, 1 and 2 for its halves.
+        part: u8,
+        /// The timestep.
+        dt: f64,
+        /// How much of the kick by the present forces the velocities have got.
+        kicked: f64,
+        /// The walls that reflect: the index of the first one, and their number.
+        first: usize,
+        count: usize,
+        /// Masses as energies over squared velocities, infinite for atoms that stay.
+        mass: &'a [f64],
+        f: &'a [f64],
     }
 
     /// Input of drag and noise of walls in one timestep.
@@ -297,6 +327,24 @@ mod ffi {
             v: &mut [f64],
         ) -> Result<[f64; 6]>;
 
+        /// Whether round walls fit into the box.
+        fn check_room(self: &Style, extent: &Extent) -> Result<()>;
+        /// The first atom in the matter of a round wall; -1 if there is none.
+        fn find_in_matter(self: &Style, extent: &Extent, atoms: &Atoms) -> Result<i64>;
+        /// Reflects atoms at round walls. `beyond` is kept for each atom from the first half of a timestep to the second; to `given` the
+        /// mean force on each wall in the timestep is added, and what presses on its surface.
+        fn bounce(
+            self: &Style,
+            extent: &Extent,
+            drift: &Drift,
+            beyond: &mut [f64],
+            given: &mut [f64],
+            x: &mut [f64],
+            v: &mut [f64],
+        ) -> Result<()>;
+        /// Mirrors places in the matter of round walls at their surfaces.
+        fn mirror(self: &Style, extent: &Extent, x: &mut [f64]) -> Result<()>;
+
         /// Announces that the thermostat will act for a time where the next forces are computed.
         fn expect_thermostat(self: &mut Style, time: f64, virial: bool) -> Result<()>;
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
@@ -329,7 +377,8 @@ mod ffi {
 }
 
 pub use ffi::{
-    Atoms, Effort, Extent, Heat, Listed, Movers, OnWall, Request, Round, Rub, Totals, WallOfFix, Wants,
+    Atoms, Drift, Effort, Extent, Heat, Listed, Movers, OnWall, Request, Round, Rub, Shape, Totals,
+    WallOfFix, Wants,
 };
 
 pub fn read_model(path: &[u8]) -> Result<String, StyleError> {

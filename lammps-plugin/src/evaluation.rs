@@ -17,7 +17,7 @@ impl Scale {
         let [xx, yy, zz, yz, xz, xy] = extent.edges.map(|edge| edge / self.length);
         let edges = Matrix3::new(xx, xy, xz, 0.0, yy, yz, 0.0, 0.0, zz);
         let origin = extent.origin.map(|x| x / self.length);
-        Ok(PeriodicBox::new(origin, edges, extent.closed)?)
+        Ok(PeriodicBox::new(origin, edges, extent.closed)?.divided(extent.periodic))
     }
 }
 
@@ -125,7 +125,7 @@ impl Style {
     pub fn sum_densities(&mut self, extent: &Extent, atoms: &Atoms) -> Result<(), StyleError> {
         guard(|| {
             let Style { engine, scale, converted, .. } = self;
-            // LAMMPS has ghosts on all sides of its atoms, also across periods; walls are at faces of the box.
+            // LAMMPS has ghosts on all sides of its atoms, also across periods.
             let around =
                 Around { domain: &scale.domain(&Extent { closed: [false; 3], ..*extent })?, images: &[] };
             let (request, _) = converted.take(scale, atoms, None);
@@ -174,11 +174,9 @@ impl Style {
     fn totals(&self, tally: &Tally) -> Totals {
         let [below, above] = self.engine.statistics().out_of_bounds.map(|n| n as f64);
         let (unit, mut tally) = (self.scale.energy, *tally);
-        for (wall, taken) in self.engine.plan().walls().iter().zip(self.engine.on_walls()) {
+        for taken in self.engine.on_walls() {
             tally.pair -= taken.energy;
-            // The fix has faces only.
-            let axis = wall.wall.surface.face().map_or(0, |(axis, _)| axis);
-            tally.virial[axis] -= taken.virial;
+            tally.virial.iter_mut().zip(taken.virial).for_each(|(sum, virial)| *sum -= virial);
         }
         let virial = std::array::from_fn(|k| unit * tally.virial[k] + unit * tally.thermostat_virial[k]);
         Totals { excess: unit * tally.excess, pair: unit * tally.pair, virial, below, above }

@@ -3,7 +3,7 @@
 //!
 //! - [`style`]: one pair style's engine, in safe Rust; `evaluation`: its forces, in the units of LAMMPS;
 //! - [`thermostat`]: drag and noise for the fix; `motion`: its loops over atoms;
-//! - `walls`: walls of matter, of the fix `dpd/wall`;
+//! - `walls`: walls of matter, of the fix `dpd/wall`; `reflection`: how round ones reflect;
 //! - [`units`]: one unit of a model in those of LAMMPS; `converted`: conversion of positions,
 //!   velocities and forces;
 //! - [`bridge`]: the interface to C++, by cxx: slices, strings and exceptions, checked at compile time;
@@ -18,6 +18,7 @@ mod converted;
 mod error;
 mod evaluation;
 mod motion;
+mod reflection;
 pub mod style;
 pub mod thermostat;
 pub mod units;

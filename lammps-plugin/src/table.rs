@@ -45,7 +45,7 @@ static STYLES: [Style; 5] = [
         c"time integration with drag and noise apart from the forces",
         psidpd_create_dpd_splitting,
     ),
-    fix(c"dpd/wall", c"walls of matter at faces of the box", psidpd_create_dpd_wall),
+    fix(c"dpd/wall", c"walls of matter", psidpd_create_dpd_wall),
 ];
 
 static TABLE: Styles = Styles {

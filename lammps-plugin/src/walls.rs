@@ -1,6 +1,6 @@
 //! Walls of matter, of fix dpd/wall.
 
-use crate::bridge::{Atoms, Extent, OnWall, Rub, WallOfFix};
+use crate::bridge::{Atoms, Extent, OnWall, Rub, Shape, WallOfFix};
 use crate::converted::triples;
 use crate::error::StyleError;
 use crate::style::{Style, guard};
@@ -8,7 +8,7 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::pair_sums::COMPONENTS;
 use psidpd_core::engine::{Step, WallBath, faces};
 use psidpd_core::model::Model;
-use psidpd_core::model::wall::{Surface, Wall};
+use psidpd_core::model::wall::{Round, Surface, Wall};
 use psidpd_core::theory::{drag_without_slip, local_densities_of_matter};
 
 impl Style {
@@ -34,7 +34,7 @@ impl Style {
         let volume = scale.length.powi(model.dimensions() as i32);
         let given = |value: f64, unit: f64| (value >= 0.0).then_some(value / unit);
         let mut made = Wall {
-            surface: Surface::Face { axis: wall.axis, high: wall.high },
+            surface: self.surface(wall),
             species: self.species_of_matter(wall)?,
             density: wall.density * volume,
             local_densities: Vec::new(),
@@ -72,6 +72,17 @@ impl Style {
         Ok(made)
     }
 
+    fn surface(&self, wall: &WallOfFix) -> Surface {
+        let (axis, dimensions) = (wall.axis, self.model.dimensions());
+        if wall.shape == Shape::Face {
+            return Surface::Face { axis, high: wall.high };
+        }
+        let along = (wall.shape == Shape::Cylinder).then_some(axis);
+        let across = [0, 1, 2].map(|c| c < dimensions && along != Some(c));
+        let center = wall.center.map(|x| x / self.scale.length);
+        Surface::Round(Round { across, center, radius: wall.radius / self.scale.length, inside: wall.inside })
+    }
+
     fn species_of_matter(&self, wall: &WallOfFix) -> Result<usize, StyleError> {
         let all = self.model.species();
         if !wall.species.is_empty() {
@@ -103,8 +114,9 @@ impl Style {
         let all = self.engine.on_walls().iter();
         all.map(|wall| OnWall {
             force: force * wall.force,
+            vector: wall.vector.map(|f| force * f),
             energy: energy * wall.energy,
-            virial: energy * wall.virial,
+            virial: wall.virial.map(|w| energy * w),
         })
         .collect()
     }

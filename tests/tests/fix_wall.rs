@@ -4,7 +4,6 @@
 
 mod style_common;
 
-use psidpd_core::maximum::largest;
 use psidpd_core::model::wall::{Surface, Wall};
 use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab};
 use psidpd_tests::{lammps, last_words};
@@ -33,59 +32,19 @@ fn walls() -> Vec<Wall> {
     vec![low, Wall { local_densities: vec![2.5, 1.5], ..wall(2, true) }]
 }
 
-/// Compares forces, energy, virial, densities and the forces on walls with the reference evaluation, at the start of a run.
-fn compare(script: &str, model: &Model, walls: &[(&str, usize, bool)]) {
-    let names: Vec<&str> = walls.iter().map(|(name, ..)| *name).collect();
-    let mut fixes = names.clone();
-    fixes.dedup_by_key(|name| name.split('[').next().unwrap().to_owned());
-    let modify: String = fixes
-        .iter()
-        .map(|name| format!("fix_modify {} energy yes virial yes\n", name.split('[').next().unwrap()))
-        .collect();
-    let outputs: String = names.iter().map(|name| format!(" f_{name}")).collect();
-    let l = open(&format!(
-        "{script}\n{modify}compute w all pressure NULL virial\n\
-         thermo_style custom step pe c_w[1]{outputs}\nthermo_modify norm no\nfix 1 all nve\ntimestep {DT}\nrun 0\n"
-    ));
-    let truth = truth(&l, model, 1.0, Some(0));
-    let found = frame(&l).f;
-    let apart = difference(&found, &truth.forces);
-    assert!(apart < 1e-10, "forces differ by {apart}\n{script}");
-    let energy = l.thermo("pe").unwrap();
-    assert!((energy / truth.energy - 1.0).abs() < 1e-10, "{energy} {}\n{script}", truth.energy);
-    let (virial, volume) = (l.compute_vector("w").unwrap(), l.eval("vol").unwrap());
-    let scale = largest(truth.virial);
-    for (c, w) in
-        truth.virial.iter().enumerate().filter(|(c, _)| model.dimensions() == 3 || [0, 1, 3].contains(c))
-    {
-        let found = virial[c] * volume;
-        assert!((found - w).abs() < 1e-9 * scale, "virial {c}: {found} {w}\n{script}");
-    }
-    // Forces between atoms add up to zero: what is left is that of the walls.
-    for axis in 0..3 {
-        let sum: f64 = found.iter().map(|f| f[axis]).sum();
-        let on_walls: f64 = walls
-            .iter()
-            .filter(|(_, of, _)| *of == axis)
-            .map(|(name, ..)| l.eval(&format!("f_{name}")).unwrap())
-            .sum();
-        assert!((sum + on_walls).abs() < 1e-8 * scale, "{axis}: {sum} {on_walls}\n{script}");
-    }
-}
-
 #[test]
 fn forces_are_those_of_the_reference() {
     let (_folder, path) = file(WIDE);
     let model = Model::parse("wide", WIDE).unwrap().with_walls(walls());
     let style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {path} A B\n{COMMANDS}");
-    let both = [("lo[1]", 2, false), ("hi[1]", 2, true)];
+    let both = ["lo[1]", "hi[1]"];
     for (before, region) in [
         ("boundary p p f", "block 0 5 0 5 0 5"),
         ("boundary f p f\nnewton off", "block -1 4 0 4 1 6"),
         ("boundary p p f", "prism 0 5 0 5 0 5 1.5 0 0"),
         ("boundary p p f", "block 0 5 0 5 0 0.8"),
     ] {
-        compare(
+        compare_walls(
             &format!(
                 "{}{style}",
                 particles(before, region, 2, if region.ends_with("0.8") { 80 } else { 500 })
@@ -102,15 +61,22 @@ fn forces_are_those_of_the_reference() {
         Vec::from_iter(Vec::into_iter(six).map(|w: Wall| Wall { local_densities: vec![local], ..w }));
     let model = Model::parse("warren", &text).unwrap().with_walls(six);
     let names = ["all[1]", "all[2]", "all[3]", "all[4]", "all[5]", "all[6]"];
-    let faces: Vec<(&str, usize, bool)> = (0..6).map(|k| (names[k], k / 2, k % 2 == 1)).collect();
     let style = format!(
         "pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F\n\
          fix all all dpd/wall xlo xhi ylo yhi zlo zhi density 3 local/density {local}\n",
         warren()
     );
-    compare(&format!("{}{style}", particles("boundary f f f", "block 0 5 0 4 0 3", 1, 360)), &model, &faces);
+    compare_walls(
+        &format!("{}{style}", particles("boundary f f f", "block 0 5 0 4 0 3", 1, 360)),
+        &model,
+        &names,
+    );
     let hybrid = style.replace("dpd/psi 1.0", "hybrid dpd/psi 1.0").replace("* * \"", "* * dpd/psi \"");
-    compare(&format!("{}{hybrid}", particles("boundary f f f", "block 0 5 0 4 0 3", 1, 360)), &model, &faces);
+    compare_walls(
+        &format!("{}{hybrid}", particles("boundary f f f", "block 0 5 0 4 0 3", 1, 360)),
+        &model,
+        &names,
+    );
 }
 
 /// The other styles, whose species are types, and two dimensions.
@@ -124,10 +90,10 @@ fn walls_of_the_other_styles() {
         "pair_style mdpd/psi 1.0 1.0 {SEED}\npair_coeff 1 1 -40 25 4.5 1 0.75\npair_coeff 1 2 -30 25 4.5 1 0.75\n\
          pair_coeff 2 2 -20 25 4.5 1 0.75\nfix w all dpd/wall yhi density 3 type 2 strength 1.3\n"
     );
-    compare(
+    compare_walls(
         &format!("{}{style}", particles("boundary p f p", "block 0 5 0 5 0 5", 2, 500)),
         &model,
-        &[("w[1]", 1, true)],
+        &["w[1]"],
     );
     let (_folder, path) = file(FLAT);
     let flat = Model::parse("flat", FLAT)
@@ -138,7 +104,7 @@ fn walls_of_the_other_styles() {
          fix w all dpd/wall xlo density 3 local/density 2\n"
     );
     let start = particles("dimension 2\nboundary f p p", "block 0 9 0 9 -0.1 0.1", 1, 300);
-    compare(&format!("{start}{style}"), &flat, &[("w[1]", 0, false)]);
+    compare_walls(&format!("{start}{style}"), &flat, &["w[1]"]);
 }
 
 /// Atoms between the walls of [`COMMANDS`], with the same numbers on any ranks.
@@ -367,7 +333,7 @@ fn what_cannot_work_is_refused() {
         (
             fix,
             "fix w all dpd/wall density 3",
-            "expected faces of the box, xlo, xhi, ylo, yhi, zlo or zhi, found 'density'",
+            "expected faces of the box, xlo, xhi, ylo, yhi, zlo or zhi, or a cylinder or a sphere, found 'density'",
         ),
         (fix, "fix w all dpd/wall zlo zlo density 3", "face zlo is named twice"),
         (fix, "fix w all dpd/wall zlo", "the density of the wall's matter is missing"),

@@ -101,18 +101,19 @@ fn data(units: &Units) -> String {
 }
 
 /// Positions and velocities after some steps; energy, pressure, energies of atoms and the mean density, in
-/// units of the model; and the log.
+/// units of the model, with what presses on a wall `w`; and the log.
 fn outcome(units: &Units, style: &str, fix: &str, ranks: usize) -> (Frame, Vec<f64>, String) {
     let [length, energy, time] = units.of_model();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fluid.data"), data(units)).unwrap();
     let name = style.split("pair_style ").nth(1).unwrap().split_whitespace().next().unwrap();
+    let on_wall = if style.contains("fix w ") { " $(f_w[1]:%.17g)" } else { "" };
     let script = format!(
         "units {}\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\nneighbor {:.17e} bin\n\
          read_data fluid.data\n{}{style}fix 1 all {fix}\ntimestep {:.17e}\nfix n all pair 1 {name} density 0\n\
          compute n all reduce ave f_n[1]\ncompute e all pe/atom pair\ncompute s all reduce sum c_e\n\
          thermo_style custom step pe press c_s c_n\nthermo_modify norm no\nrun 20\n\
-         print \"$(pe:%.17g) $(press:%.17g) $(c_s:%.17g) $(c_n:%.17g)\" file totals\n",
+         print \"$(pe:%.17g) $(press:%.17g) $(c_s:%.17g) $(c_n:%.17g){on_wall}\" file totals\n",
         units.name,
         0.3 * length,
         load(),
@@ -126,7 +127,7 @@ fn outcome(units: &Units, style: &str, fix: &str, ranks: usize) -> (Frame, Vec<f
     let totals = std::fs::read_to_string(folder.path().join("totals")).unwrap();
     let totals = totals.split_whitespace().map(|t| t.parse::<f64>().unwrap());
     let pressure = ENERGY / LENGTH.powi(3) / units.pressure;
-    let here = [energy, pressure, energy, length.powi(-3)];
+    let here = [energy, pressure, energy, length.powi(-3), energy / length];
     let log = std::fs::read_to_string(folder.path().join("log.lammps")).unwrap();
     (frame, totals.zip(here).map(|(t, unit)| t / unit).collect(), log)
 }
@@ -214,6 +215,33 @@ fn walls_are_the_same_in_all_units() {
             0.7 * velocity,
             30.0 * drag,
             0.8 * length
+        )
+    };
+    for fix in FIXES {
+        let expected = outcome(&ALL[0], &style(&ALL[0]), fix, 1);
+        for units in &ALL[1..] {
+            agree(&outcome(units, &style(units), fix, 2), &expected, &format!("{}, {fix}", units.name));
+        }
+    }
+}
+
+/// And so are round walls, which reflect atoms.
+#[test]
+fn round_walls_are_the_same_in_all_units() {
+    let (_folder, model) =
+        file(&format!("{WIDE}[units]\nlength = {LENGTH:e}\nmass = {MASS:e}\nenergy = {ENERGY:e}\n"));
+    let style = |units: &Units| {
+        let [length, energy, time] = units.of_model();
+        let (kt, drag) = (energy / units.boltzmann, energy * time / length.powi(2));
+        let place = format!("cylinder y {:.17e} {:.17e} {:.17e}", 2.4 * length, 2.5 * length, 1.9 * length);
+        format!(
+            "region m {place} EDGE EDGE side out\ndelete_atoms region m compress no\n\
+             pair_style dpd/psi {kt:.17e} {SEED}\npair_coeff * * \"{model}\" A B\n\
+             fix w all dpd/wall {place} inside density {:.17e} type 2 velocity 0 {:.17e} 0 drag {:.17e}\n\
+             fix_modify w energy yes virial yes\n",
+            4.0 / length.powi(3),
+            0.7 * length / time,
+            30.0 * drag,
         )
     };
     for fix in FIXES {

@@ -32,6 +32,9 @@ const CORE: &[&[&str]] = &[
     &["engine::excess_pass"],
     // What matter behind faces of the box adds.
     &["engine::walls"],
+    // Particles at cylinders and spheres of matter.
+    &["engine::wall_room", "engine::round_flight"],
+    &["engine::reflection"],
     // Pair potentials of rare species with long ranges.
     &["engine::long_pairs"],
     // The fast engine: one traversal of all cells, without a neighbour list.

@@ -33,7 +33,8 @@ fn request(thermostat: bool) -> Request {
 
 /// A cube, periodic or open.
 fn cube(edge: f64, closed: bool) -> Extent {
-    Extent { origin: [0.0; 3], edges: [edge, edge, edge, 0.0, 0.0, 0.0], closed: [closed; 3] }
+    let edges = [edge, edge, edge, 0.0, 0.0, 0.0];
+    Extent { origin: [0.0; 3], edges, closed: [closed; 3], periodic: [true; 3] }
 }
 
 #[test]

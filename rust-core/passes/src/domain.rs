@@ -7,6 +7,8 @@ pub struct PeriodicBox {
     edges: Matrix3<f64>,
     inverse: Matrix3<f64>,
     periodic: [bool; 3],
+    /// Directions that are periodic, of which this is a part.
+    divided: [bool; 3],
 }
 
 /// The error of an invalid box.
@@ -24,6 +26,7 @@ impl PeriodicBox {
         edges: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
         inverse: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
         periodic: [false; 3],
+        divided: [false; 3],
     };
 
     /// Builds a box at `origin` with the columns of `edges` as edge vectors.
@@ -40,7 +43,7 @@ impl PeriodicBox {
         let inverse = edges.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()));
         match inverse {
             Some(inverse) if finite && edges.determinant() > 0.0 && edges.determinant().is_finite() => {
-                Ok(PeriodicBox { origin, edges, inverse, periodic })
+                Ok(PeriodicBox { origin, edges, inverse, periodic, divided: [false; 3] })
             }
             _ => Err(DomainError::Degenerate),
         }
@@ -81,6 +84,16 @@ impl PeriodicBox {
 
     pub fn periodic(&self) -> [bool; 3] {
         self.periodic
+    }
+
+    /// The box, with more directions that repeat than are periodic here: ranks divide these, and have ghosts for images.
+    pub fn divided(self, divided: [bool; 3]) -> PeriodicBox {
+        PeriodicBox { divided, ..self }
+    }
+
+    /// The directions along which the system repeats: periodic ones, and those that ranks divide.
+    pub fn repeats(&self) -> [bool; 3] {
+        [0, 1, 2].map(|k| self.periodic[k] || self.divided[k])
     }
 
     /// The volume; in two dimensions the area, with the third edge taken as a unit.

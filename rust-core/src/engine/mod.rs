@@ -10,6 +10,9 @@
 //! noise          the random number of a pair
 //! walls          what matter behind faces of the box adds to densities, energies and forces
 //! wall_drag      drag and noise of a particle against that matter
+//! wall_room      whether cylinders and spheres of matter fit into a box
+//! round_flight   the exact motion beside a cylinder or a sphere under a constant acceleration
+//! reflection     what becomes of a particle that meets one in a drift
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
@@ -39,7 +42,9 @@ mod particles;
 mod path;
 mod plan;
 mod reach;
+pub mod reflection;
 mod request;
+mod round_flight;
 mod step;
 mod surroundings;
 mod sweep;
@@ -47,6 +52,7 @@ mod sweep_path;
 pub mod thermostat;
 pub mod vectors;
 mod wall_drag;
+mod wall_room;
 mod walls;
 
 pub use counts::PassCounts;
@@ -72,6 +78,7 @@ pub use step::Step;
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, ThreadCount, Times, part};
 pub use wall_drag::WallBath;
+pub use wall_room::{Cramped, check_apart, check_room};
 pub use walls::{Face, OnWall, Place, faces};
 
 #[cfg(test)]

@@ -15,12 +15,12 @@ use psidpd_threads::Pool;
 pub struct OnWall {
     /// The force on it, away from the fluid, added up over its surface.
     pub force: f64,
-    /// The force on a round wall as a vector; that on a face is across it.
+    /// The force on it as a vector.
     pub vector: [f64; 3],
     /// The energy of the particles near it, besides that of their ψ.
     pub energy: f64,
-    /// The component of its virial across the face, along the line from the particle to the face.
-    pub virial: f64,
+    /// The virial of its forces, along the lines from the particles to the surface.
+    pub virial: [f64; 6],
 }
 
 /// The surface of a wall in a box.
@@ -48,6 +48,7 @@ impl Place {
     /// The surface in a box; `None` if the box has no such face.
     pub fn of(surface: &Surface, domain: &PeriodicBox, dimensions: usize) -> Option<Place> {
         let (origin, lengths, periodic) = (domain.origin(), domain.lengths(), domain.periodic());
+        let repeats = domain.repeats();
         match *surface {
             Surface::Face { axis, .. } if axis >= dimensions || periodic[axis] => None,
             Surface::Face { axis, high: true } => {
@@ -55,7 +56,7 @@ impl Place {
             }
             Surface::Face { axis, .. } => Some(Place::Face { axis, at: origin[axis], inwards: 1.0 }),
             Surface::Round(round) => {
-                let period = |c: usize| if periodic[c] { lengths[c] } else { f64::INFINITY };
+                let period = |c: usize| if repeats[c] { lengths[c] } else { f64::INFINITY };
                 Some(Place::Round { round, periods: [0, 1, 2].map(period) })
             }
         }
@@ -80,6 +81,21 @@ impl Place {
         }
     }
 
+    /// Whether a place is in the matter of a round wall, further behind its surface than rounding leads.
+    pub fn is_in_matter(&self, x: &[f64; 3]) -> bool {
+        let radius = self.arm(x).map(|(round, _)| round.radius);
+        radius.is_some_and(|radius| self.distance(x) < -ON_SURFACE * radius)
+    }
+
+    /// Mirrors a place in the matter of a round wall at its surface.
+    pub fn mirror(&self, x: &mut [f64; 3]) {
+        let z = self.distance(x);
+        if z < 0.0 && matches!(self, Place::Round { .. }) {
+            let n = self.normal(x);
+            (0..3).for_each(|c| x[c] -= 2.0 * z * n[c]);
+        }
+    }
+
     /// The direction into the fluid at the point of the surface that is nearest to a place.
     pub fn normal(&self, x: &[f64; 3]) -> [f64; 3] {
         match self {
@@ -95,15 +111,18 @@ impl Place {
     }
 }
 
+/// How far behind a round surface a place still counts as on it, in radii: rounding leaves it there.
+const ON_SURFACE: f64 = 1e-9;
+
 /// The vector to `x` from the nearest image of the centre, across the surface.
+#[inline(always)]
 fn from_center(round: &Round, periods: &[f64; 3], x: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| {
-        let d = x[c] - round.center[c];
-        let images = (d / periods[c]).round();
-        match (round.across[c], images == 0.0) {
-            (false, _) => 0.0,
-            (true, true) => d,
-            (true, false) => d - images * periods[c],
+        let (d, period) = (x[c] - round.center[c], periods[c]);
+        match round.across[c] {
+            false => 0.0,
+            true if d.abs() < 0.5 * period => d,
+            true => d - (d / period).round() * period,
         }
     })
 }
@@ -228,13 +247,15 @@ pub fn add_forces(
         for (k, x) in x.iter().enumerate() {
             for_each_near(faces, x, species(k), |face, field, z| {
                 let [force, energy] = of(k, face, field, z);
-                tally.pair += energy;
                 let on_wall = &mut on_walls[face.index];
                 match face.place {
-                    Place::Face { axis, .. } => tally.virial[axis] += z * force,
+                    Place::Face { axis, inwards, .. } => {
+                        on_wall.virial[axis] += z * force;
+                        on_wall.vector[axis] -= inwards * force;
+                    }
                     round => {
                         let n = round.normal(x);
-                        for (virial, (a, b)) in tally.virial.iter_mut().zip(COMPONENTS) {
+                        for (virial, (a, b)) in on_wall.virial.iter_mut().zip(COMPONENTS) {
                             *virial += z * force * n[a] * n[b];
                         }
                         (0..3).for_each(|c| on_wall.vector[c] -= n[c] * force);
@@ -242,8 +263,11 @@ pub fn add_forces(
                 }
                 on_wall.force += force;
                 on_wall.energy += energy;
-                on_wall.virial += z * force;
             });
+        }
+        for on_wall in &*on_walls {
+            tally.pair += on_wall.energy;
+            tally.virial.iter_mut().zip(on_wall.virial).for_each(|(sum, of_one)| *sum += of_one);
         }
     }
     tally

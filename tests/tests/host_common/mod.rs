@@ -159,18 +159,25 @@ pub fn splittings_are_the_native_ones(runs: &Runs) {
     }
 }
 
-/// Walls of matter, one of them moving, with drag and noise: no atom reaches a face, where native runs bounce on the exact path.
+/// Walls of matter that move, with drag and noise: planes, whose faces no atom reaches, as native runs bounce there on the exact path,
+/// and a cylinder.
 pub fn walls_are_the_native_ones(runs: &Runs) {
-    for integrator in ["velocity-verlet", "two-stage"] {
+    let planes = "boundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+        [[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.5]\nhigh = [5.0, 4.0, 4.5]\ndensity = 6.0\n\
+        [[wall]]\nfaces = [\"zlo\", \"zhi\"]\nvelocity = [0.5, 0.0, 0.0]\n";
+    let cylinder = "[[part]]\nshape = \"rest\"\ndensity = 6.0\n\
+        [[wall]]\nshape = \"cylinder\"\naxis = \"y\"\nradius = 2.0\nfluid = \"inside\"\nvelocity = [0.0, 0.5, 0.0]\n";
+    let cases = [(planes, "dpd/wall zhi density 5.0"), (cylinder, "dpd/wall cylinder y 2.5 2.5 2.0 inside")];
+    for (integrator, (wall, part)) in
+        ["velocity-verlet", "two-stage"].into_iter().flat_map(|i| cases.map(|case| (i, case)))
+    {
         let scene = format!(
             "title = \"walls\"\nmodel = \"{}\"\nkT = 1.0\nseed = 4\nprecision = \"double\"\n\
-             [box]\nlengths = [5.0, 4.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
-             [[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.5]\nhigh = [5.0, 4.0, 4.5]\ndensity = 6.0\n\
-             [[wall]]\nkind = \"continuum\"\nfaces = [\"zlo\", \"zhi\"]\ndensity = 5.0\nviscosity = 7.8\nvelocity = [0.5, 0.0, 0.0]\n\
+             [box]\nlengths = [5.0, 4.0, 5.0]\n{wall}kind = \"continuum\"\ndensity = 5.0\nviscosity = 7.8\n\
              [[stage]]\nname = \"all\"\nsteps = 15\ndt = 0.005\nintegrator = \"{integrator}\"\n[output]\nthermo = 5\n",
             model().display()
         );
-        compare_with_native(runs, &scene, "dpd/wall zhi density 5.0");
+        compare_with_native(runs, &scene, part);
     }
 }
 

@@ -179,6 +179,43 @@ pub fn truth(l: &Lammps, model: &Model, kt: f64, step: Option<u64>) -> Truth {
     all
 }
 
+/// Compares forces, energy, virial and the forces on walls of fix dpd/wall, which have names like `w[1]`, with the reference evaluation, at the
+/// start of a run.
+pub fn compare_walls(script: &str, model: &Model, walls: &[&str]) {
+    let mut fixes = walls.to_vec();
+    fixes.dedup_by_key(|name| name.split('[').next().unwrap().to_owned());
+    let modify: String = fixes
+        .iter()
+        .map(|name| format!("fix_modify {} energy yes virial yes\n", name.split('[').next().unwrap()))
+        .collect();
+    let outputs: String = walls.iter().map(|name| format!(" f_{name}")).collect();
+    let l = open(&format!(
+        "{script}\n{modify}compute w all pressure NULL virial\n\
+         thermo_style custom step pe c_w[1]{outputs}\nthermo_modify norm no\nfix 1 all nve\ntimestep {DT}\nrun 0\n"
+    ));
+    let truth = truth(&l, model, 1.0, Some(0));
+    let found = frame(&l).f;
+    let apart = difference(&found, &truth.forces);
+    assert!(apart < 1e-10, "forces differ by {apart}\n{script}");
+    let energy = l.thermo("pe").unwrap();
+    assert!((energy / truth.energy - 1.0).abs() < 1e-10, "{energy} {}\n{script}", truth.energy);
+    let (virial, volume) = (l.compute_vector("w").unwrap(), l.eval("vol").unwrap());
+    let scale = largest(truth.virial);
+    for (c, w) in
+        truth.virial.iter().enumerate().filter(|(c, _)| model.dimensions() == 3 || [0, 1, 3].contains(c))
+    {
+        let found = virial[c] * volume;
+        assert!((found - w).abs() < 1e-9 * scale, "virial {c}: {found} {w}\n{script}");
+    }
+    // Forces between atoms add up to zero: what is left is that of the walls.
+    for axis in 0..3 {
+        let sum: f64 = found.iter().map(|f| f[axis]).sum();
+        let on_walls: f64 =
+            walls.iter().map(|name| l.eval(&format!("f_{name}[{}]", axis + 1)).unwrap()).sum();
+        assert!((sum + on_walls).abs() < 1e-8 * scale, "{axis}: {sum} {on_walls}\n{script}");
+    }
+}
+
 /// A data file of chains of five particles with harmonic bonds, types 1 and 2 along each chain, in a box of length 5.
 pub fn chains(count: usize) -> String {
     let (mut atoms, mut bonds) = (String::new(), String::new());

@@ -124,10 +124,6 @@ pub enum LammpsError {
         "pair styles other than those of psidpd have no walls of matter, [[wall]]: freeze layers of particles instead"
     )]
     Walls,
-    #[error(
-        "fix dpd/wall has plane walls only: cylinders and spheres of matter, [[wall]] with a shape, are those of psidpd run"
-    )]
-    RoundWalls,
     #[error("reversed_along has no counterpart in a deck for a box with tilt")]
     Tilt,
     #[error("{found} body forces need more groups than LAMMPS has: at most {most} can be written")]

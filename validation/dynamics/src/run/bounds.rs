@@ -21,9 +21,6 @@ pub(super) struct Bounds {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Surfaces(Vec<(usize, Place)>);
 
-/// How far behind a round surface a place still counts as on it, in radii: rounding leaves it there.
-const ON_SURFACE: f64 = 1e-9;
-
 /// Number of floating-point numbers below the upper face that are tried.
 const TRIES: usize = 64;
 
@@ -90,21 +87,14 @@ impl Surfaces {
         self.0.iter().map(|(wall, place)| (*wall, place))
     }
 
-    /// Whether a place is in the matter of a round wall, further behind its surface than rounding leads.
+    /// Whether a place is in the matter of a round wall.
     pub fn is_in_matter(&self, x: &[f64; 3]) -> bool {
-        let radius = |place: &Place| place.arm(x).map_or(0.0, |(round, _)| round.radius);
-        self.0.iter().any(|(_, place)| place.distance(x) < -ON_SURFACE * radius(place))
+        self.0.iter().any(|(_, place)| place.is_in_matter(x))
     }
 
     /// Mirrors a place in the matter of a round wall at its surface.
     pub fn mirror(&self, x: &mut [f64; 3]) {
-        for (_, place) in &self.0 {
-            let z = place.distance(x);
-            if z < 0.0 {
-                let n = place.normal(x);
-                (0..3).for_each(|c| x[c] -= 2.0 * z * n[c]);
-            }
-        }
+        self.0.iter().for_each(|(_, place)| place.mirror(x));
     }
 }
 

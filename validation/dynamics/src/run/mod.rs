@@ -19,7 +19,6 @@ mod memory;
 mod outcome;
 mod output;
 mod reorder;
-mod round;
 mod runner;
 mod scene;
 mod simulation;

@@ -4,7 +4,8 @@ use super::number::vector;
 use super::round::{read_round, rounds};
 use super::shape::Shapes;
 use super::{FileError, Initial, Model, PeriodicBox, Section, Value};
-use psidpd_core::model::wall::{Round, Surface, Wall, WallField};
+use psidpd_core::engine::{Cramped, check_apart, check_room};
+use psidpd_core::model::wall::{Surface, Wall};
 use psidpd_core::theory::{self, local_densities_of_matter};
 use psidpd_observe::options::FACES;
 
@@ -35,10 +36,12 @@ pub fn read(
             let tried = model.clone().with_walls(vec![wall.clone()]);
             let tried = tried.at(kt).map_err(|error| item.error(error.kind.to_string()))?;
             if let Some(round) = wall.surface.round() {
-                check_room(&section, round, domain, dimensions, range(&tried.walls).max(tried.cutoff()))?;
+                let room = check_room(round, &tried.walls[0], domain, dimensions, tried.cutoff());
+                room.map_err(|cramped| not_placed(&section, cramped))?;
             }
             for other in &walls {
-                check_apart(&item, [&wall, other], domain, dimensions, tried.cutoff())?;
+                let apart = check_apart([&wall, other], domain, dimensions, tried.cutoff());
+                apart.map_err(|cramped| item.error(cramped.message))?;
             }
             walls.push(wall);
         }
@@ -46,88 +49,12 @@ pub fn read(
     Ok(model.with_walls(walls))
 }
 
-/// The longest range of the fields of walls.
-fn range(walls: &[WallField]) -> f64 {
-    let fields = walls.iter().flat_map(|wall| &wall.fields);
-    fields
-        .map(|field| field.friction.as_ref().map_or(0.0, |f| f.range()).max(field.range))
-        .fold(0.0, f64::max)
-}
-
-/// Refuses a round surface that does not fit into the box: it lies in the box, and images of it and of the fluid see nothing of each
-/// other.
-fn check_room(
-    section: &Section,
-    round: &Round,
-    domain: &PeriodicBox,
-    dimensions: usize,
-    range: f64,
-) -> Result<(), FileError> {
-    let radius = section.require("radius")?;
-    let tilted = (0..3).any(|k| (0..3).any(|c| c != k && domain.edge(k)[c] != 0.0));
-    if tilted {
-        return Err(section.require("shape")?.error("a round wall needs a box without tilt"));
+fn not_placed(section: &Section, cramped: Cramped) -> FileError {
+    let Cramped { message, help } = cramped;
+    match section.require("radius").map(|radius| radius.error(message)) {
+        Ok(error) => help.into_iter().fold(error, |error, help| error.with_help(help)),
+        Err(error) => error,
     }
-    for c in (0..dimensions).filter(|c| round.across[*c]) {
-        let (low, length) = (domain.origin()[c], domain.lengths()[c]);
-        let (periodic, name) = (domain.periodic()[c], ["x", "y", "z"][c]);
-        // What is left of the box beside the surface, and how much is needed.
-        let margin = if round.inside || periodic { 0.0 } else { range };
-        let rest = if !periodic {
-            0.0
-        } else if round.inside {
-            range
-        } else {
-            2.0 * range
-        };
-        let reach = round.radius + margin - 1e-9 * length;
-        if round.center[c] - reach < low || round.center[c] + reach > low + length {
-            let needs = if margin > 0.0 {
-                format!(", and {margin} from the reflecting faces")
-            } else {
-                String::new()
-            };
-            return Err(radius.error(format!("the surface does not lie in the box along {name}{needs}")));
-        }
-        if length < 2.0 * round.radius + rest {
-            let help = format!("a length of {:?} along {name}, or more", 2.0 * round.radius + rest);
-            let message = "the box is so small that fluid beside the surface sees its own images, or those of the surface";
-            return Err(radius.error(message).with_help(help));
-        }
-    }
-    Ok(())
-}
-
-/// Refuses two walls that may have one particle between them in a step: round ones keep a range from others.
-fn check_apart(
-    item: &Value,
-    walls: [&Wall; 2],
-    domain: &PeriodicBox,
-    dimensions: usize,
-    range: f64,
-) -> Result<(), FileError> {
-    let rounds: Vec<&Round> = walls.iter().filter_map(|wall| wall.surface.round()).collect();
-    let face = walls.iter().find_map(|wall| wall.surface.face());
-    let error = match (&rounds[..], face) {
-        ([round], Some((axis, _))) if round.inside && round.across[axis] => {
-            Some("a wall with the fluid inside has no other across it".to_owned())
-        }
-        ([a, b], _) if a.inside || b.inside => {
-            Some("a wall with the fluid inside has no other round one beside it".to_owned())
-        }
-        ([a, b], _) => {
-            let along = |c: usize| {
-                let (d, period) = (a.center[c] - b.center[c], domain.lengths()[c]);
-                let nearest = if domain.periodic()[c] { d - period * (d / period).round() } else { d };
-                if a.across[c] && b.across[c] { nearest } else { 0.0 }
-            };
-            let apart = (0..dimensions).map(along).map(|d| d * d).sum::<f64>().sqrt() - a.radius - b.radius;
-            (apart < range)
-                .then(|| format!("two round walls are {apart:.4} apart, less than the range {range}"))
-        }
-        _ => None,
-    };
-    error.map_or(Ok(()), |message| Err(item.error(message)))
 }
 
 /// The number density of the largest part that moves, or of all particles of a file.

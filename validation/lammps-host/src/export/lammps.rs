@@ -259,9 +259,6 @@ pub fn script_of(scene: &Scene, script: Script) -> Result<String, LammpsError> {
     if script.style.is_some() && !scene.model.walls().is_empty() {
         return Err(LammpsError::Walls);
     }
-    if scene.model.walls().iter().any(|wall| wall.surface.round().is_some()) {
-        return Err(LammpsError::RoundWalls);
-    }
     let mut s = String::new();
     // Writing to a String cannot fail.
     let _ = write_script(scene, script, &mut s);

@@ -1,49 +1,12 @@
 //! Particles that meet reflecting faces, or the round surfaces of walls, in a drift.
 //!
-//! A drift moves particles with the velocity of the step, which has a share of the kick by the present forces in it and lacks the
-//! rest. To mirror what is beyond a face and to reverse its velocity would be a leapfrog over the kink of the potential, which
-//! heats: each bounce would change the energy by up to `F |v| Δt`. So a particle that meets a face moves on the exact path under the
-//! force held, `x + ut + ½Ft²/m`, with its bounces. Velocity and position of the path differ from those of the step by what
-//! the step has given already, or has still to give, of the held force's kick; where no face is met both end at the same place.
+//! They move on the exact path under the force held: see [`psidpd_core::engine::reflection`].
 
 use crate::run::bounce::{Arc, fly};
 use crate::run::bounds::Bounds;
-use crate::run::round::{self, fly_beside};
 use psidpd_core::engine::Place;
-
-/// The drift of a step, in which the present forces are held.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Path {
-    pub time: f64,
-    /// The velocity of the step at the start less that of the path, in units of force over mass.
-    pub kicked: f64,
-    /// The position of the step at the start less that of the path, in units of force over mass.
-    shift: f64,
-    /// The velocity that moves the particles less that of the step, in the same units.
-    pub ahead: f64,
-}
-
-impl Path {
-    /// A drift of a whole step, whose velocity has `kicked` of the kick; the particles move with half of it.
-    pub fn whole(dt: f64, kicked: f64) -> Path {
-        Path { time: dt, kicked, shift: 0.0, ahead: 0.5 * dt - kicked }
-    }
-
-    /// The first drift of half a step.
-    pub fn first_half(dt: f64, kicked: f64) -> Path {
-        Path { time: 0.5 * dt, kicked, ..Path::default() }
-    }
-
-    /// The drift of half a step behind it.
-    pub fn second_half(dt: f64, kicked: f64) -> Path {
-        let first = Path::first_half(dt, kicked);
-        Path { shift: -first.shift_at_end(), ..first }
-    }
-
-    fn shift_at_end(&self) -> f64 {
-        self.shift + (self.kicked + self.ahead - 0.5 * self.time) * self.time
-    }
-}
+pub use psidpd_core::engine::reflection::Path;
+use psidpd_core::engine::reflection::{self, Way};
 
 /// The faces around particles, and how these move.
 #[derive(Debug, Clone, Copy)]
@@ -214,55 +177,38 @@ impl Faces<'_> {
     ) where
         R: Fn(f64, f64, f64, f64) -> (f64, f64),
     {
-        let Path { time, kicked, shift, ahead } = self.path;
+        let Place::Round { round, .. } = place else { return };
+        let ahead = self.path.ahead;
         for (k, (x, (v, (f, s)))) in
             before.x.iter().zip(before.v.iter().zip(before.f.iter().zip(before.species))).enumerate()
         {
-            let Some((surface, arm)) = place.arm(x) else { continue };
-            let distance = place.distance(x);
-            let across =
-                |of: &dyn Fn(usize) -> f64| [0, 1, 2].map(|c| if surface.across[c] { of(c) } else { 0.0 });
             let moved = [0, 1, 2].map(|c| rule(x[c], v[c], f[c], over_mass[*s as usize]));
-            let a = across(&|c| f[c] / self.mass[*s as usize]);
-            let waits = distance <= round::NEAR * surface.radius;
-            let beyond = across(&|c| if waits { self.beyond(before.first + k, c) } else { 0.0 });
-            let u = across(&|c| moved[c].1 - kicked * a[c]);
-            // All from the place of the step at the start.
-            let from = across(&|c| beyond[c] - shift * a[c]);
-            let to = across(&|c| moved[c].0 - x[c]);
-            let middle = across(&|c| from[c] + 0.5 * time * u[c]);
-            let end = across(&|c| from[c] + time * (u[c] + 0.5 * time * a[c]));
-            let reach = [from, to, middle, end].map(round::square).into_iter().fold(0.0, f64::max).sqrt();
-            if distance > reach && beyond == [0.0; 3] {
-                continue;
-            }
+            let [to, v] = [moved.map(|moved| moved.0), moved.map(|moved| moved.1)];
+            let a = f.map(|f| f / self.mass[*s as usize]);
             let mut arcs: [Vec<Arc>; 3] = Default::default();
-            let show = |arc: round::Arc| {
-                for c in (0..3).filter(|c| self.records && surface.across[*c]) {
-                    let given = arc.given[c] + moved[c].1 + ahead * a[c];
+            let show = |arc: reflection::Arc| {
+                let Some((_, arm)) = place.arm(x).filter(|_| self.records) else { return };
+                for c in (0..3).filter(|c| round.across[*c]) {
+                    let given = arc.given[c] + v[c] + ahead * a[c];
                     let x = x[c] + (arc.arm[c] - arm[c]);
                     arcs[c].push(Arc { time: arc.time, x, u: arc.u[c], a: arc.a[c], given });
                 }
             };
-            let start = across(&|c| arm[c] + from[c]);
-            let flown = fly_beside(surface, start, u, a, time, show);
-            let is_inside =
-                surface.side() * (surface.radius.powi(2) - round::square(across(&|c| arm[c] + to[c]))) >= 0.0;
-            if is_inside && beyond == [0.0; 3] && flown.is_some_and(|end| end.push == 0.0) {
-                continue;
-            }
-            let placed = across(&|c| flown.map_or(0.0, |end| end.arm[c]) + self.path.shift_at_end() * a[c]);
-            let inside = round::clamp(surface, placed);
-            let mut push = flown.map_or(0.0, |end| end.push);
-            for c in (0..3).filter(|c| surface.across[*c]) {
-                let end = flown.map(|end| [x[c] + (inside[c] - arm[c]), moved[c].1 + end.given[c], end.u[c]]);
+            let beyond = || [0, 1, 2].map(|c| self.beyond(before.first + k, c));
+            let met = match self.path.meet(place, x, [to, v], a, beyond, show) {
+                Way::Free => continue,
+                Way::Lost => None,
+                Way::Met(met) => Some(met),
+            };
+            let mut push = met.map_or(0.0, |met| met.push);
+            for c in (0..3).filter(|c| round.across[*c]) {
                 bounces.push(Bounce {
                     particle: k,
                     direction: c,
                     wall: Some(wall),
-                    end,
-                    given: flown.map_or(0.0, |end| end.given[c]),
-                    beyond: placed[c] - inside[c],
+                    end: met.map(|met| [met.x[c], met.v[c], met.u[c]]),
+                    given: met.map_or(0.0, |met| met.given[c]),
+                    beyond: met.map_or(0.0, |met| met.beyond[c]),
                     start: x[c],
                     arcs: std::mem::take(&mut arcs[c]),
                     image: before.image[k][c],

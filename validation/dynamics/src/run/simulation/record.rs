@@ -129,18 +129,11 @@ impl Simulation {
 
     /// The conservative forces on the walls in the last evaluation.
     fn forces_of_fluid_on_walls(&self) -> Vec<OnWall> {
-        let engine = self.engine();
-        let walls = engine.plan().walls().iter().zip(engine.on_walls());
-        walls
-            .map(|(wall, taken)| {
-                let [x, y, z] = taken.vector;
-                let mut on_wall = [x, y, z, taken.force];
-                if let Some((axis, high)) = wall.wall.surface.face() {
-                    on_wall[axis] = if high { taken.force } else { -taken.force };
-                }
-                on_wall
-            })
-            .collect()
+        let one = |taken: &psidpd_core::engine::OnWall| {
+            let [x, y, z] = taken.vector;
+            [x, y, z, taken.force]
+        };
+        self.engine().on_walls().iter().map(one).collect()
     }
 
     /// Records the friction of walls, and what they are `given` by it.

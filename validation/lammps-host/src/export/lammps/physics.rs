@@ -1,5 +1,6 @@
 //! Walls, frozen particles and body forces of a deck.
 
+use psidpd_core::model::wall::{Round, Surface};
 use psidpd_dynamics::run::{BodyForce, Tags};
 use psidpd_dynamics::scene::{Scene, Stage};
 use std::fmt::{Result, Write};
@@ -60,11 +61,13 @@ impl<'a> Physics<'a> {
 
     /// Writes the temperature of the mobile particles, with their degrees of freedom.
     pub fn write_temperature(&self, s: &mut impl Write) -> Result {
-        if self.mobile == "all" && self.walls == [false; 3] {
+        let rounds = || self.scene.model.walls().iter().filter_map(|wall| wall.surface.round());
+        if self.mobile == "all" && self.walls == [false; 3] && rounds().next().is_none() {
             return Ok(());
         }
+        let is_free = |k: &usize| !self.walls[*k] && !rounds().any(|round| round.across[*k]);
         let conserved = match self.mobile {
-            "all" if !self.rubs() => (0..self.dimensions).filter(|k| !self.walls[*k]).count(),
+            "all" if !self.rubs() => (0..self.dimensions).filter(is_free).count(),
             _ => 0,
         };
         writeln!(s, "# momentum is conserved along {conserved} directions only")?;
@@ -89,10 +92,13 @@ impl<'a> Physics<'a> {
             if again {
                 writeln!(s, "unfix         {name}")?;
             }
-            let face = wall.surface.name(self.dimensions);
+            let surface = match &wall.surface {
+                Surface::Round(round) => self.round(round),
+                face => face.name(self.dimensions),
+            };
             write!(
                 s,
-                "fix           {name} {} dpd/wall {face} density {:?} species {} strength {:?}",
+                "fix           {name} {} dpd/wall {surface} density {:?} species {} strength {:?}",
                 self.mobile, wall.density, names[wall.species], wall.strength
             )?;
             let local = match (&wall.local_densities[..], model.at(stage.kt)) {
@@ -118,6 +124,18 @@ impl<'a> Physics<'a> {
             writeln!(s, "\nfix_modify    {name} energy yes virial yes")?;
         }
         Ok(())
+    }
+
+    /// A cylinder or a sphere in the words of the fix.
+    fn round(&self, round: &Round) -> String {
+        let [x, y, z] = round.center;
+        let place = match round.axis(self.dimensions) {
+            Some(0) => format!("cylinder x {y:?} {z:?}"),
+            Some(1) => format!("cylinder y {x:?} {z:?}"),
+            Some(_) => format!("cylinder z {x:?} {y:?}"),
+            None => format!("sphere {x:?} {y:?} {z:?}"),
+        };
+        format!("{place} {:?} {}", round.radius, if round.inside { "inside" } else { "outside" })
     }
 
     pub fn write_body_forces(&self, s: &mut impl Write) -> Result {

@@ -2,7 +2,7 @@
 //!
 //! All vectors are those across the surface, and places are vectors from its axis or centre.
 
-use psidpd_core::model::wall::Round;
+use crate::model::wall::Round;
 
 /// Bounces that are met one by one. What hops more often in a step is pressed to the surface, and slides.
 const MOST: usize = 128;
@@ -18,9 +18,11 @@ pub const NEAR: f64 = 1e-9;
 pub struct Arc {
     /// When it begins.
     pub time: f64,
-    /// Where it begins, with what velocity and acceleration; a slide is a chord.
+    /// Where it begins; a slide is a chord.
     pub arm: [f64; 3],
+    /// With what velocity it begins.
     pub u: [f64; 3],
+    /// Its acceleration.
     pub a: [f64; 3],
     /// The velocity that the surface has given until then; in a slide the mean.
     pub given: [f64; 3],
