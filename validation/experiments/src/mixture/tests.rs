@@ -72,13 +72,18 @@ fn each_liquid_keeps_its_own_and_cross_is_between_them() {
     }
     let fluid = both.at(0.7).unwrap();
     assert_eq!(fluid.densities.len(), 1, "both count their particles by one kernel");
-    let at = |a: usize, b: usize, r: f64| -> f64 {
-        use psidpd_core::model::pair::PairForm as _;
-        fluid.pairs.iter().filter(|t| t.acts(a, b, 0.0)).map(|t| t.potential.at(r).0).sum()
-    };
-    for r in [0.1, 0.5, 0.9] {
-        let expected = 0.6 * 0.5 * (at(0, 0, r) + at(1, 1, r));
-        assert!((at(0, 1, r) - expected).abs() < 1e-12, "{r}: {} {expected}", at(0, 1, r));
+    // Of one range the formulas of both strengths are added up, of two each has its own potential.
+    let apart = SOFTER.replace("strength = \"A\"\nrange = 1.0", "strength = \"A - 10\"\nrange = 0.8");
+    assert_ne!(apart, SOFTER);
+    for fluid in [&fluid, &merged([SET6, &apart], 0.6).at(0.7).unwrap()] {
+        let at = |a: usize, b: usize, r: f64| -> f64 {
+            use psidpd_core::model::pair::PairForm as _;
+            fluid.pairs.iter().filter(|t| t.acts(a, b, 0.0)).map(|t| t.potential.at(r).0).sum()
+        };
+        for r in [0.1, 0.5, 0.9] {
+            let expected = 0.6 * 0.5 * (at(0, 0, r) + at(1, 1, r));
+            assert!((at(0, 1, r) - expected).abs() < 1e-12, "{r}: {} {expected}", at(0, 1, r));
+        }
     }
     let gammas: Vec<f64> = fluid.thermostats.iter().map(|t| t.unwrap().gamma).collect();
     assert_eq!(gammas, [18.0, 12.0, 12.0, 6.0]);

@@ -154,10 +154,11 @@ fn tensions_are_split_between_the_film_and_the_vapour() {
         places.iter().map(|z| (*z, Measured { value: f(*z), error: 0.02 * z })).collect()
     };
     // The pressure of the particles, kT = 0.7, with a gap at the face.
-    let ideal = |low: f64, high: f64| -> Vec<(f64, Measured)> {
-        let of = |z: f64| if (low..high).contains(&z) { 4.2 } else { 0.01 };
+    let ideal_of = |pressure: f64, low: f64, high: f64| -> Vec<(f64, Measured)> {
+        let of = |z: f64| if (low..high).contains(&z) { pressure } else { 0.01 };
         places.iter().map(|z| (*z, of(*z).into())).collect()
     };
+    let ideal = |low: f64, high: f64| ideal_of(4.2, low, high);
     let whole = Measured { value: 4.5, error: 0.22 };
     let film = |integral: Vec<(f64, Measured)>, ideal: Vec<(f64, Measured)>| {
         split((&integral, whole), &ideal, [11.0, 5.0], 4.2)
@@ -173,6 +174,13 @@ fn tensions_are_split_between_the_film_and_the_vapour() {
         assert!((found.cosine(&slab).unwrap().value - 0.5).abs() < 1e-9);
     }
     assert_eq!(film(integral(&lower), ideal(3.0, 8.0)).liquid, None);
+    // A gap of 0.29 is that of a wall; a film nine tenths as dense as the liquid is one, one of seven tenths is not.
+    for (part, is_film) in [(0.9, true), (0.7, false)] {
+        for (f, low, high) in [(&lower as &dyn Fn(f64) -> f64, 0.29, 5.0), (&upper, 6.0, 10.71)] {
+            let found = film(integral(f), ideal_of(part * 4.2, low, high));
+            assert_eq!(found.liquid.is_some(), is_film, "{part} {low}");
+        }
+    }
 }
 
 /// Two films on either side of a cosine, whose line has an error of 0.01 there: within a degree of 90, where a degree is 0.017, and not

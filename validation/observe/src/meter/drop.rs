@@ -309,6 +309,13 @@ mod tests {
             for k in 0..10 {
                 assert!(drop.shells.push(&row) && drop.size.push(&[f64::from(k), 100.0, 9.0, 0.0]));
             }
+            // No shape without a radius, or without a pressure on either side.
+            assert!(drop.shape(&row).is_some());
+            for shells in [0..20, 60..80] {
+                let mut unknown = row.clone();
+                shells.for_each(|k| unknown[k * WIDTH + 3] = f64::NAN);
+                assert!(drop.shape(&unknown).is_none());
+            }
             // A square that is known to 2 % is that of a radius that is known to 1 %.
             let mut shaking = drop.clone();
             let squares: Vec<f64> = (0..500).map(|k| 9.0 * (1.0 + 0.3 * f64::from(k * k).sin())).collect();
