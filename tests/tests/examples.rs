@@ -133,5 +133,5 @@ fn examples_of_the_manual_pages_are_accepted() {
             count += 1;
         }
     }
-    assert_eq!(count, 16);
+    assert_eq!(count, 18);
 }
