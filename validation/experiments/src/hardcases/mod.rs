@@ -177,6 +177,28 @@ mod tests {
         assert!(page.contains(&format!(": {count} rows.")), "{count}");
     }
 
+    /// Each row has what was judged; long messages are cut.
+    #[test]
+    fn rows_are_those_of_the_verdicts() {
+        let verdict = |did: String, wrong: Option<String>| Verdict {
+            group: "a group",
+            case: "a case",
+            host: Host::Plugin,
+            integrator: "aboba",
+            precision: "mixed".into(),
+            must: "stop".into(),
+            did,
+            wrong,
+        };
+        let table = table(&[verdict("stopped".into(), None), verdict("ü".repeat(100), Some("late".into()))]);
+        let beginning = ["a case", Host::Plugin.name(), "aboba", "mixed", "stop"];
+        assert_eq!(table.header.len(), 7);
+        assert_eq!(table.rows[0][..5], beginning);
+        assert_eq!(table.rows[0][5..], ["stopped", "pass"]);
+        assert_eq!(table.rows[1][5..], [&*"ü".repeat(90), "fail"]);
+        assert_eq!(table.rows.len(), 2);
+    }
+
     #[test]
     fn words_of_no_case_are_an_error() {
         let error = run(Extent::Quick, false, Some("zzz"), &Progress::new()).unwrap_err();

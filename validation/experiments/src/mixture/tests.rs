@@ -72,10 +72,16 @@ fn each_liquid_keeps_its_own_and_cross_is_between_them() {
     }
     let fluid = both.at(0.7).unwrap();
     assert_eq!(fluid.densities.len(), 1, "both count their particles by one kernel");
-    // Of one range the formulas of both strengths are added up, of two each has its own potential.
+    // Of one range the formulas of both strengths are added up, of two, and of another form, each has its own potential.
     let apart = SOFTER.replace("strength = \"A\"\nrange = 1.0", "strength = \"A - 10\"\nrange = 0.8");
-    assert_ne!(apart, SOFTER);
-    for fluid in [&fluid, &merged([SET6, &apart], 0.6).at(0.7).unwrap()] {
+    let formula =
+        SOFTER.replace("form = \"soft\"\nstrength = \"A\"", "form = \"expression\"\nphi = \"A/2*(1 - r)^2\"");
+    assert!(apart != SOFTER && formula.contains("phi"));
+    for fluid in [
+        &fluid,
+        &merged([SET6, &apart], 0.6).at(0.7).unwrap(),
+        &merged([SET6, &formula], 0.6).at(0.7).unwrap(),
+    ] {
         let at = |a: usize, b: usize, r: f64| -> f64 {
             use psidpd_core::model::pair::PairForm as _;
             fluid.pairs.iter().filter(|t| t.acts(a, b, 0.0)).map(|t| t.potential.at(r).0).sum()

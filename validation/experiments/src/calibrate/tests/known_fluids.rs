@@ -107,6 +107,19 @@ fn a_fluid_with_a_straight_hole_is_calibrated_in_one_round() {
     assert!(found.text.contains("# Corrected density") && !found.text.contains("misses"), "{}", found.text);
 }
 
+/// A pressure that is no number at a density is no target.
+#[test]
+fn a_density_without_a_pressure_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pole.toml");
+    let pole = MODEL.replace("b*rho^3", "b*rho^3*ln(8 - rho)");
+    assert_ne!(pole, MODEL);
+    std::fs::write(&path, pole).unwrap();
+    let run = |_: &Bulk| panic!("nothing is run");
+    let found = calibrate_by(&run, &path, &options(&[5.0, 9.0], 1e-3), "a command", &mut |_| {});
+    assert!(matches!(found, Err(ExperimentError::NoTarget(9.0))), "{found:?}");
+}
+
 /// Where the virial lacks a tenth, one density fixes offset and slope of the correction: the first fit to the pressure meets it,
 /// since it knows which part of the pressure is not of ψ.
 #[test]
