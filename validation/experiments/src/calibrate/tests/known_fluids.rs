@@ -107,17 +107,20 @@ fn a_fluid_with_a_straight_hole_is_calibrated_in_one_round() {
     assert!(found.text.contains("# Corrected density") && !found.text.contains("misses"), "{}", found.text);
 }
 
-/// A pressure that is no number at a density is no target.
+/// A pressure that is no number at a density is no target, nor is one whose slope has no bound.
 #[test]
 fn a_density_without_a_pressure_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("pole.toml");
-    let pole = MODEL.replace("b*rho^3", "b*rho^3*ln(8 - rho)");
-    assert_ne!(pole, MODEL);
-    std::fs::write(&path, pole).unwrap();
-    let run = |_: &Bulk| panic!("nothing is run");
-    let found = calibrate_by(&run, &path, &options(&[5.0, 9.0], 1e-3), "a command", &mut |_| {});
-    assert!(matches!(found, Err(ExperimentError::NoTarget(9.0))), "{found:?}");
+    let pressure = "[excess_free_energy.F]\npressure = \"rho*kT + (1 - a)*rho^2 + b*rho^3\"";
+    for (psi, at) in [("ln(8 - n)", 9.0), ("(8 - n)^1.5", 8.0)] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pole.toml");
+        let pole = MODEL.replace(pressure, &format!("[excess_free_energy]\nF = \"{psi}\""));
+        assert_ne!(pole, MODEL);
+        std::fs::write(&path, pole).unwrap();
+        let run = |_: &Bulk| panic!("nothing is run");
+        let found = calibrate_by(&run, &path, &options(&[5.0, at], 1e-3), "a command", &mut |_| {});
+        assert!(matches!(found, Err(ExperimentError::NoTarget(x)) if x == at), "{found:?}");
+    }
 }
 
 /// Where the virial lacks a tenth, one density fixes offset and slope of the correction: the first fit to the pressure meets it,
