@@ -36,7 +36,8 @@ GROUPS = {
 }
 # Ways to write a text or a debug form have no right answer.
 WORDS = ["impl (std::fmt::|fmt::)?(Display|Debug)", "-> String with"]
-ENVIRONMENT = {"CARGO_TARGET_DIR": str(WORK / "target"), "RUSTFLAGS": "-Awarnings"}
+# What one line changes is compiled in four seconds in place of twenty.
+ENVIRONMENT = {"CARGO_TARGET_DIR": str(WORK / "target"), "RUSTFLAGS": "-Awarnings", "CARGO_INCREMENTAL": "1"}
 
 
 def copy():
@@ -80,6 +81,11 @@ def cargo_test(crate, *arguments, timeout=None):
             return None
 
 
+def passes(crate, run, without):
+    names = ["--", *run, *(word for name in without for word in ("--skip", name))]
+    return cargo_test(crate, *names, timeout=120) == 0
+
+
 def attempt(change):
     """What becomes of a change: it does not compile, a test catches it, or none does."""
     path = COPY / change["file"]
@@ -90,8 +96,7 @@ def attempt(change):
         for crate, run, without in GROUPS[group_of(change)]:
             if cargo_test(crate, "--no-run") != 0:
                 return "unviable"
-            names = ["--", *run, *(word for name in without for word in ("--skip", name))]
-            if cargo_test(crate, *names, timeout=120) != 0:
+            if not passes(crate, run, without):
                 return "caught"
         return "missed"
     finally:
@@ -115,6 +120,9 @@ def main(seed, most):
     for crate in sorted({crate for group in by_group for crate, _, _ in GROUPS[group]}):
         if cargo_test(crate, "--no-run") != 0:
             sys.exit(f"{crate} does not compile without a change")
+    for group in sorted(by_group):
+        if not all(passes(*tests) for tests in GROUPS[group]):
+            sys.exit(f"{group}: its tests fail without a change")
     begin = time.monotonic()
     found = collections.Counter()
     by_file = collections.defaultdict(list)

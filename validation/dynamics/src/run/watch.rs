@@ -404,6 +404,19 @@ mod tests {
         );
     }
 
+    /// However far apart samples are, it takes four of them.
+    #[test]
+    fn few_hot_samples_stop_no_run() {
+        let mut hot = None;
+        for (k, lasts) in [false, false, false, true, true].into_iter().enumerate() {
+            let done = 10_000 * (k as u64 + 1);
+            let now = Hot::with(hot, 9.0, done);
+            assert_eq!((now.since, now.at, now.count), (10_000, 10_000, k as u64 + 1));
+            assert_eq!(now.lasts(done, 20.0), lasts, "{k}");
+            hot = Some(now);
+        }
+    }
+
     #[test]
     fn a_trend_is_told_from_scatter() {
         let mut rng = StdRng::seed_from_u64(3);

@@ -152,6 +152,9 @@ fn bounds_are_those_of_the_variable_and_must_exclude_the_pole() {
     assert_eq!(singular(&bounded(pole, "bounds = [0.05, 100]", ""), 12.0), [Error]);
     assert_eq!(singular(&bounded(pole, "bounds = [0.05, 100]", ""), 5.0), [Warning]);
     assert_eq!(singular(&bounded(pole, "bounds = [0.05, 9.5]", ""), 5.0), [Note]);
+    let kept = found(&bounded(pole, "bounds = [0.05, 9.5]", ""), 1.0, Some(vec![5.0]));
+    let kept = kept.warnings.iter().find(|w| w.id == "singular").unwrap();
+    assert!(kept.message.ends_with("keep runs away from it"), "{}", kept.message);
     // Mean field knows how psi goes on.
     let beyond = found(&bounded(pole, "bounds = [0.05, 9.5]", ""), 1.0, Some(vec![12.0]));
     assert!(beyond.pressure.unwrap().is_finite(), "{beyond:?}");
@@ -174,10 +177,11 @@ fn bounds_of_parts_leave_a_pole_of_their_sum_open() {
         );
         // Nearly pure A never reaches the pole within the bounds.
         let findings = found(&text, 1.0, Some(vec![5.9, 0.1]));
-        findings.warnings.iter().filter(|w| w.id == "singular").map(|w| w.severity).collect::<Vec<_>>()
+        let warnings = findings.warnings.into_iter().filter(|w| w.id == "singular");
+        warnings.map(|w| (w.severity, w.message.contains("still reaches it"))).collect::<Vec<_>>()
     };
-    assert_eq!(of(9.5), [Severity::Warning]);
-    assert_eq!(of(4.9), [Severity::Note]);
+    assert_eq!(of(9.5), [(Severity::Warning, true)]);
+    assert_eq!(of(4.9), [(Severity::Note, false)]);
 }
 
 /// A particle without neighbours has the corrected density that the correction gives it.
@@ -217,6 +221,11 @@ fn laws_without_potential_and_jumps_are_named() {
     for (step, counts) in [("1e-4", true), ("2e-6", true), ("1e-8", false)] {
         let steep = cut.replace("exp(-r)", &format!("(1 - r)^2 + {step}"));
         assert_eq!(has(&found(&steep, 1.0, None), "energy-jump"), counts, "{step}");
+    }
+    // It is 22 at 2/3 of the range and 6e-3 at a twentieth.
+    for (step, counts) in [("3e-5", true), ("1e-5", false)] {
+        let far = cut.replace("exp(-r)", &format!("1000*r^4*(1 - r)^2 + {step}"));
+        assert_eq!(has(&found(&far, 1.0, None), "energy-jump"), counts, "{step}");
     }
 }
 

@@ -107,6 +107,7 @@ fn next(trials: &[Tried], goal: f64, density: f64) -> Option<Drag> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use psidpd_observe::Measured;
 
     /// Of the usual weight it is 2πγρ²r_c⁵/1575, as in textbooks; of others the integral of r⁴ w² over spheres, by a sum.
     #[test]
@@ -125,5 +126,38 @@ mod tests {
             let found = per_gamma(&Drag { gamma: 1.0, range, exponent }, 5.0);
             assert!((found / expected - 1.0).abs() < 1e-4, "{range} {exponent}: {found} {expected}");
         }
+    }
+
+    /// One trial is followed in proportion, two by a line in logarithms whose slope physics bounds. What takes an uncomfortable drag
+    /// takes a wider weight with the same part of the drag.
+    #[test]
+    fn the_next_drag_is_that_of_the_trials() {
+        let trial = |gamma: f64, viscosity: f64| Tried {
+            drag: Drag { gamma, ..USUAL },
+            flow: Flow { viscosity: viscosity.into(), diffusion: Measured::NONE, dt: 0.01 },
+        };
+        let gamma = |trials: &[Tried], goal: f64| {
+            let next = next(trials, goal, 3.0).unwrap();
+            assert_eq!([next.range, next.exponent], [USUAL.range, USUAL.exponent]);
+            next.gamma
+        };
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+        near(gamma(&[trial(2.0, 4.0)], 8.0), 4.0);
+        near(gamma(&[trial(8.0, 4.0)], 1.0), 2.0);
+        // Slopes of 1/2 and 1, and of 0 and 3, which noise makes: they count as 0.15 and 1.2.
+        near(gamma(&[trial(1.0, 2.0), trial(4.0, 4.0)], 6.0), 9.0);
+        near(gamma(&[trial(9.0, 9.0), trial(1.0, 2.0), trial(2.0, 4.0)], 6.0), 3.0);
+        near(gamma(&[trial(1.0, 2.0), trial(2.0, 2.0)], 2.2), 2.0 * 1.1f64.powf(1.0 / 0.15));
+        near(gamma(&[trial(1.0, 1.0), trial(2.0, 8.0)], 4.0), 2.0 * 0.5f64.powf(1.0 / 1.2));
+        // Two trials of one drag have no slope, as one of another weight has none with this one.
+        near(gamma(&[trial(2.0, 5.0), trial(2.0, 4.0)], 8.0), 4.0);
+        let mut other = trial(1.0, 2.0);
+        other.drag.exponent = SHAPES[1][1];
+        near(gamma(&[other, trial(2.0, 4.0)], 8.0), 4.0);
+        let wider = next(&[trial(COMFORTABLE, 4.0)], 6.0, 3.0).unwrap();
+        assert_eq!([wider.range, wider.exponent], SHAPES[1]);
+        let part = |drag: &Drag| drag.gamma * per_gamma(drag, 3.0);
+        near(part(&wider), part(&Drag { gamma: 1.5 * COMFORTABLE, ..USUAL }));
+        assert!(next(&[], 6.0, 3.0).is_none());
     }
 }

@@ -194,6 +194,24 @@ const OF_SLAB: &str = "every = 5\nsurface_tension = true\ninterface_width = { ev
 const OF_FLOW: &str = "every = 3\npoiseuille = true\n";
 const OF_MOTION: &str = "msd = { every = 15, length = 10 }\n";
 
+/// What the liquid at the three densities, of which the middle one is `density`, and its slab show.
+fn read(found: &[Observed], density: f64) -> Result<Equilibrium, Trouble> {
+    let [thin, wanted, dense] = [0, 1, 2].map(|k: usize| found[k].configurational_pressure());
+    let slab = &found[3];
+    let diffusion = found[1].scalar("diffusion", "diffusion").value;
+    if diffusion < SOLID {
+        let message = format!("particles stay in place, with a diffusion coefficient of {diffusion:.4}");
+        return Err(Trouble::Frozen(message));
+    }
+    Ok(Equilibrium {
+        pressure: wanted,
+        stiffness: dense.minus(thin).times(1.0 / ((DENSITIES[2] - DENSITIES[0]) * density)),
+        // Of the routes to the tension that with the least scatter.
+        tension: slab.scalar("surface_tension", "free_energy"),
+        liquid: slab.scalar("interface_width", "liquid"),
+    })
+}
+
 impl Instrument for Runs<'_> {
     fn equilibrium(&mut self, fluid: &Strengths, care: Care) -> Result<Equilibrium, Trouble> {
         let dt = self.dt(&self.model(fluid, &USUAL)?)?;
@@ -214,21 +232,7 @@ impl Instrument for Runs<'_> {
             dt,
             observe: OF_SLAB,
         });
-        let found = self.run(&settings, care)?;
-        let [thin, wanted, dense] = [0, 1, 2].map(|k: usize| found[k].configurational_pressure());
-        let slab = &found[3];
-        let diffusion = found[1].scalar("diffusion", "diffusion").value;
-        if diffusion < SOLID {
-            let message = format!("particles stay in place, with a diffusion coefficient of {diffusion:.4}");
-            return Err(Trouble::Frozen(message));
-        }
-        Ok(Equilibrium {
-            pressure: wanted,
-            stiffness: dense.minus(thin).times(1.0 / ((DENSITIES[2] - DENSITIES[0]) * density)),
-            // Of the routes to the tension that with the least scatter.
-            tension: slab.scalar("surface_tension", "free_energy"),
-            liquid: slab.scalar("interface_width", "liquid"),
-        })
+        read(&self.run(&settings, care)?, density)
     }
 
     fn flow(&mut self, fluid: &Strengths, drag: &Drag, guess: f64, care: Care) -> Result<Flow, Trouble> {
@@ -240,5 +244,39 @@ impl Instrument for Runs<'_> {
             Care::Result(_) => found[0].scalar("diffusion", "diffusion"),
         };
         Ok(Flow { viscosity: last.scalar("poiseuille", "viscosity"), diffusion, dt })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_observe::observation::Kind;
+    use psidpd_observe::{Observation, Series};
+
+    /// A liquid of density 5 whose pressure is −0.6, 0.3 and 1.2 at the three densities, 0.3 apart in all: a stiffness of 6.
+    #[test]
+    fn a_liquid_of_known_pressures_is_read_and_a_solid_is_not() {
+        let number = |name: &str, column: &str, value: Measured| {
+            Observation::new(name, name, Kind::Scalar, &Series::new(1)).column(column, "1", [value])
+        };
+        let of = |diffusion: f64| {
+            let pressure = |value: f64| {
+                let pressure = number("pressure", "configurational", [value, 0.03].into());
+                Observed(vec![pressure, number("diffusion", "diffusion", diffusion.into())])
+            };
+            let slab = Observed(vec![
+                number("surface_tension", "free_energy", [7.5, 0.2].into()),
+                number("interface_width", "liquid", [5.1, 0.01].into()),
+            ]);
+            read(&[pressure(-0.6), pressure(0.3), pressure(1.2), slab], 5.0)
+        };
+        let Equilibrium { pressure, stiffness, tension, liquid } = of(0.03).unwrap();
+        assert_eq!([pressure.value, pressure.error, tension.value, liquid.value], [0.3, 0.03, 7.5, 5.1]);
+        assert!((stiffness.value - 6.0).abs() < 1e-12, "{stiffness:?}");
+        assert!((stiffness.error - 0.03 * 2f64.sqrt() / 0.3).abs() < 1e-12, "{stiffness:?}");
+        // What is not known is not said to be solid.
+        assert!(of(0.0061).is_ok() && of(f64::NAN).is_ok());
+        let Err(Trouble::Frozen(why)) = of(0.0059) else { panic!("a solid") };
+        assert!(why.contains("0.0059"), "{why}");
     }
 }

@@ -120,6 +120,14 @@ fn what_cannot_be_mixed_is_refused_with_the_reason() {
     assert!(merge::units([&plain, &small]).unwrap_err().to_string().contains("has none"));
     let heavy = of(&units(1e-9).replace("mass = 2e-25", "mass = 3e-25"), "heavy");
     assert!((merge::units([&small, &heavy]).unwrap().1 - 1.5).abs() < 1e-12);
+    for (names, why) in
+        [(["a", "a"], "both liquids are called a"), (["a b", "c"], "\"a b\""), (["a", ""], "\"\"")]
+    {
+        let mut sought = sought(folder.path(), 8.0);
+        (0..2).for_each(|k| sought.liquids[k].name = names[k].into());
+        let said = super::mixture(&sought, &mut |_| ()).unwrap_err().to_string();
+        assert!(said.contains(why) && said.contains("--species"), "{said}");
+    }
     // One name for both, or one that no species can have, is an error of the model.
     for name in ["small", "a b"] {
         let mut other = small.clone();
@@ -209,6 +217,20 @@ fn what_no_mixture_has_is_refused_with_the_nearest() {
     let found = of(&mut Known::new(|s| 5.0 + 5.0 * (-s).exp(), 1), 3.0);
     let why = found.refusal.clone().unwrap();
     assert!(!found.good && why.contains("nearest") && found.cross.is_nan(), "{why}");
+    // The nearest of those that stay above it, and of those that stay below it.
+    let curves: [(fn(f64) -> f64, f64); 2] = [(|s| 5.0 + 5.0 * (-s).exp(), 3.0), (|s| 9.0 - 2.0 * s, 13.0)];
+    for (curve, wanted) in curves {
+        let mut known = Known::new(curve, 1);
+        let found = of(&mut known, wanted);
+        // By what noise may add.
+        let off = |cross: f64| (curve(cross) - wanted).abs();
+        let least = known.asked.iter().map(|cross| off(*cross)).fold(f64::INFINITY, f64::min);
+        let [near, far]: [Vec<f64>; 2] =
+            known.asked.iter().partition(|cross| off(**cross) < least + 0.5).into();
+        let why = found.refusal.unwrap();
+        let says = |cross: &f64| why.contains(&format!("the nearest: cross = {cross:.3}:"));
+        assert!(near.iter().any(says) && !far.is_empty(), "{near:?} {far:?}: {why}");
+    }
     // Longer runs that disagree.
     let mut known = Known { off: 1.5, ..Known::new(CURVES[0], 1) };
     let found = of(&mut known, 8.0);

@@ -4,7 +4,7 @@ use super::origin::Origin;
 use super::own_style::own_style;
 use super::quantity::{Class, Quantities};
 use super::recommend::scene_of;
-use super::sample::{Effort, FAR_OFF, Made, Sampled, observe};
+use super::sample::{Effort, Made, Sampled, far_off, observe};
 use super::setting::{Physics, Setting};
 use crate::ExperimentError;
 use crate::code::Host;
@@ -74,10 +74,8 @@ impl LammpsRuns {
             sampled.push(&row[1..3]);
         }
         let mean = sampled.mean(0);
-        let calm = mean.value < FAR_OFF * origin.stage.kt;
-        // NaN is not calm.
-        if !calm {
-            return Ok(Err(format!("the temperature is {:.1} kT", mean.value / origin.stage.kt)));
+        if let Some(why) = far_off(mean.value / origin.stage.kt) {
+            return Ok(Err(why));
         }
         let observe = observe(origin, every, Host::Lammps, true)?;
         let mut observers = Observers::new(&observe, [origin.stage.name.as_str()]);

@@ -56,7 +56,13 @@ const FEWEST: u64 = 16;
 /// Samples of the cheap observables to one of the others.
 const RARELY: u64 = 3;
 /// A run is given up where it is hotter than this, in kT.
-pub const FAR_OFF: f64 = 5.0;
+const FAR_OFF: f64 = 5.0;
+
+/// What is wrong with a temperature, over kT, at which a run is given up. NaN is one.
+pub fn far_off(ratio: f64) -> Option<String> {
+    let is_calm = ratio <= FAR_OFF;
+    (!is_calm).then(|| format!("the temperature is {ratio:.1} kT"))
+}
 
 /// What is observed: temperature of configurations, pressures, g(r) and diffusion, and what the scene itself asks of interfaces and
 /// viscosities. Without time there is neither diffusion nor viscosity.
@@ -141,10 +147,7 @@ impl<'a> Sampler<'a> {
         let ratio = self.run.temperature() / self.origin.stage.kt;
         self.stopped = match made {
             Err(why) => Some(why.to_string()),
-            Ok(()) if ratio > FAR_OFF => {
-                Some(format!("step {}: the temperature is {ratio:.1} kT", self.run.step_number()))
-            }
-            Ok(()) => None,
+            Ok(()) => far_off(ratio).map(|why| format!("step {}: {why}", self.run.step_number())),
         };
     }
 
