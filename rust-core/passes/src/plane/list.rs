@@ -456,13 +456,13 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
     }
 }
 
-/// Computes the pairs of a batch.
-struct Computed<'a, I: Isa, const MULTISPECIES: bool> {
-    metric: <Mixed as Arithmetic<I>>::Metric,
-    packed: *const MixedParticle,
-    i_particles: &'a IParticles<f32>,
-    batch: Batch<'a>,
-    species: usize,
+/// Computes the pairs of a batch in single precision.
+pub struct Computed<'a, I: Isa, const MULTISPECIES: bool> {
+    pub metric: <Mixed as Arithmetic<I>>::Metric,
+    pub packed: *const MixedParticle,
+    pub i_particles: &'a IParticles<f32>,
+    pub batch: Batch<'a>,
+    pub species: usize,
 }
 
 impl<I: Isa, const MULTISPECIES: bool> VectorsOfPairs<I, Mixed> for Computed<'_, I, MULTISPECIES> {

@@ -2,6 +2,7 @@
 
 pub mod buffers;
 pub mod data;
+pub mod distances;
 pub mod first;
 pub mod list;
 pub mod listed_noise;

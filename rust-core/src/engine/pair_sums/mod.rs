@@ -26,6 +26,7 @@ mod listed;
 mod pairs;
 mod plane_list;
 mod search;
+mod shells;
 mod single;
 mod special;
 mod sweep_pairs;
@@ -36,6 +37,7 @@ pub use super::components::COMPONENTS;
 pub use evaluation::{Evaluation, Evaluator, NearWall};
 pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
+pub use shells::count_in_shells;
 
 use super::counts::PassCounts;
 use super::error::EngineError;

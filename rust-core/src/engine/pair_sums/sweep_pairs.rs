@@ -43,10 +43,7 @@ impl SweepPairs {
         found: &mut Vec<PlaneList>,
     ) -> bool {
         let SweepPairs { lists, dimensions, kinds, tags, planes } = self;
-        let is_periodic = [0, 1, 2].map(|k| domain.periodic()[k] && k < *dimensions);
-        let search_range = range * (1.0 + MARGIN);
-        let is_wide = |k: usize| !is_periodic[k] || domain.height(k) > 2.0 * search_range;
-        if !(range > 0.0 && range.is_finite() && (0..3).all(is_wide)) {
+        if !is_wide(domain, *dimensions, range) {
             return false;
         }
         tags.resize(x.len(), 0);
@@ -66,6 +63,12 @@ impl SweepPairs {
         pool.each(&mut work, |(plane, list)| list.measure(plane, &places, species));
         true
     }
+}
+
+/// Whether a box is so wide that no particle is near two images of another, and the range positive.
+pub fn is_wide(domain: &PeriodicBox, dimensions: usize, range: f64) -> bool {
+    let wide = |k: usize| !domain.periodic()[k] || domain.height(k) > 2.0 * range * (1.0 + MARGIN);
+    range > 0.0 && range.is_finite() && (0..dimensions).all(wide)
 }
 
 /// Weights greater than 0 within the range.

@@ -8,7 +8,7 @@ mod plane_pairs;
 pub use plane_pairs::PlanePairs;
 
 use super::region::region;
-use super::workspace::{CellOrder, Input, SortedParticles};
+use super::workspace::{CellOrder, Input, SharedParticles, SortedParticles};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
@@ -18,6 +18,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::distances::{DistanceInputs, ShellCounts, Shells, count_pairs};
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
 use psidpd_threads::{Pool, part, take};
 
@@ -44,6 +45,24 @@ pub struct PairLists {
     buffers: Vec<ListBuffers>,
     /// The sorted index of each particle of the host, beyond all for particles that are left out.
     pub place: Vec<u32>,
+}
+
+/// Sorted cells and their particles, as loops over pairs need them.
+fn sorted_cells<'a>(
+    set: InstructionSet,
+    cells: &'a CellOrder,
+    shared: &SharedParticles<'a, MixedParticle>,
+) -> SortedCells<'a> {
+    SortedCells {
+        set,
+        geometry: &cells.geometry,
+        grid: &cells.grid,
+        start: &cells.start,
+        x: shared.x,
+        fixed16: shared.fixed16,
+        fixed16_scale: shared.fixed16_scale,
+        excluded: Excluded::default(),
+    }
 }
 
 impl PairLists {
@@ -77,54 +96,24 @@ impl PairLists {
         [range, margin]: [f64; 2],
         planes: &mut Vec<PlanePairs>,
     ) -> Result<bool, EngineError> {
-        particles.check(26)?;
-        particles.check_images(images)?;
         let input =
             Input { particles: *particles, images, species_of_type: species_of_kind, ..Input::default() };
-        let set = self.set;
-        let region = region(set, pool, (self.dimensions, range * (1.0 + margin)), domain, &input)?;
-        let is_long = region.is_long(range);
-        let extent = region.geometry.extent();
-        let margin = if is_long { margin.max(extent / range * UNITS_OF_MARGIN) } else { margin };
-        if margin > MOST_MARGIN {
-            return Err(FAR_APART);
-        }
-        let range = self.range_within(domain, extent, range, margin)?;
-        let (geometry, mut grid) = region.cells(range, particles.x.len())?;
+        let (margin, is_long) = self.sort(pool, domain, &input, [range, margin])?;
         let terms = &terms(margin);
-        // Updates of single pairs need an even number of planes, so that planes updated at
-        // once have no neighbour in common.
-        if geometry.periodic[grid.plane_axis] {
-            grid.planes = grid.planes.max(2);
-        }
-        self.cells.sort(pool, set, geometry, grid, &input)?;
-        self.sort_by_tags(pool, particles.tag);
         self.fill(pool, &input, terms.species() > 1);
-        planes.resize_with(grid.planes, PlanePairs::default);
+        let set = self.set;
+        planes.resize_with(self.cells.grid.planes, PlanePairs::default);
         self.buffers.resize_with(pool.threads(), ListBuffers::default);
-        let cells = &self.cells;
-        let shared = self.particles.share();
-        let inputs = &ListInputs {
-            cells: SortedCells {
-                set: self.set,
-                geometry: &cells.geometry,
-                grid: &cells.grid,
-                start: &cells.start,
-                x: shared.x,
-                fixed16: shared.fixed16,
-                fixed16_scale: shared.fixed16_scale,
-                excluded: Excluded::default(),
-            },
-            packed: shared.packed,
-            terms,
-        };
+        let PairLists { cells, particles, buffers, .. } = self;
+        let (cells, shared) = (&*cells, particles.share());
+        let inputs = &ListInputs { cells: sorted_cells(set, cells, &shared), packed: shared.packed, terms };
         let (count, threads) = (planes.len(), pool.threads());
         let mut rest = &mut planes[..];
         let of_thread = |(t, buffers): (usize, _)| {
             let numbers = part(count, t, threads);
             (buffers, take(&mut rest, numbers.len()), numbers)
         };
-        let mut work: Vec<_> = self.buffers.iter_mut().enumerate().map(of_thread).collect();
+        let mut work: Vec<_> = buffers.iter_mut().enumerate().map(of_thread).collect();
         pool.each(&mut work, |(buffers, planes, numbers)| {
             for (number, plane) in numbers.clone().zip(planes.iter_mut()) {
                 plane.lie_in(cells, number);
@@ -133,6 +122,78 @@ impl PairLists {
             }
         });
         Ok(is_long)
+    }
+
+    /// Counts the pairs of `particles` in shells, and lists by sorted indices those of which single precision does not tell the shell:
+    /// by thread, with as many `species` as kinds. There are no ghosts.
+    ///
+    /// # Errors
+    /// Fails as [`PairLists::find`], and where the box is too long for single precision.
+    pub fn count(
+        &mut self,
+        pool: &Pool,
+        domain: &PeriodicBox,
+        particles: &Particles,
+        species: &[i32],
+        [range, margin]: [f64; 2],
+        shells: Shells,
+    ) -> Result<Vec<ShellCounts>, EngineError> {
+        let input = Input { particles: *particles, species_of_type: species, ..Input::default() };
+        let (_, is_long) = self.sort(pool, domain, &input, [range, margin])?;
+        // A unit of 2⁻³² of the region, and sixteen of the last digit.
+        let error = shells.per_length * (self.cells.geometry.extent() / 4_294_967_296.0 + 1e-6 * range);
+        if is_long || error > 0.25 {
+            return Err(FAR_APART);
+        }
+        self.fill(pool, &input, species.len() > 1);
+        let (set, cells, shared) = (self.set, &self.cells, self.particles.share());
+        let shells = Shells { error, ..shells };
+        let inputs = &DistanceInputs {
+            cells: sorted_cells(set, cells, &shared),
+            packed: shared.packed,
+            species: species.len(),
+            shells,
+        };
+        let threads = pool.threads();
+        let mut counts: Vec<(usize, ShellCounts)> =
+            (0..threads).map(|t| (t, ShellCounts::new(species.len(), &shells))).collect();
+        pool.each(&mut counts, |(t, counts)| {
+            for plane in part(cells.grid.planes, *t, threads) {
+                // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
+                unsafe { count_pairs(set, inputs, plane, counts) };
+            }
+        });
+        Ok(counts.into_iter().map(|(_, counts)| counts).collect())
+    }
+
+    /// Sorts particles for a search within `range`, and returns its margin, and whether pairs have to be measured in double precision.
+    fn sort(
+        &mut self,
+        pool: &Pool,
+        domain: &PeriodicBox,
+        input: &Input,
+        [range, margin]: [f64; 2],
+    ) -> Result<(f64, bool), EngineError> {
+        input.particles.check(26)?;
+        input.particles.check_images(input.images)?;
+        let set = self.set;
+        let region = region(set, pool, (self.dimensions, range * (1.0 + margin)), domain, input)?;
+        let is_long = region.is_long(range);
+        let extent = region.geometry.extent();
+        let margin = if is_long { margin.max(extent / range * UNITS_OF_MARGIN) } else { margin };
+        if margin > MOST_MARGIN {
+            return Err(FAR_APART);
+        }
+        let range = self.range_within(domain, extent, range, margin)?;
+        let (geometry, mut grid) = region.cells(range, input.particles.x.len())?;
+        // Updates of single pairs need an even number of planes, so that planes updated at
+        // once have no neighbour in common.
+        if geometry.periodic[grid.plane_axis] {
+            grid.planes = grid.planes.max(2);
+        }
+        self.cells.sort(pool, set, geometry, grid, input)?;
+        self.sort_by_tags(pool, input.particles.tag);
+        Ok((margin, is_long))
     }
 
     /// Takes over the order of a sweep.

@@ -19,7 +19,7 @@ mod units;
 pub use cell_order::{CellOrder, extremes};
 pub use forces::ForceSink;
 pub use input::Input;
-pub use sorted_particles::SortedParticles;
+pub use sorted_particles::{SharedParticles, SortedParticles};
 
 use crate::engine::error::EngineError;
 use crate::engine::fault::Fault;
@@ -42,7 +42,6 @@ use psidpd_passes::plane::list::{ListTerms, Listed};
 use psidpd_threads::{Pool, part};
 use scheduler::{PassInput, Scheduler};
 use slopes::SlopeArrays;
-use sorted_particles::SharedParticles;
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 

@@ -75,8 +75,7 @@ impl Advice {
         let (better_dt, found) = Piece::settled(&of).ok()?.ok()?.longest(ADVISED).ok()??;
         let better_errors = [found.temperatures(), found.carried()];
         let time = PRICE * stage.dt / better_dt;
-        let gains = worst(errors) > worst(better_errors) && time < 3.0;
-        gains.then(|| Advice {
+        gains(worst(errors), worst(better_errors), time).then(|| Advice {
             stage: stage.name.clone(),
             dt: stage.dt,
             errors,
@@ -86,6 +85,11 @@ impl Advice {
             time,
         })
     }
+}
+
+/// Whether a setting with a smaller error is worth what it takes, in times of the stage's.
+fn gains(error: f64, better: f64, time: f64) -> bool {
+    error > better && time < 3.0
 }
 
 /// Number densities of the species where the fluid is densest: in the blocks of space that hold the densest quarter of the particles.
@@ -163,6 +167,12 @@ mod tests {
     use psidpd_core::engine::{PeriodicBox, Want};
     use psidpd_core::model::Model;
 
+    #[test]
+    fn advice_has_a_smaller_error_for_up_to_three_times_the_time() {
+        assert!(gains(0.02, 0.019, 2.99) && !gains(0.02, 0.019, 3.01));
+        assert!(!gains(0.02, 0.021, 0.5) && !gains(0.02, 0.021, 4.0) && !gains(0.02, f64::NAN, 1.0));
+    }
+
     /// Advice for Warren's liquid in units of energy and mass that are 0.7 and 3 of the usual ones, for a step in the usual units of time.
     fn advice(dt: f64, rest: &str) -> Option<Advice> {
         let (kt, mass): (f64, f64) = (0.7, 3.0);
@@ -224,6 +234,15 @@ mod tests {
         let run = Simulation::new(&model, 0.7, state, 1).unwrap();
         let found = frequency(&run).unwrap();
         assert!((found - (12.5f64 / 3.0 / 3.0).sqrt()).abs() < 1e-9, "{found}");
+    }
+
+    /// A particle on the upper face of an open box is in the last block.
+    #[test]
+    fn the_corner_of_the_box_is_in_a_block() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [false; 3]).unwrap();
+        let state = State::at_rest(domain, vec![1.0], vec![[5.0; 3], [4.3, 1.0, 2.0]]);
+        let run = Simulation::new(&Model::parse("m", SOFT).unwrap(), 0.7, state, 1).unwrap();
+        assert_eq!(densest(&run), [2.0 / 125.0]);
     }
 
     /// A slab that fills a third of the box is as dense as its middle, with its own composition.

@@ -433,6 +433,22 @@ mod tests {
         assert!(!falls(&[3.0, 2.0, 1.0]) && !falls(&[]));
     }
 
+    /// A fluid that cools towards its temperature is told of only if it never was near it.
+    #[test]
+    fn samples_that_fall_are_told_of_if_all_are_above() {
+        let soft =
+            scene(SOFT, "model = \"m.toml\"\nkT = 0.7\nbox = 4.0\ndensity = 3.0\nsteps = 10\ndt = 0.01\n")
+                .unwrap();
+        let told = |last: f64| {
+            let kinetic = (0..60).map(|k| last + 8.0 * (-0.15 * f64::from(k)).exp()).collect();
+            let watch = Watch { kinetic, ..Watch::default() };
+            let found = watch.deviations(&soft.stages[0]);
+            assert!(found.iter().all(|d| matches!(d.thermometer, Thermometer::Kinetic)));
+            found.first().map(|d| d.falls)
+        };
+        assert_eq!((told(1.03), told(0.99)), (Some(true), None));
+    }
+
     /// Of samples that are as often below as above, all are above once in two to the power of their number; 1.02 is tolerated.
     #[test]
     fn all_must_be_too_high_and_many() {

@@ -188,6 +188,19 @@ fn a_correction_that_does_not_run_is_damped() {
     assert!(rounds.is_empty());
 }
 
+/// One density of several that runs fits no line of pressures: what was found with its density alone is kept.
+#[test]
+fn pressures_need_more_densities_than_coefficients() {
+    let made = Made { hole: |rho| rho - (rho - 1.6) / 1.2, factor: 1.3 };
+    let goals = |densities: &[f64], runs: &dyn Fn(f64, &Polynomial) -> bool| -> Vec<Goal> {
+        made.search_where(densities, 1e-9, runs).iter().map(|round| round.goal).collect()
+    };
+    let all = goals(&[4.0, 6.0], &|_, _| true);
+    assert!(all.contains(&Goal::Pressure), "{all:?}");
+    let one = goals(&[4.0, 6.0], &|rho, p| rho == 6.0 || *p == Polynomial::identity());
+    assert!(one.iter().all(|goal| *goal == Goal::Density), "{one:?}");
+}
+
 /// What a run observes of a distribution of the local density.
 fn histogram(centres: &[f64], masses: &[f64]) -> Observed {
     let of = |values: &[f64]| values.to_vec();

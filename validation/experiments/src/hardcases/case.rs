@@ -259,6 +259,8 @@ mod tests {
         assert!(judge(Must::RightOrSaid(0.01), &ended(1.1, &["hot"], 0), true).is_ok());
         assert!(judge(Must::RightOrSaid(0.01), &stopped("step 5: no"), true).is_ok());
         assert!(judge(Must::RightOrSaid(0.01), &stopped("no"), true).is_err());
+        let refused = |why: &str| judge(Must::RightOrSaid(0.01), &Found::Refused(why.into()), true);
+        assert!(refused("dt: too long").is_ok() && refused("").is_err());
         assert!(judge(Must::Stops, &stopped("step 5: too hot"), true).is_err());
         assert!(judge(Must::Stops, &stopped("step 5: particle 7 is"), true).is_ok());
         assert!(judge(Must::Stops, &ended(1.0, &[], 0), true).is_err());

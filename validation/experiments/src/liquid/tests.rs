@@ -204,6 +204,8 @@ struct Known {
     noise: f64,
     calls: f64,
     asked: Vec<Strengths>,
+    /// The viscosities that were expected.
+    guesses: Vec<f64>,
     /// How often a result was measured.
     results: usize,
 }
@@ -211,7 +213,16 @@ struct Known {
 impl Known {
     fn new() -> Known {
         let answer = Strengths { attraction: -46.0, linear: 2.2, square: 0.62 };
-        Known { answer, freezes: -1e3, thin: 4.0, noise: 1.3, calls: 0.0, asked: Vec::new(), results: 0 }
+        Known {
+            answer,
+            freezes: -1e3,
+            thin: 4.0,
+            noise: 1.3,
+            calls: 0.0,
+            asked: Vec::new(),
+            guesses: Vec::new(),
+            results: 0,
+        }
     }
 
     fn exact(fluid: &Strengths) -> [f64; 3] {
@@ -264,7 +275,8 @@ impl Instrument for Known {
         })
     }
 
-    fn flow(&mut self, _: &Strengths, drag: &Drag, _: f64, _: Care) -> Result<Flow, Trouble> {
+    fn flow(&mut self, _: &Strengths, drag: &Drag, guess: f64, _: Care) -> Result<Flow, Trouble> {
+        self.guesses.push(guess);
         let viscosity = self.noisy(self.viscosity(drag), 0.01 * self.viscosity(drag));
         Ok(Flow { viscosity, diffusion: Measured::from(0.02), dt: 0.05 })
     }
@@ -281,10 +293,31 @@ fn the_answer_of_a_known_fluid_is_found() {
         close(found.fluid.square, known.answer.square, 0.15);
         close(known.viscosity(&found.drag), viscosity, 0.06);
         assert!(found.trials.len() <= 9 && found.drags.len() <= 6, "{found:#?}");
+        // At first the part of the usual drag, 2πγρ²/1575, and some.
+        let [first, later @ ..] = &known.guesses[..] else { panic!("no flow") };
+        let usual = 2.0 + 2.0 * std::f64::consts::PI * USUAL.gamma * 36.0 / 1575.0;
+        assert!((first / usual - 1.0).abs() < 1e-9, "{first} {usual}");
+        later.iter().for_each(|guess| close(*guess, viscosity, 0.1));
         let [_, k, t] = Known::exact(&found.fluid);
         let [_, stiffness, tension] = Known::exact(&known.answer);
         close(k, stiffness, 0.03);
         close(t, tension, 0.02);
+    }
+}
+
+/// A first guess without a result is moved halfway to the liquid that has no wish but its density, again and again.
+#[test]
+fn a_guess_that_freezes_is_moved_toward_a_liquid() {
+    let mut known = Known { freezes: 0.0, ..Known::new() };
+    let liquid = known.sheet(1.3, 20.0);
+    let found = model_by(&liquid, &mut known, &mut |_| ()).unwrap();
+    assert!(!found.good && known.asked.len() == 3, "{found:#?}");
+    let goals = Goals { density: liquid.goals.density, stiffness: None, tension: None, viscosity: None };
+    let plain = theory::start(&goals).array();
+    for pair in known.asked.windows(2) {
+        for (k, plain) in plain.iter().enumerate() {
+            close(pair[1].array()[k], 0.5 * (pair[0].array()[k] + plain), 1e-9);
+        }
     }
 }
 

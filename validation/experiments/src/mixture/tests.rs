@@ -141,6 +141,7 @@ const OWN: [f64; 2] = [11.6, 2.9];
 
 /// Liquids whose tension is a curve of the strength, with bounded noise of a standard error of one percent of the sum.
 struct Known {
+    own: [f64; 2],
     curve: fn(f64) -> f64,
     /// Longer runs have a tension that differs by so much.
     off: f64,
@@ -150,7 +151,7 @@ struct Known {
 
 impl Known {
     fn new(curve: fn(f64) -> f64, seed: u64) -> Known {
-        Known { curve, off: 0.0, rng: StdRng::seed_from_u64(seed), asked: Vec::new() }
+        Known { own: OWN, curve, off: 0.0, rng: StdRng::seed_from_u64(seed), asked: Vec::new() }
     }
 
     fn layers_of(&mut self, cross: f64, error: f64) -> Layers {
@@ -162,7 +163,7 @@ impl Known {
 
 impl Instrument for Known {
     fn alone(&mut self) -> Result<[Slab; 2], Trouble> {
-        Ok(OWN.map(|tension| Slab { tension: tension.into(), density: 6.0.into() }))
+        Ok(self.own.map(|tension| Slab { tension: tension.into(), density: 6.0.into() }))
     }
 
     fn layers(&mut self, cross: [f64; 2]) -> Result<[Layers; 2], Trouble> {
@@ -218,8 +219,8 @@ fn what_no_mixture_has_is_refused_with_the_nearest() {
     let why = found.refusal.clone().unwrap();
     assert!(!found.good && why.contains("nearest") && found.cross.is_nan(), "{why}");
     // The nearest of those that stay above it, and of those that stay below it.
-    let curves: [(fn(f64) -> f64, f64); 2] = [(|s| 5.0 + 5.0 * (-s).exp(), 3.0), (|s| 9.0 - 2.0 * s, 13.0)];
-    for (curve, wanted) in curves {
+    let curves: [fn(f64) -> f64; 2] = [|s| 5.0 + 5.0 * (-s).exp(), |s| 9.0 - 2.0 * s];
+    for (curve, wanted) in curves.into_iter().zip([3.0, 13.0]) {
         let mut known = Known::new(curve, 1);
         let found = of(&mut known, wanted);
         // By what noise may add.
@@ -235,6 +236,27 @@ fn what_no_mixture_has_is_refused_with_the_nearest() {
     let mut known = Known { off: 1.5, ..Known::new(CURVES[0], 1) };
     let found = of(&mut known, 8.0);
     assert!(!found.good && found.refusal.unwrap().contains("not within"));
+}
+
+/// What has no tension beside its vapour is no liquid, whichever of both it is.
+#[test]
+fn what_is_no_liquid_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (own, name) in [([f64::NAN, 2.9], "a"), ([11.6, -0.1], "b"), ([0.0, 2.9], "a")] {
+        let mut known = Known { own, ..Known::new(CURVES[0], 1) };
+        let said = mixture_by(&sought(folder.path(), 8.0), &mut known, &mut |_| ()).unwrap_err().to_string();
+        assert!(said.contains(&format!("{name} has a tension")) && said.contains("lower kT"), "{said}");
+    }
+}
+
+/// The file is that of both liquids at kT, with the strength in it.
+#[test]
+fn the_file_has_both_liquids() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = super::text(&sought(folder.path(), 8.0), 0.375, "found today").unwrap();
+    let model = Model::parse("mixture.toml", &text).unwrap();
+    assert_eq!(model.species(), ["a", "b"]);
+    assert!(text.contains("found today") && text.contains("0.375"), "{text}");
 }
 
 /// Tensions are in the unit of the models, energy over length²: what is 8 in it is found as 8 of it.

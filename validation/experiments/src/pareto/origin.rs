@@ -3,7 +3,7 @@
 use super::setting::{self, INTERVAL, Physics};
 use crate::ExperimentError;
 use crate::check::estimates;
-use psidpd_core::engine::{Precision, Settings, Want};
+use psidpd_core::engine::{Settings, Want};
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::run::{RunError, Simulation};
 use psidpd_dynamics::scene::{Scene, Stage};
@@ -51,7 +51,7 @@ impl<'a> Origin<'a> {
             scene.stages.iter().rposition(|s| s.thermostat && s.integrator.has_time() && s.level.is_none());
         let measured = measured.ok_or(ExperimentError::NoStage)?;
         let stage = &scene.stages[measured];
-        let settings = Settings { precision: Precision::Mixed, threads, ..Settings::default() };
+        let settings = Settings { threads, ..Settings::default() };
         let mut run = scene.simulation(scene.initial_state())?;
         run.set_settings(settings)?;
         run.set_reordering(true);

@@ -6,7 +6,6 @@ mod across;
 mod clusters;
 mod contact_angle;
 mod density_field;
-mod distances;
 mod drop;
 mod energy;
 mod interface_width;

@@ -215,7 +215,7 @@ fn plateaus(values: &[f64], length: f64) -> Option<[f64; 2]> {
     }
     let middle = (sine.atan2(cosine) / std::f64::consts::TAU).rem_euclid(1.0);
     // By whole bins, so that the distances from the middle stay even.
-    let shift = (middle * count).round() as usize + values.len() - values.len() / 2;
+    let shift = (middle * count).round() as usize + values.len().div_ceil(2);
     let half = (values.len() / 2) as f64;
     let moved = |k: usize| {
         let z = (k as f64 + 0.5 - half) * length / count;

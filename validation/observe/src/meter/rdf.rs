@@ -1,7 +1,7 @@
-use super::distances::{Shells, count};
 use super::peak::peak;
 use super::species_pairs::SpeciesPairs;
 use super::*;
+use psidpd_core::engine::pair_sums::count_in_shells;
 use std::f64::consts::PI;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,7 +30,7 @@ impl Meter for Rdf {
                 gas. `g` of all particles, and `g_A_B` of each two of several species. `rdf_peak` is the highest point \
                 of `g`, by a parabola: its `height`, and the distance that it is `at`.",
         keys: keys! {
-            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("three times the range of the model, or half the box"),
+            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("twice the range of the model, or half the box"),
                 "Up to which distance."
                 => "2.0";
             "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("as many as make them 0.02 wide, or a little less"),
@@ -43,7 +43,7 @@ impl Meter for Rdf {
     fn read(options: &Options) -> Result<Rdf, FileError> {
         let fluid = options.place.fluid;
         let half = options.half_box();
-        let preset = if fluid.cutoff() > 0.0 { half.min(3.0 * fluid.cutoff()) } else { half };
+        let preset = if fluid.cutoff() > 0.0 { half.min(2.0 * fluid.cutoff()) } else { half };
         let range = options.within_half_box("range")?.unwrap_or(preset);
         let bins = options.bins(range, 0.02, 1)?;
         let pairs = SpeciesPairs::new(&fluid.species);
@@ -55,8 +55,8 @@ impl Meter for Rdf {
         let view = frame.view;
         let species = view.species;
         let kinds = view.model.species().len();
-        let shells = Shells { range: self.range, bins: self.bins };
-        let by_species = count(view.pool, view.x, species, kinds, view.domain, self.dimensions, shells);
+        let place = (view.domain, self.dimensions);
+        let by_species = count_in_shells(view.pool, view.x, species, kinds, place, self.range, self.bins);
         let all = (0..self.bins).map(|bin| by_species.iter().skip(bin).step_by(self.bins).sum::<u64>());
         let of_species = if kinds > 1 { &by_species[..] } else { &[] };
         let mut counts: Vec<f64> = all.chain(of_species.iter().copied()).map(|count| count as f64).collect();

@@ -106,6 +106,18 @@ fn stages_have_their_own_temperature_and_drag() {
     assert_eq!([alone.error, alone.carried, alone.drag], [0.0; 3]);
 }
 
+/// A ramp is judged at its first level and at its last.
+#[test]
+fn ramps_are_judged_at_both_ends() {
+    let gas = "title = \"gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 0.1\nrange = 1\n";
+    let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\nbox = 6.0\ndensity = 8.0\n\
+                [[stage]]\nname = \"heat\"\nkT = [0.5, 2.0]\nlevels = 4\nsteps = 40\ndt = 0.01\n";
+    let found = estimates(&scene(gas, text).unwrap()).unwrap().known;
+    let [cold, hot] = &found[..] else { panic!("{found:?}") };
+    // Its drag is that of the stage, in configurations of their own.
+    assert!(cold.drag != hot.drag && is_near(cold.drag, hot.drag, 0.1), "{found:?}");
+}
+
 /// The step is judged where the fluid is stiffest: in the denser part of a box, and in the liquid to which a thinner start condenses.
 #[test]
 fn the_stiffest_part_decides() {

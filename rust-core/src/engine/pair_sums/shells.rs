@@ -1,0 +1,211 @@
+//! Histograms of the distances of particles.
+
+mod windows;
+
+use super::sweep_pairs::is_wide;
+use crate::engine::particles::Particles;
+use crate::engine::sweep::{MARGIN, PairLists, Places, Pool};
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::distances::Shells;
+
+/// Pairs in each of `bins` shells of equal thickness up to `range`, which is at most half the height of the box along any period:
+/// `bins` numbers for each species `a` of `kinds` and each `b` from `a` on, those of double precision. Particles without a finite
+/// position make no pairs.
+///
+/// The search of the sweep finds the pairs, and single precision measures them; the few that are so near to the edge of a shell
+/// that rounding may matter are measured once more. Where it does not apply, as at a range of half the box, [`windows`] counts them.
+pub fn count_in_shells(
+    pool: &Pool,
+    x: &[[f64; 3]],
+    species: &[i32],
+    kinds: usize,
+    (domain, dimensions): (&PeriodicBox, usize),
+    range: f64,
+    bins: usize,
+) -> Vec<u64> {
+    let mut counts = Counts { kinds, bins, per_length: bins as f64 / range, numbers: Vec::new() };
+    counts.numbers.resize(counts.first_of(kinds, 0), 0);
+    let is_counted =
+        is_wide(domain, dimensions, range) && counts.by_search(pool, x, species, (domain, dimensions), range);
+    if !is_counted {
+        windows::count(&mut counts, pool, x, species, (domain, dimensions), range);
+    }
+    counts.numbers
+}
+
+/// Counts of the shells, for each species and each from it on.
+struct Counts {
+    kinds: usize,
+    bins: usize,
+    per_length: f64,
+    numbers: Vec<u64>,
+}
+
+impl Counts {
+    /// The first counter of species `a` and `b`, where `a` is not above `b`.
+    fn first_of(&self, a: usize, b: usize) -> usize {
+        // Species before `a` have kinds, kinds − 1, … rows.
+        (a * self.kinds - a * a.saturating_sub(1) / 2 + b - a.min(b)) * self.bins
+    }
+
+    /// Adds a pair at a distance, if it is in range.
+    fn add(&mut self, [a, b]: [usize; 2], r: f64) {
+        let shell = (r * self.per_length) as usize;
+        if shell < self.bins {
+            let first = self.first_of(a.min(b), a.max(b));
+            self.numbers[first + shell] += 1;
+        }
+    }
+
+    /// Zeros for each species of the first particle and of the second, and each shell and what lies beyond them.
+    fn of_ordered_pairs(&self) -> Vec<u64> {
+        vec![0; self.kinds * self.kinds * (self.bins + 1)]
+    }
+
+    /// Adds such numbers.
+    fn take(&mut self, of_ordered_pairs: &[u64]) {
+        for (pair, numbers) in of_ordered_pairs.chunks_exact(self.bins + 1).enumerate() {
+            let [a, b] = [pair / self.kinds, pair % self.kinds];
+            let first = self.first_of(a.min(b), a.max(b));
+            self.numbers[first..].iter_mut().zip(&numbers[..self.bins]).for_each(|(sum, n)| *sum += n);
+        }
+    }
+
+    /// Counts by the search of the sweep, and returns whether that was possible.
+    fn by_search(
+        &mut self,
+        pool: &Pool,
+        x: &[[f64; 3]],
+        species: &[i32],
+        (domain, dimensions): (&PeriodicBox, usize),
+        range: f64,
+    ) -> bool {
+        let Counts { kinds, bins, per_length, .. } = *self;
+        let tags: Vec<i32> = (1..=x.len() as i32).collect();
+        let particles = Particles { x, tag: &tags, kind: species, owned: x.len() };
+        let all: Vec<i32> = (0..kinds as i32).collect();
+        let mut lists = PairLists::new(InstructionSet::best(), dimensions);
+        let shells = Shells { per_length, count: bins, error: 0.0 };
+        let Ok(shares) = lists.count(pool, domain, &particles, &all, [range, MARGIN], shells) else {
+            return false;
+        };
+        let places = Places::new(dimensions, domain, x, lists.order());
+        for share in shares {
+            self.take(&share.numbers);
+            for pair in share.unsure {
+                let [a, b] = pair.map(|k| places.x(k));
+                let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
+                places.images.find_nearest(&mut d);
+                let [[x], [y], [z]] = d;
+                let kinds = pair.map(|k| species[places.host(k)] as usize);
+                self.add(kinds, (x * x + y * y + z * z).sqrt());
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::pair_sums::for_each_pair;
+    use nalgebra::Matrix3;
+    use psidpd_passes::noise::threefry2x32;
+    use std::num::NonZeroUsize;
+
+    /// Uniform numbers, one after the other.
+    fn uniform() -> impl FnMut() -> f64 {
+        let mut k = 0;
+        move || {
+            k += 1;
+            f64::from(threefry2x32::<20>([k, 0], [5, 9])[0]) / 4_294_967_296.0
+        }
+    }
+
+    /// The counts agree with all pairs one by one, for any box, whether the search of the sweep applies or not.
+    #[test]
+    fn counts_are_those_of_single_pairs() {
+        let mut random = uniform();
+        let skew = Matrix3::new(7.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 4.0);
+        let along = |a, b, c| Matrix3::new(a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c);
+        let cases = [
+            (along(4.0, 4.0, 4.0), [true; 3], 3, 2.0, false),
+            (along(4.0, 4.0, 4.0), [true; 3], 3, 1.9999, true),
+            (along(9.0, 5.0, 4.0), [true; 3], 3, 0.9, true),
+            (along(9.0, 5.0, 4.0), [true, false, true], 3, 1.7, true),
+            (along(3.0, 4.0, 8.0), [false; 3], 3, 5.0, true),
+            (skew, [true; 3], 3, 1.5, true),
+            (skew, [true, true, false], 3, 1.5, false),
+            (along(12.0, 7.0, 1.0), [true, true, false], 2, 3.5, false),
+            (along(12.0, 7.0, 1.0), [true, true, false], 2, 3.4, true),
+            (along(6.0, 12.0, 1.0), [false, true, false], 2, 0.7, true),
+            (along(9e4, 4.0, 4.0), [true; 3], 3, 1.9, false),
+        ];
+        let (bins, species): (usize, Vec<i32>) = (11, (0..400).map(|k| k % 5 / 2).collect());
+        for (edges, periodic, dimensions, range, by_search) in cases {
+            let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
+            let mut place = || domain.point([0, 1, 2].map(|k| if k < dimensions { random() } else { 0.0 }));
+            let mut x: Vec<[f64; 3]> = (0..400).map(|_| place()).collect();
+            for nowhere in [false, true] {
+                if nowhere {
+                    x[17] = [f64::NAN; 3];
+                }
+                let mut expected = vec![0; 6 * bins];
+                for_each_pair(&x, &domain, dimensions, range, |p| {
+                    let (a, b) = (species[p.i].min(species[p.j]), species[p.i].max(species[p.j]));
+                    let kind = (a * 3 - a * (a + 1) / 2 + b) as usize;
+                    expected[bins * kind + ((p.r / range * bins as f64) as usize).min(bins - 1)] += 1;
+                });
+                assert!(domain.height(0) > 1e3 || expected.iter().sum::<u64>() > 400, "pairs to count");
+                for threads in [1, 3] {
+                    let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
+                    let found = count_in_shells(&pool, &x, &species, 3, (&domain, dimensions), range, bins);
+                    assert_eq!(found, expected, "{edges} {periodic:?}");
+                    let mut counts = Counts {
+                        kinds: 3,
+                        bins,
+                        per_length: bins as f64 / range,
+                        numbers: vec![0; 6 * bins],
+                    };
+                    let is_found = is_wide(&domain, dimensions, range)
+                        && counts.by_search(&pool, &x, &species, (&domain, dimensions), range);
+                    assert_eq!(is_found, by_search && !nowhere, "{edges} {periodic:?} {range}");
+                }
+            }
+        }
+    }
+
+    /// Pairs a billionth of a shell below and above the edge of each shell, in every direction, each alone in its part of the box: their
+    /// shells are known, and single precision does not tell them.
+    #[test]
+    fn pairs_at_edges_are_in_their_shell() {
+        let mut random = uniform();
+        let (bins, range) = (16, 1.0);
+        let domain = PeriodicBox::orthogonal([0.3, -7.0, 1.1], [30.0, 31.0, 29.0], [true; 3]).unwrap();
+        let (mut x, mut expected) = (Vec::new(), vec![0; bins]);
+        for place in 0..1000 {
+            let (shell, is_above) = (1 + place / 2 % 16, place % 2 == 1);
+            if shell < 16 || !is_above {
+                expected[shell - usize::from(!is_above)] += 1;
+            }
+            let r = (shell as f64 + if is_above { 1e-9 } else { -1e-9 }) / bins as f64 * range;
+            let (u, turn) = (random() * 2.0 - 1.0, std::f64::consts::TAU * random());
+            let flat = (1.0 - u * u).sqrt();
+            let at = [place % 10, place / 10 % 10, place / 100].map(|k| 2.9 * k as f64 + random() * 0.5);
+            x.push(at);
+            x.push([at[0] + r * flat * turn.cos(), at[1] + r * flat * turn.sin(), at[2] + r * u]);
+        }
+        let species = vec![0; x.len()];
+        let found =
+            count_in_shells(&Pool::new(NonZeroUsize::MIN), &x, &species, 1, (&domain, 3), range, bins);
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn nothing_makes_no_pairs() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
+        let alone = Pool::new(NonZeroUsize::MIN);
+        assert_eq!(count_in_shells(&alone, &[], &[], 1, (&domain, 3), 1.0, 2), [0, 0]);
+    }
+}
