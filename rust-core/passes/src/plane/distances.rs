@@ -21,7 +21,7 @@ pub struct Shells {
     pub error: f64,
 }
 
-/// Particles in the order of cells, and the shells. A position is `species · species + species` of a pair.
+/// Particles in the order of cells, of so many species, and the shells.
 #[derive(Clone, Copy)]
 pub struct DistanceInputs<'a> {
     pub cells: SortedCells<'a>,

@@ -1,13 +1,14 @@
 //! Histograms of the distances of particles.
 
+mod counts;
 mod windows;
 
 use super::sweep_pairs::is_wide;
 use crate::engine::particles::Particles;
 use crate::engine::sweep::{MARGIN, PairLists, Places, Pool};
+use counts::Counts;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::distances::Shells;
 
 /// Pairs in each of `bins` shells of equal thickness up to `range`, which is at most half the height of the box along any period:
 /// `bins` numbers for each species `a` of `kinds` and each `b` from `a` on, those of double precision. Particles without a finite
@@ -24,86 +25,46 @@ pub fn count_in_shells(
     range: f64,
     bins: usize,
 ) -> Vec<u64> {
-    let mut counts = Counts { kinds, bins, per_length: bins as f64 / range, numbers: Vec::new() };
-    counts.numbers.resize(counts.first_of(kinds, 0), 0);
-    let is_counted =
-        is_wide(domain, dimensions, range) && counts.by_search(pool, x, species, (domain, dimensions), range);
+    let mut counts = Counts::new(kinds, bins, range);
+    let is_counted = is_wide(domain, dimensions, range)
+        && by_search(&mut counts, InstructionSet::best(), pool, x, species, (domain, dimensions), range);
     if !is_counted {
         windows::count(&mut counts, pool, x, species, (domain, dimensions), range);
     }
     counts.numbers
 }
 
-/// Counts of the shells, for each species and each from it on.
-struct Counts {
-    kinds: usize,
-    bins: usize,
-    per_length: f64,
-    numbers: Vec<u64>,
-}
-
-impl Counts {
-    /// The first counter of species `a` and `b`, where `a` is not above `b`.
-    fn first_of(&self, a: usize, b: usize) -> usize {
-        // Species before `a` have kinds, kinds − 1, … rows.
-        (a * self.kinds - a * a.saturating_sub(1) / 2 + b - a.min(b)) * self.bins
-    }
-
-    /// Adds a pair at a distance, if it is in range.
-    fn add(&mut self, [a, b]: [usize; 2], r: f64) {
-        let shell = (r * self.per_length) as usize;
-        if shell < self.bins {
-            let first = self.first_of(a.min(b), a.max(b));
-            self.numbers[first + shell] += 1;
+/// Counts by the search of the sweep, and returns whether that was possible.
+fn by_search(
+    counts: &mut Counts,
+    set: InstructionSet,
+    pool: &Pool,
+    x: &[[f64; 3]],
+    species: &[i32],
+    (domain, dimensions): (&PeriodicBox, usize),
+    range: f64,
+) -> bool {
+    let Counts { kinds, bins, .. } = *counts;
+    let tags: Vec<i32> = (1..=x.len() as i32).collect();
+    let particles = Particles { x, tag: &tags, kind: species, owned: x.len() };
+    let all: Vec<i32> = (0..kinds as i32).collect();
+    let mut lists = PairLists::new(set, dimensions);
+    let Ok(shares) = lists.count(pool, domain, &particles, &all, [range, MARGIN], bins) else {
+        return false;
+    };
+    let places = Places::new(dimensions, domain, x, lists.order());
+    for share in shares {
+        counts.take(&share.numbers);
+        for pair in share.unsure {
+            let [a, b] = pair.map(|k| places.x(k));
+            let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
+            places.images.find_nearest(&mut d);
+            let [[x], [y], [z]] = d;
+            let kinds = pair.map(|k| species[places.host(k)] as usize);
+            counts.add(kinds, (x * x + y * y + z * z).sqrt());
         }
     }
-
-    /// Zeros for each species of the first particle and of the second, and each shell and what lies beyond them.
-    fn of_ordered_pairs(&self) -> Vec<u64> {
-        vec![0; self.kinds * self.kinds * (self.bins + 1)]
-    }
-
-    /// Adds such numbers.
-    fn take(&mut self, of_ordered_pairs: &[u64]) {
-        for (pair, numbers) in of_ordered_pairs.chunks_exact(self.bins + 1).enumerate() {
-            let [a, b] = [pair / self.kinds, pair % self.kinds];
-            let first = self.first_of(a.min(b), a.max(b));
-            self.numbers[first..].iter_mut().zip(&numbers[..self.bins]).for_each(|(sum, n)| *sum += n);
-        }
-    }
-
-    /// Counts by the search of the sweep, and returns whether that was possible.
-    fn by_search(
-        &mut self,
-        pool: &Pool,
-        x: &[[f64; 3]],
-        species: &[i32],
-        (domain, dimensions): (&PeriodicBox, usize),
-        range: f64,
-    ) -> bool {
-        let Counts { kinds, bins, per_length, .. } = *self;
-        let tags: Vec<i32> = (1..=x.len() as i32).collect();
-        let particles = Particles { x, tag: &tags, kind: species, owned: x.len() };
-        let all: Vec<i32> = (0..kinds as i32).collect();
-        let mut lists = PairLists::new(InstructionSet::best(), dimensions);
-        let shells = Shells { per_length, count: bins, error: 0.0 };
-        let Ok(shares) = lists.count(pool, domain, &particles, &all, [range, MARGIN], shells) else {
-            return false;
-        };
-        let places = Places::new(dimensions, domain, x, lists.order());
-        for share in shares {
-            self.take(&share.numbers);
-            for pair in share.unsure {
-                let [a, b] = pair.map(|k| places.x(k));
-                let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
-                places.images.find_nearest(&mut d);
-                let [[x], [y], [z]] = d;
-                let kinds = pair.map(|k| species[places.host(k)] as usize);
-                self.add(kinds, (x * x + y * y + z * z).sqrt());
-            }
-        }
-        true
-    }
+    true
 }
 
 #[cfg(test)]
@@ -112,6 +73,7 @@ mod tests {
     use crate::engine::pair_sums::for_each_pair;
     use nalgebra::Matrix3;
     use psidpd_passes::noise::threefry2x32;
+    use psidpd_passes::settings::Instructions;
     use std::num::NonZeroUsize;
 
     /// Uniform numbers, one after the other.
@@ -143,7 +105,7 @@ mod tests {
             (along(9e4, 4.0, 4.0), [true; 3], 3, 1.9, false),
         ];
         let (bins, species): (usize, Vec<i32>) = (11, (0..400).map(|k| k % 5 / 2).collect());
-        for (edges, periodic, dimensions, range, by_search) in cases {
+        for (edges, periodic, dimensions, range, searched) in cases {
             let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
             let mut place = || domain.point([0, 1, 2].map(|k| if k < dimensions { random() } else { 0.0 }));
             let mut x: Vec<[f64; 3]> = (0..400).map(|_| place()).collect();
@@ -162,15 +124,18 @@ mod tests {
                     let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
                     let found = count_in_shells(&pool, &x, &species, 3, (&domain, dimensions), range, bins);
                     assert_eq!(found, expected, "{edges} {periodic:?}");
-                    let mut counts = Counts {
-                        kinds: 3,
-                        bins,
-                        per_length: bins as f64 / range,
-                        numbers: vec![0; 6 * bins],
-                    };
-                    let is_found = is_wide(&domain, dimensions, range)
-                        && counts.by_search(&pool, &x, &species, (&domain, dimensions), range);
-                    assert_eq!(is_found, by_search && !nowhere, "{edges} {periodic:?} {range}");
+                    let sets =
+                        Instructions::ALL.map(|(_, set)| set).into_iter().filter_map(InstructionSet::new);
+                    for set in sets {
+                        let mut counts = Counts::new(3, bins, range);
+                        let is_found = is_wide(&domain, dimensions, range)
+                            && by_search(&mut counts, set, &pool, &x, &species, (&domain, dimensions), range);
+                        assert_eq!(is_found, searched && !nowhere, "{set:?} {edges} {periodic:?} {range}");
+                        assert!(
+                            !is_found || counts.numbers == expected,
+                            "{set:?} {edges} {periodic:?} {range}"
+                        );
+                    }
                 }
             }
         }

@@ -124,8 +124,8 @@ impl PairLists {
         Ok(is_long)
     }
 
-    /// Counts the pairs of `particles` in shells, and lists by sorted indices those of which single precision does not tell the shell:
-    /// by thread, with as many `species` as kinds. There are no ghosts.
+    /// Counts the pairs of `particles` in `bins` shells up to `range`, and lists by sorted indices those of which single precision does not
+    /// tell the shell: by thread, with as many `species` as kinds. There are no ghosts.
     ///
     /// # Errors
     /// Fails as [`PairLists::find`], and where the box is too long for single precision.
@@ -136,18 +136,19 @@ impl PairLists {
         particles: &Particles,
         species: &[i32],
         [range, margin]: [f64; 2],
-        shells: Shells,
+        bins: usize,
     ) -> Result<Vec<ShellCounts>, EngineError> {
         let input = Input { particles: *particles, species_of_type: species, ..Input::default() };
         let (_, is_long) = self.sort(pool, domain, &input, [range, margin])?;
         // A unit of 2⁻³² of the region, and sixteen of the last digit.
-        let error = shells.per_length * (self.cells.geometry.extent() / 4_294_967_296.0 + 1e-6 * range);
+        let per_length = bins as f64 / range;
+        let error = per_length * (self.cells.geometry.extent() / 4_294_967_296.0 + 1e-6 * range);
         if is_long || error > 0.25 {
             return Err(FAR_APART);
         }
         self.fill(pool, &input, species.len() > 1);
         let (set, cells, shared) = (self.set, &self.cells, self.particles.share());
-        let shells = Shells { error, ..shells };
+        let shells = Shells { per_length, count: bins, error };
         let inputs = &DistanceInputs {
             cells: sorted_cells(set, cells, &shared),
             packed: shared.packed,

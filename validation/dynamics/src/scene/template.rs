@@ -43,6 +43,8 @@ pub const TEMPLATES: &[Template] = &[
 pub enum TemplateError {
     #[error("{} already exists: choose another name, or replace it with --overwrite", .0.display())]
     Exists(PathBuf),
+    #[error("{} names no file: give the scene a name, as drop.toml", .0.display())]
+    NoName(PathBuf),
     #[error("{} cannot be written: {}", .0.path.display(), .0.cause)]
     Output(#[from] PathError),
 }
@@ -51,9 +53,10 @@ impl Template {
     /// Writes the scene to `path`, with `.toml` if the path has no extension, and its model beside it, unless
     /// the same model is there. Nothing is overwritten. Returns the paths of the scene and of the model.
     pub fn write(&self, path: &Path, existing: Existing) -> Result<[PathBuf; 2], TemplateError> {
+        let name = path.file_name().ok_or_else(|| TemplateError::NoName(path.to_owned()))?;
         let scene = match path.extension() {
             Some(extension) if extension == "toml" => path.to_owned(),
-            _ => PathBuf::from([path.as_os_str(), ".toml".as_ref()].join(OsStr::new(""))),
+            _ => path.with_file_name([name, ".toml".as_ref()].join(OsStr::new(""))),
         };
         let model = scene.with_file_name(self.model_name);
         let keep = existing == Existing::Keep;
@@ -102,6 +105,18 @@ mod tests {
             assert_eq!(read.model_path, model);
             assert!(template.scene.starts_with("# "));
         }
+    }
+
+    /// A folder's name is that of a file beside it.
+    #[test]
+    fn scenes_have_a_name() {
+        let folder = tempfile::tempdir().unwrap();
+        for path in ["", ".", "..", "/", "deep/.."] {
+            let refused = TEMPLATES[0].write(Path::new(path), Existing::Keep);
+            assert!(matches!(refused, Err(TemplateError::NoName(_))), "{path:?}: {refused:?}");
+        }
+        let [scene, _] = TEMPLATES[0].write(&folder.path().join("drops/"), Existing::Keep).unwrap();
+        assert_eq!(scene, folder.path().join("drops.toml"));
     }
 
     #[test]

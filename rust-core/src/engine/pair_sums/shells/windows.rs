@@ -1,6 +1,6 @@
 //! Counts pairs in boxes of any kind: particles are sorted along the widest direction, and each is compared with those in range along it.
 
-use super::Counts;
+use super::counts::Counts;
 use crate::engine::sweep::{Images, Places, Pool};
 use crate::engine::vectors::{Loop, run_best};
 use psidpd_passes::domain::PeriodicBox;
