@@ -57,11 +57,8 @@ fn by_search(
         counts.take(&share.numbers);
         for pair in share.unsure {
             let [a, b] = pair.map(|k| places.x(k));
-            let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
-            places.images.find_nearest(&mut d);
-            let [[x], [y], [z]] = d;
             let kinds = pair.map(|k| species[places.host(k)] as usize);
-            counts.add(kinds, (x * x + y * y + z * z).sqrt());
+            counts.add(kinds, places.distance(a, b));
         }
     }
     true
@@ -124,6 +121,9 @@ mod tests {
                     let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
                     let found = count_in_shells(&pool, &x, &species, 3, (&domain, dimensions), range, bins);
                     assert_eq!(found, expected, "{edges} {periodic:?}");
+                    let mut counts = Counts::new(3, bins, range);
+                    windows::count(&mut counts, &pool, &x, &species, (&domain, dimensions), range);
+                    assert_eq!(counts.numbers, expected, "{edges} {periodic:?}");
                     let sets =
                         Instructions::ALL.map(|(_, set)| set).into_iter().filter_map(InstructionSet::new);
                     for set in sets {
@@ -162,9 +162,11 @@ mod tests {
             x.push([at[0] + r * flat * turn.cos(), at[1] + r * flat * turn.sin(), at[2] + r * u]);
         }
         let species = vec![0; x.len()];
-        let found =
-            count_in_shells(&Pool::new(NonZeroUsize::MIN), &x, &species, 1, (&domain, 3), range, bins);
-        assert_eq!(found, expected);
+        let alone = Pool::new(NonZeroUsize::MIN);
+        assert_eq!(count_in_shells(&alone, &x, &species, 1, (&domain, 3), range, bins), expected);
+        let mut counts = Counts::new(1, bins, range);
+        windows::count(&mut counts, &alone, &x, &species, (&domain, 3), range);
+        assert_eq!(counts.numbers, expected);
     }
 
     #[test]

@@ -52,6 +52,13 @@ impl Places<'_> {
         [x, y, if self.dimensions > 2 { z } else { 0.0 }]
     }
 
+    /// The distance of the nearest images of two positions, within half a height of the box.
+    pub fn distance(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
+        let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
+        self.images.find_nearest(&mut d);
+        d.iter().flatten().map(|d| d * d).sum::<f64>().sqrt()
+    }
+
     /// The host's index of a sorted particle.
     #[inline(always)]
     pub fn host(&self, k: usize) -> usize {
