@@ -337,6 +337,17 @@ mod tests {
         assert_eq!(whole, parts);
     }
 
+    /// Blocks are powers of two, of no more samples than there can be.
+    #[test]
+    fn what_is_no_series_is_not_read() {
+        let read = |block: u64| {
+            let mut series = serde_json::to_value(Series::new(1)).unwrap();
+            series["block"] = block.into();
+            serde_json::from_value::<Series>(series).is_ok()
+        };
+        assert_eq!([1, 2, 3, 4, 1 << 63].map(read), [true, true, false, true, false]);
+    }
+
     /// Mean, ratio and jackknife of 400 correlated series of 8000 samples each with a correlation time of ten. The errors
     /// agree with theory within 10 % on average. Intervals of two errors contain the true value in 95 % of the series:
     /// 380 ± 4.4; the limit 355 is more than five deviations below. The seed is fixed.

@@ -263,6 +263,9 @@ mod tests {
             let found = difference(&of(point, 1.0, n), &of(0.0, 1e-9, 1000));
             assert!((found.p_value - 0.05).abs() < 1e-4, "{n}: {found:?}");
         }
+        // Errors of 1 and 2 from 4 and 11 samples: 1/ν = (1/5)²/3 + (4/5)²/10, ν = 12.93.
+        let found = difference(&of(2.1616 * 5f64.sqrt(), 1.0, 4), &of(0.0, 2.0, 11));
+        assert!((found.p_value - 0.05).abs() < 2e-4, "{found:?}");
         // Samples that hang together count as so many fewer.
         let slow = Estimate { tau: 2.5, ..of(2.571, 1.0, 30) };
         assert!((difference(&slow, &of(0.0, 1e-9, 1000)).p_value - 0.05).abs() < 1e-4);
