@@ -82,6 +82,7 @@ def cargo_test(crate, *arguments, timeout=None):
 
 
 def passes(crate, run, without):
+    """Whether the tests of a crate pass; one that does not end fails."""
     names = ["--", *run, *(word for name in without for word in ("--skip", name))]
     return cargo_test(crate, *names, timeout=120) == 0
 

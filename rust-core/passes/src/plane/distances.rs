@@ -17,7 +17,7 @@ pub struct Shells {
     /// The number of shells in a unit of length.
     pub per_length: f64,
     pub count: usize,
-    /// In shells, how far off a distance in single precision may be.
+    /// In shells, how far off a distance in single precision may be; less than half a shell.
     pub error: f64,
 }
 
@@ -116,12 +116,12 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Counter<'_, I, MULTIS
             let per_length = I::F32::constant(shells.per_length);
             let half = I::F32::constant(0.5);
             let beyond = I::F32::constant(shells.count as f64);
-            // Squares, as there is no absolute value. Where nothing is sure, nothing is below.
-            let sure = I::F32::constant((0.5 - shells.error).max(0.0).powi(2));
+            // Squares, as there is no absolute value.
+            let sure = I::F32::constant((0.5 - shells.error).powi(2));
             let mut k = 0;
             while k < batch.count {
                 let PairsAt { geometry, species_pair, .. } = computed.at(k);
-                let place = (geometry.r * per_length - half).smaller(beyond);
+                let place = (geometry.r * per_length - half).larger(I::F32::constant(0.0)).smaller(beyond);
                 // Whichever is chosen between two shells, such a pair is unsure.
                 let nearest = place.round();
                 let off = place - nearest;

@@ -55,10 +55,9 @@ fn by_search(
     let places = Places::new(dimensions, domain, x, lists.order());
     for share in shares {
         counts.take(&share.numbers);
-        for pair in share.unsure {
-            let [a, b] = pair.map(|k| places.x(k));
-            let kinds = pair.map(|k| species[places.host(k)] as usize);
-            counts.add(kinds, places.distance(a, b));
+        for [i, j] in share.unsure {
+            let kinds = [i, j].map(|k| species[places.host(k)] as usize);
+            counts.add(kinds, places.distance(i, j));
         }
     }
     true
@@ -106,10 +105,14 @@ mod tests {
             let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
             let mut place = || domain.point([0, 1, 2].map(|k| if k < dimensions { random() } else { 0.0 }));
             let mut x: Vec<[f64; 3]> = (0..400).map(|_| place()).collect();
-            for nowhere in [false, true] {
-                if nowhere {
-                    x[17] = [f64::NAN; 3];
+            // Two at one place.
+            x[5] = x[4];
+            let is_open = periodic == [false; 3];
+            for (changed, nowhere) in [(x[17], false), ([f64::NAN; 3], true), ([3e10; 3], true)] {
+                if changed[0] > 1e9 && !is_open {
+                    continue;
                 }
+                x[17] = changed;
                 let mut expected = vec![0; 6 * bins];
                 for_each_pair(&x, &domain, dimensions, range, |p| {
                     let (a, b) = (species[p.i].min(species[p.j]), species[p.i].max(species[p.j]));
@@ -167,6 +170,16 @@ mod tests {
         let mut counts = Counts::new(1, bins, range);
         windows::count(&mut counts, &alone, &x, &species, (&domain, 3), range);
         assert_eq!(counts.numbers, expected);
+    }
+
+    /// A particle so far away in an open box that single precision has a unit of 1.5 there: a pair near the range is found all the same.
+    #[test]
+    fn far_particles_hide_no_pair() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [10.0, 9.0, 8.0], [false; 3]).unwrap();
+        // At a distance of 4.9797, where 1.34 counts as a unit.
+        let x = [[-3e9, 0.0, 0.0], [0.0; 3], [1.34, 0.0, 4.796]];
+        let found = count_in_shells(&Pool::new(NonZeroUsize::MIN), &x, &[0; 3], 1, (&domain, 3), 5.0, 1000);
+        assert_eq!((found[995], found.iter().sum::<u64>()), (1, 1));
     }
 
     #[test]

@@ -140,9 +140,9 @@ impl PairLists {
     ) -> Result<Vec<ShellCounts>, EngineError> {
         let input = Input { particles: *particles, species_of_type: species, ..Input::default() };
         let (_, is_long) = self.sort(pool, domain, &input, [range, margin])?;
-        // A unit of 2⁻³² of the region, and sixteen of the last digit.
+        // Rounding of both positions, and sixteen units in the last digit of a distance.
         let per_length = bins as f64 / range;
-        let error = per_length * (self.cells.geometry.extent() / 4_294_967_296.0 + 1e-6 * range);
+        let error = per_length * (self.cells.geometry.extent() * UNITS_OF_MARGIN + 1e-6 * range);
         if is_long || error > 0.25 {
             return Err(FAR_APART);
         }

@@ -52,8 +52,9 @@ impl Places<'_> {
         [x, y, if self.dimensions > 2 { z } else { 0.0 }]
     }
 
-    /// The distance of the nearest images of two positions, within half a height of the box.
-    pub fn distance(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
+    /// The distance of the nearest images of two sorted particles, where that is below half a height of the box.
+    pub fn distance(&self, i: usize, j: usize) -> f64 {
+        let (a, b) = (self.x(i), self.x(j));
         let mut d = [0, 1, 2].map(|c| [a[c] - b[c]]);
         self.images.find_nearest(&mut d);
         d.iter().flatten().map(|d| d * d).sum::<f64>().sqrt()

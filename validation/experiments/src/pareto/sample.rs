@@ -193,3 +193,16 @@ impl<'a> Sampler<'a> {
         Ok(Made { quantities, samples: self.sampled.samples(), time: self.time })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Five times the temperature is as far as a run may be, and what is no number is too far.
+    #[test]
+    fn hot_runs_are_given_up() {
+        assert!([0.0, 1.0, 4.99].into_iter().all(|ratio| far_off(ratio).is_none()));
+        assert!([5.01, f64::INFINITY, f64::NAN].into_iter().all(|ratio| far_off(ratio).is_some()));
+        assert_eq!(far_off(7.26).unwrap(), "the temperature is 7.3 kT");
+    }
+}

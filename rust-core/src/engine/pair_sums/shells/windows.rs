@@ -42,7 +42,8 @@ pub fn count(
     let height = |k: &usize| domain.height(*k);
     let along =
         (0..dimensions).max_by(|a, b| height(a).total_cmp(&height(b))).expect("two or three directions");
-    let s = |k: u32| domain.fraction(x[k as usize]);
+    let fractions: Vec<[f64; 3]> = x.iter().map(|x| domain.fraction(*x)).collect();
+    let s = |k: u32| fractions[k as usize];
     let mut order: Vec<u32> =
         (0..x.len() as u32).filter(|k| x[*k as usize].iter().all(|c| c.is_finite())).collect();
     order.sort_unstable_by(|a, b| s(*a)[along].total_cmp(&s(*b)[along]));
@@ -106,10 +107,10 @@ impl Sorted<'_> {
 
     /// Distances of a vector of particles, in shells, and at most `last`.
     #[inline(always)]
-    fn places(&self, i: usize, from: usize, per_length: f32, last: f32) -> [f32; LANES] {
+    fn distances(&self, i: usize, from: usize, per_length: f32, last: f32) -> [f32; LANES] {
         let ([u, v, w], [a, b, c]) = (&self.u, &self.units);
         let (of_u, of_v, of_w) = (&u[from..from + LANES], &v[from..from + LANES], &w[from..from + LANES]);
-        let mut places = [0.0; LANES];
+        let mut distances = [0.0; LANES];
         for k in 0..LANES {
             let p = of_u[k].wrapping_sub(u[i]) as i32 as f32;
             let q = of_v[k].wrapping_sub(v[i]) as i32 as f32;
@@ -117,17 +118,10 @@ impl Sorted<'_> {
             let x = p * a[0] + q * b[0] + r * c[0];
             let y = p * a[1] + q * b[1] + r * c[1];
             let z = p * a[2] + q * b[2] + r * c[2];
-            let place = (x * x + y * y + z * z).sqrt() * per_length;
-            places[k] = if place < last { place } else { last };
+            let distance = (x * x + y * y + z * z).sqrt() * per_length;
+            distances[k] = if distance < last { distance } else { last };
         }
-        places
-    }
-
-    /// The distance of two particles in double precision.
-    #[cold]
-    fn distance(&self, i: usize, j: usize) -> f64 {
-        let [a, b] = [i, j].map(|k| self.places.x(k));
-        self.places.distance(a, b)
+        distances
     }
 }
 
@@ -139,22 +133,24 @@ impl Loop for CountWindows<'_> {
         let CountWindows { sorted, shells, first, step, numbers } = self;
         let Counts { kinds, bins, per_length, .. } = shells;
         let (width, last, sure) = (bins + 1, *bins as f32 + 1.0, sorted.sure);
+        // Single precision may be off by more than a shell where particles are far apart.
+        let all_unsure = sure < 0.0;
         for i in (first..sorted.s.len()).step_by(step) {
             let of_i = &mut numbers[sorted.species[i] * kinds * width..][..kinds * width];
             for window in sorted.windows(i) {
                 for from in window.clone().step_by(LANES) {
-                    let places = sorted.places(i, from, *per_length as f32, last);
-                    let (mut shell, mut unsure) = ([0; LANES], false);
+                    let distances = sorted.distances(i, from, *per_length as f32, last);
+                    let (mut shell, mut unsure) = ([0; LANES], all_unsure);
                     for k in 0..LANES {
-                        // SAFETY: places are from 0 to `last`, and not NaN.
-                        let number: i32 = unsafe { places[k].to_int_unchecked() };
-                        unsure |= ((places[k] - number as f32 - 0.5).abs() > sure) & (places[k] < last);
+                        // SAFETY: distances are from 0 to `last`, and not NaN.
+                        let number: i32 = unsafe { distances[k].to_int_unchecked() };
+                        unsure |= ((distances[k] - number as f32 - 0.5).abs() > sure) & (distances[k] < last);
                         shell[k] = number;
                     }
                     for k in 0..LANES.min(window.end - from) {
                         let mut number = shell[k] as usize;
-                        if unsure && (places[k] - number as f32 - 0.5).abs() > sure {
-                            number = (sorted.distance(i, from + k) * per_length) as usize;
+                        if unsure && (distances[k] - number as f32 - 0.5).abs() > sure {
+                            number = (sorted.places.distance(i, from + k) * per_length) as usize;
                         }
                         of_i[sorted.species[from + k] * width + number.min(*bins)] += 1;
                     }
