@@ -198,7 +198,7 @@ impl<'a> Sampler<'a> {
 mod tests {
     use super::*;
 
-    /// Five times the temperature is as far as a run may be, and what is no number is too far.
+    /// Five times the temperature is as far as a run may be, and NaN is too far.
     #[test]
     fn hot_runs_are_given_up() {
         assert!([0.0, 1.0, 4.99].into_iter().all(|ratio| far_off(ratio).is_none()));
