@@ -1,5 +1,6 @@
 use crate::checkpoint::Written;
 use psidpd_formats::files::{PathError, create_inside, open_inside_to_write};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// A file that grows during a run. It records what was written to it, buffered bytes included, so that a
 /// checkpoint can state which part belongs to the completed steps.
 pub(super) struct GrowingFile {
-    pub name: &'static str,
+    name: &'static str,
     path: PathBuf,
     out: BufWriter<File>,
     pub written: Written,
@@ -20,8 +21,13 @@ impl GrowingFile {
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written: Written::default() })
     }
 
-    /// Opens the file of a resumed run and truncates it to the bytes that were `written` at the checkpoint.
-    pub fn reopen(folder: &Path, name: &'static str, written: Written) -> Result<GrowingFile, PathError> {
+    /// Opens the file of a resumed run and truncates it to the bytes that were written at the checkpoint; `None` if it has no record.
+    pub fn reopen(
+        folder: &Path,
+        name: &'static str,
+        records: &BTreeMap<String, Written>,
+    ) -> Result<Option<GrowingFile>, PathError> {
+        let Some(written) = records.get(name).copied() else { return Ok(None) };
         let path = folder.join(name);
         let open = || {
             let mut file = open_inside_to_write(&path)?;
@@ -30,7 +36,12 @@ impl GrowingFile {
             Ok(file)
         };
         let file = open().map_err(PathError::at("write", &path))?;
-        Ok(GrowingFile { name, path, out: BufWriter::new(file), written })
+        Ok(Some(GrowingFile { name, path, out: BufWriter::new(file), written }))
+    }
+
+    /// Its name, and what is written of it.
+    pub fn record(&self) -> (String, Written) {
+        (self.name.to_owned(), self.written)
     }
 
     /// Calls `write`; an error names the file.

@@ -11,6 +11,7 @@ mod bounds;
 mod checkpoints;
 mod error;
 mod folder;
+mod frames;
 mod growing;
 mod integrator;
 mod length;

@@ -1,29 +1,25 @@
 //! The files of a run in its folder, except checkpoints and `timing.json`.
 
+use super::frames::{DUMP, Frames, GSD, XYZ};
 use super::growing::GrowingFile;
 use super::thermo::HEADER;
 use super::{RunError, Thermo, Timing};
 use crate::checkpoint::{Checkpoint, ROWS as THERMO, Store, Written};
-use crate::scene::{Scene, every};
-use psidpd_formats::dump::write_dump;
+use crate::scene::Scene;
+use psidpd_formats::About;
 use psidpd_formats::files::{
     PathError, folder_inside, is_empty_or_missing, is_protected, names_inside, read_json_if_there,
     remove_all, remove_folder_if_empty, remove_if_there, replace_inside, there,
 };
-use psidpd_formats::{About, Frame, GsdFile, write_xyz};
 use psidpd_observe::Observation;
 use psidpd_pictures::snapshot::SNAPSHOTS;
-use psidpd_pictures::{VTK, remove_snapshots, remove_vtk, snapshots, vtk_files, write_snapshot, write_vtk};
+use psidpd_pictures::{VTK, remove_snapshots, remove_vtk, snapshots, vtk_files};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
-
-const DUMP: &str = "dump.lammpstrj";
-const XYZ: &str = "trajectory.xyz";
-const GSD: &str = "trajectory.gsd";
 
 /// Files of a run that a scene or a user may use as input.
 pub const FILES: [&str; 6] = [THERMO, DUMP, XYZ, GSD, "final.data", "last-good.data"];
@@ -69,10 +65,9 @@ const OBSERVABLES: &str = "observables.json";
 const TABLES: &str = "observables";
 
 pub(super) struct Output {
-    thermo: Option<GrowingFile>,
-    dump: Option<GrowingFile>,
-    xyz: Option<GrowingFile>,
-    gsd: Option<(PathBuf, GsdFile)>,
+    rows: Option<GrowingFile>,
+    noted: Option<Written>,
+    frames: Frames,
 }
 
 impl Output {
@@ -84,12 +79,10 @@ impl Output {
         remove_snapshots(folder)?;
         remove_vtk(folder)?;
         super::about::about(scene).write(folder)?;
-        let create = |every: u64, name| (every > 0).then(|| GrowingFile::create(folder, name)).transpose();
-        let mut thermo = create(scene.output.thermo, THERMO)?;
-        thermo.iter_mut().try_for_each(|file| file.line(HEADER))?;
-        let (dump, xyz) = (create(scene.output.dump, DUMP)?, create(scene.output.xyz, XYZ)?);
-        let gsd = open_gsd(scene, folder, |path, every| GsdFile::create(path, frames(scene, every)))?;
-        Ok(Output { thermo, dump, xyz, gsd })
+        let rows = scene.output.thermo > 0;
+        let mut rows = rows.then(|| GrowingFile::create(folder, THERMO)).transpose()?;
+        rows.iter_mut().try_for_each(|file| file.line(HEADER))?;
+        Ok(Output::of(rows, Frames::create(scene, folder)?))
     }
 
     /// Opens the files of a resumed run and truncates them to what was written at its checkpoint; the scene may have more steps than
@@ -97,87 +90,45 @@ impl Output {
     pub fn reopen(scene: &Scene, folder: &Path, checkpoint: &Checkpoint) -> Result<Output, RunError> {
         remove_tables(folder)?;
         remove_all(folder, &LAST)?;
-        let reopen = |name| {
-            let written = checkpoint.files.get(name);
-            written.map(|written| GrowingFile::reopen(folder, name, *written)).transpose()
-        };
-        let (thermo, dump, xyz) = (reopen(THERMO)?, reopen(DUMP)?, reopen(XYZ)?);
-        let Checkpoint { step, position, .. } = *checkpoint;
-        // Frames begin with the initial state, once its forces are known.
-        let begun = step > 0 || position.entered;
-        let gsd = open_gsd(scene, folder, |path, every| {
-            GsdFile::reopen(path, if begun { 1 + step / every } else { 0 }, frames(scene, every))
-        })?;
-        Ok(Output { thermo, dump, xyz, gsd })
+        let rows = GrowingFile::reopen(folder, THERMO, &checkpoint.files)?;
+        Ok(Output::of(rows, Frames::reopen(scene, folder, checkpoint)?))
+    }
+
+    fn of(rows: Option<GrowingFile>, frames: Frames) -> Output {
+        let mut output = Output { rows, noted: None, frames };
+        output.note();
+        output
     }
 
     /// Writes a row of totals if one is due, and returns whether it was.
     pub fn row(&mut self, thermo: &Thermo) -> Result<bool, PathError> {
-        let Some(file) = &mut self.thermo else { return Ok(false) };
+        let Some(file) = &mut self.rows else { return Ok(false) };
         file.line(&thermo.line()).map(|()| true)
     }
 
-    /// Writes the particles to the files that are due after a step.
-    pub fn particles(&mut self, scene: &Scene, folder: &Path, frame: &Frame) -> Result<(), RunError> {
-        let (step, intervals) = (frame.step, &scene.output);
-        if let Some(file) = self.dump.as_mut().filter(|_| every(intervals.dump, step)) {
-            file.attempt(|file| write_dump(frame, file))?;
-        }
-        if let Some(file) = self.xyz.as_mut().filter(|_| every(intervals.xyz, step)) {
-            file.attempt(|file| write_xyz(frame, file))?;
-        }
-        if let Some((path, file)) = self.gsd.as_mut().filter(|_| every(intervals.gsd, step)) {
-            file.write(frame, &scene.mass).map_err(PathError::at("write", path))?;
-        }
-        if every(intervals.vtk, step) {
-            let kernel = scene.model.at(scene.kt)?.densities.first().map(|d| d.kernel);
-            write_vtk(folder, frame, kernel)?;
-        }
-        if every(intervals.snapshot, step) {
-            write_snapshot(folder, frame)?;
-        }
-        Ok(())
+    /// The files with all particles.
+    pub fn frames(&mut self) -> &mut Frames {
+        &mut self.frames
     }
 
     /// The record of the file of rows.
     pub fn rows(&self) -> Option<Written> {
-        self.thermo.as_ref().map(|file| file.written)
+        self.rows.as_ref().map(|file| file.written)
     }
 
-    /// The record of each file that grows at its end alone.
-    pub fn written(&mut self) -> BTreeMap<String, Written> {
-        self.files().map(|file| (file.name.to_owned(), file.written)).collect()
+    /// Notes what is written of each file that grows at its end alone, for a checkpoint of this step.
+    pub fn note(&mut self) {
+        self.noted = self.rows();
+        self.frames.note();
     }
 
-    pub fn sync(&mut self) -> Result<(), PathError> {
-        if let Some((path, file)) = &self.gsd {
-            file.sync().map_err(PathError::at("write", path))?;
-        }
-        self.files().try_for_each(|file| file.sync())
+    /// Syncs all files to the disk, and returns what was noted last.
+    pub fn sync(&mut self) -> Result<BTreeMap<String, Written>, RunError> {
+        self.rows.iter_mut().try_for_each(GrowingFile::sync)?;
+        let mut files = self.frames.sync()?;
+        files.extend(self.noted.map(|rows| (THERMO.to_owned(), rows)));
+        Ok(files)
     }
-
-    fn files(&mut self) -> impl Iterator<Item = &mut GrowingFile> {
-        [&mut self.thermo, &mut self.dump, &mut self.xyz].into_iter().flatten()
-    }
-}
-
-/// The number of frames of a run at an interval.
-fn frames(scene: &Scene, every: u64) -> u64 {
-    1 + scene.steps() / every
-}
-
-fn open_gsd(
-    scene: &Scene,
-    folder: &Path,
-    open: impl FnOnce(&Path, u64) -> io::Result<GsdFile>,
-) -> Result<Option<(PathBuf, GsdFile)>, PathError> {
-    let every = scene.output.gsd;
-    if every == 0 {
-        return Ok(None);
-    }
-    let path = folder.join(GSD);
-    let file = open(&path, every).map_err(PathError::at("write", &path))?;
-    Ok(Some((path, file)))
 }
 
 /// Writes `observables.json` and the tables in `observables/`, if there are any observations, and syncs them to the disk.

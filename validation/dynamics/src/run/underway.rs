@@ -6,7 +6,7 @@ use super::watch::{Deviation, Thermometer, Watch, interval_of_looks};
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
 use crate::scene::{Stage, every};
-use psidpd_core::engine::Want;
+use psidpd_core::engine::{Want, processors};
 use psidpd_formats::DataFile;
 use psidpd_formats::files::{PathError, draft_inside};
 use std::path::PathBuf;
@@ -148,9 +148,9 @@ impl Runner<'_> {
             }
             if self.scene.output.writes_particles(step) {
                 let simulation = self.course.whole()?;
-                let state = simulation.state().by_tag();
-                let frame = simulation.frame(&state, self.position.time);
-                output.particles(self.scene, &self.folder.path, &frame)?;
+                // The threads of a run wait for each other: one that shares its processor with the output holds up all.
+                let beside = simulation.settings().threads.get() < processors();
+                output.frames().write(step, self.position.time, simulation.state().by_tag(), beside)?;
             }
         }
         // Totals alone do not bring the particles from a device.
@@ -205,9 +205,7 @@ impl Runner<'_> {
         good.max_move = simulation.max_move();
         good.out_of_bounds = simulation.out_of_bounds();
         good.observers = self.observers.to_bytes();
-        if let Some(output) = &mut self.output {
-            good.files = output.written();
-        }
+        self.output.iter_mut().for_each(Output::note);
         Ok(())
     }
 
@@ -219,7 +217,7 @@ impl Runner<'_> {
     fn store_good(&mut self) -> Result<(), RunError> {
         // A checkpoint records the contents of the files, so they are synced first.
         if let Some(output) = &mut self.output {
-            output.sync()?;
+            self.checkpoints.good.files = output.sync()?;
         }
         self.checkpoints.write()?;
         let step = self.checkpoints.good.step;
@@ -257,6 +255,7 @@ impl Runner<'_> {
 
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
+        self.output.iter_mut().try_for_each(|output| output.frames().wait())?;
         self.write_good("final.data")?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary()?;

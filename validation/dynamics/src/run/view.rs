@@ -1,7 +1,6 @@
-//! Views of a simulation for observables and files.
+//! Views of a simulation for observables.
 
 use super::{Simulation, State};
-use psidpd_formats::Frame;
 use psidpd_observe::frame::View;
 
 impl Simulation {
@@ -29,22 +28,6 @@ impl Simulation {
             pressure: self.pressure_tensor(),
             conservative_pressure: self.conservative_pressure_tensor(),
             flux: self.flux(),
-        }
-    }
-
-    /// The present step for files and pictures, with its particles in the order of `state`; `time` is measured from the
-    /// start of the run.
-    pub(super) fn frame<'a>(&'a self, state: &'a State, time: f64) -> Frame<'a> {
-        Frame {
-            step: self.step_number(),
-            time,
-            dimensions: self.dimensions(),
-            domain: &state.domain,
-            names: self.model().species(),
-            x: &state.x,
-            v: Some(&state.v),
-            species: &state.species,
-            tag: &state.tag,
         }
     }
 }
