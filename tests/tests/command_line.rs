@@ -174,6 +174,42 @@ fn a_run_has_a_report_and_pictures() {
 }
 
 /// Each row has a fault and a part of the program's message; all exit with code 2.
+/// Runs of one scene from different seeds do not differ; a warmer one does, in its temperature too. What only one run has is said.
+#[test]
+fn two_runs_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let observe = "[observe]\nevery = 2\ntemperature = true\nrdf = true\n";
+    let path = write(folder.path(), "scene.toml", &scene(observe));
+    let run = |out: &str, set: &[&str]| {
+        let set = ["stage.run.steps=800"].iter().chain(set).flat_map(|set| ["--set", set]);
+        let words: Vec<&str> = ["run", &path, "--out", out].into_iter().chain(set).collect();
+        let output = psidpd(folder.path(), &words);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    };
+    run("a", &[]);
+    run("b", &["seed=4"]);
+    run("warm", &["kT=1.3"]);
+    let compare = |first: &str, second: &str| {
+        let output = psidpd(folder.path(), &["report", first, "--against", second]);
+        (output.status.code(), said(&output))
+    };
+    let (code, words) = compare("a", "b");
+    assert!(words.contains("rdf at r = ") && words.contains("temperature: kinetic"), "{words}");
+    assert!(words.contains("no difference: "), "{words}");
+    assert_eq!(code, Some(0), "{words}");
+    let (code, words) = compare("a", "warm");
+    assert_eq!(code, Some(1), "{words}");
+    let warm = words.lines().find(|line| line.starts_with("temperature: kinetic")).unwrap();
+    assert!(warm.ends_with("differs"), "{words}");
+    let bare = write(folder.path(), "bare.toml", &scene(""));
+    let output = psidpd(folder.path(), &["run", &bare, "--out", "bare"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let (_, words) = compare("a", "bare");
+    assert!(words.contains("not compared: rdf in run: only the first run has it"), "{words}");
+    let (code, words) = compare("a", "nowhere");
+    assert!(code == Some(2) && words.contains("nowhere"), "{code:?} {words}");
+}
+
 #[test]
 fn bad_input_is_named_with_file_line_and_key() {
     let folder = tempfile::tempdir().unwrap();

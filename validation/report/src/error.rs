@@ -1,3 +1,4 @@
+use psidpd_formats::FormatError;
 use psidpd_formats::files::PathError;
 use std::path::PathBuf;
 
@@ -9,6 +10,8 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
     #[error(transparent)]
     Write(#[from] PathError),
+    #[error(transparent)]
+    Read(#[from] FormatError),
     #[error("{} is not the folder of a run: it has none of the files {files}", folder.display())]
     NoRun { folder: PathBuf, files: String },
 }

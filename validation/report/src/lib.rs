@@ -22,7 +22,7 @@ pub use html::{Item, Report, Section};
 pub use plot::{Plot, Series, Style};
 pub use progress::{Bar, Overall, Progress, to_stderr};
 pub use results::{Check, Results};
-pub use run::{Headline, HeadlineValue, headline, run_report, write_run_report};
+pub use run::{Against, FALSE_ALARM, Headline, HeadlineValue, headline, run_report, write_run_report};
 pub use table::{Align, Table};
 pub use text::{named, typeset};
 

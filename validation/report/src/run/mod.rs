@@ -3,6 +3,7 @@
 //! A folder may lack any of the files: a run that was stopped has no `summary.json`, a scene without `[output]` has no dump.
 //! The page then says what is missing.
 
+mod against;
 mod facts;
 mod headline;
 mod observables;
@@ -17,6 +18,7 @@ use psidpd_observe::Observation;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+pub use against::{Against, FALSE_ALARM};
 pub use headline::{Headline, HeadlineValue, headline};
 pub use series::Table as SeriesTable;
 
