@@ -66,7 +66,7 @@ fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
     let mut rounds = faces(&frame.evaluator.fluid.walls, frame.view.domain, frame.view.dimensions);
     rounds.retain(|wall| matches!(wall.place, Place::Round { .. }));
-    for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
+    for (k, (f, l)) in evaluation.forces(frame.view.pool).iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
             let (w, gradient) = weight(frame, &rounds, range, frame.view.x[k]);
             let across: f64 = gradient.iter().zip(f).map(|(g, f)| g * f).sum();

@@ -8,7 +8,9 @@
 //! The random force transfers momentum too, but is left out: it does not depend on the positions, so its mean contribution
 //! is 0.
 
-use psidpd_core::engine::pair_sums::COMPONENTS;
+use psidpd_core::engine::pair_sums::{COMPONENTS, PAIR_BLOCK};
+use psidpd_core::engine::thermostat::Pulls;
+use psidpd_core::engine::vectors::{Loop, run_best};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -25,12 +27,11 @@ pub struct Line {
 }
 
 /// The number of lines in a block.
-pub const BLOCK: usize = 256;
+pub const BLOCK: usize = PAIR_BLOCK;
 
-/// Lines of one carrier as parallel arrays, of which the first `count` entries are lines.
+/// A block of lines as parallel arrays, of which the first `count` entries are lines.
 #[derive(Debug, Clone)]
 pub struct Lines {
-    pub carrier: Carrier,
     /// True if every `f` is parallel to `d`.
     pub parallel: bool,
     pub count: usize,
@@ -40,34 +41,91 @@ pub struct Lines {
     pub f: [[f64; BLOCK]; 3],
 }
 
-impl Lines {
-    /// No lines.
-    pub fn of(carrier: Carrier, parallel: bool) -> Lines {
+impl Default for Lines {
+    fn default() -> Lines {
         let none = [[0.0; BLOCK]; 3];
-        Lines { carrier, parallel, count: 0, from: none, d: none, f: none }
+        Lines { parallel: true, count: 0, from: none, d: none, f: none }
     }
+}
 
+impl Lines {
     /// Passes lines on in blocks.
     pub fn in_blocks(
-        carrier: Carrier,
+        &mut self,
         parallel: bool,
         all: impl Iterator<Item = Line>,
         mut visit: impl FnMut(&Lines),
     ) {
-        let mut lines = Lines::of(carrier, parallel);
+        (self.parallel, self.count) = (parallel, 0);
         for Line { from, d, f } in all {
-            let at = lines.count;
+            let at = self.count;
             for c in 0..3 {
-                (lines.from[c][at], lines.d[c][at], lines.f[c][at]) = (from[c], d[c], f[c]);
+                (self.from[c][at], self.d[c][at], self.f[c][at]) = (from[c], d[c], f[c]);
             }
-            lines.count += 1;
-            if lines.count == BLOCK {
-                visit(&lines);
-                lines.count = 0;
+            self.count += 1;
+            if self.count == BLOCK {
+                visit(self);
+                self.count = 0;
             }
         }
-        if lines.count > 0 {
-            visit(&lines);
+        if self.count > 0 {
+            visit(self);
+        }
+    }
+
+    /// Becomes the lines between the particles of pairs, at most [`BLOCK`], which begin at the particles at `x`. `d` are the
+    /// separations of the pairs, and `strengths` times `share` the forces divided by them. The particles lie at `displacements` from
+    /// `x`, which are empty where they lie there.
+    pub fn join(
+        &mut self,
+        particles: impl Iterator<Item = [usize; 2]>,
+        (x, displacements): (&[[f64; 3]], &[[f64; 3]]),
+        pairs: Pull,
+    ) {
+        self.parallel = displacements.is_empty();
+        self.count = pairs.strengths.len();
+        if self.parallel {
+            for (k, [i, _]) in particles.enumerate() {
+                (0..3).for_each(|c| self.from[c][k] = x[i][c]);
+            }
+            run_best(Join::<false> { lines: self, pairs });
+        } else {
+            for (k, [i, j]) in particles.enumerate() {
+                let (of_i, of_j) = (displacements[i], displacements[j]);
+                for c in 0..3 {
+                    (self.from[c][k], self.d[c][k]) = (x[i][c], of_i[c] - of_j[c]);
+                }
+            }
+            run_best(Join::<true> { lines: self, pairs });
+        }
+    }
+}
+
+/// Pairs and forces on them.
+#[derive(Debug, Clone, Copy)]
+pub struct Pull<'a> {
+    pub d: [&'a [f64]; 3],
+    pub strengths: &'a [f64],
+    pub share: f64,
+}
+
+/// Sets `d` and `f` of lines between pairs; `d` holds the displacements, if there are any.
+struct Join<'a, const DISPLACED: bool> {
+    lines: &'a mut Lines,
+    pairs: Pull<'a>,
+}
+
+impl<const DISPLACED: bool> Loop for Join<'_, DISPLACED> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Join { lines: Lines { d, f, .. }, pairs: Pull { d: of_pairs, strengths, share } } = self;
+        for ((d, f), of_pair) in d.iter_mut().zip(f).zip(of_pairs) {
+            for (((d, f), of_pair), strength) in d.iter_mut().zip(f).zip(of_pair).zip(strengths) {
+                *d = of_pair - if DISPLACED { *d } else { 0.0 };
+                *f = share * strength * of_pair;
+            }
         }
     }
 }
@@ -109,8 +167,30 @@ pub struct Flux {
 pub struct Drag {
     /// `Σ d ⊗ f` in the order xx, yy, zz, xy, xz, yz.
     pub sum: [f64; 6],
-    /// The lines, in parts that do not depend on the number of threads; none if only the sum is recorded.
-    pub lines: Vec<Vec<Line>>,
+    /// The positions of the particles at the time, and the pairs, in parts that do not depend on the number of threads; none if only
+    /// the sum is recorded.
+    pub x: Vec<[f64; 3]>,
+    #[serde(with = "arrays")]
+    pub pairs: Vec<Pulls>,
+    /// The lines of the friction of walls.
+    pub friction: Vec<Line>,
+}
+
+/// The arrays of pairs are written like other things.
+mod arrays {
+    use super::{Deserialize, Pulls};
+    use serde::{Deserializer, Serializer};
+
+    type Arrays = (Vec<u32>, [Vec<f64>; 3], Vec<f64>);
+
+    pub fn serialize<S: Serializer>(pairs: &[Pulls], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(pairs.iter().map(|Pulls { i, d, strengths }| (i, d, strengths)))
+    }
+
+    pub fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<Vec<Pulls>, D::Error> {
+        let pulls = |(i, d, strengths): Arrays| Pulls { i, d, strengths };
+        Ok(Vec::<Arrays>::deserialize(from)?.into_iter().map(pulls).collect())
+    }
 }
 
 /// Conservative forces at positions of a step.

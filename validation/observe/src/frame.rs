@@ -1,7 +1,8 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
-use super::flux::{Acted, Carrier, Flux, Line, Lines, Place};
+use super::flux::{BLOCK, Carrier, Flux, Line, Lines, Place, Pull};
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair};
+use psidpd_core::engine::thermostat::Pulls;
 use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_core::model::Model;
 use std::cell::OnceCell;
@@ -60,8 +61,8 @@ struct Earlier {
     displacements: Vec<[f64; 3]>,
 }
 
-/// Number of particles whose lines a thread takes at a time.
-const LINES: usize = 1024;
+/// The least number of lines, if there are so many, that a thread adds to sums of its own.
+const LINES: usize = 4096;
 
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
@@ -74,45 +75,53 @@ impl<'a> Frame<'a> {
         self.evaluation.get_or_init(|| self.evaluator.evaluate(pool, x, species, domain))
     }
 
-    /// Adds up `width` numbers over all lines of momentum transport in the step; `None` if the step did not record them.
+    /// Adds up `width` numbers over all lines of momentum transport in the step: over those of particles, and over those of pairs;
+    /// `None` if the step did not record them.
     ///
     /// Threads share the lines. The parts of their sums, and the order in which these are added, do not depend on the number of threads.
-    pub fn sum_lines(&self, width: usize, add: impl Fn(&Lines, &mut [f64]) + Sync) -> Option<Vec<f64>> {
+    pub fn sum_lines(&self, width: usize, add: impl Fn(&Lines, &mut [f64]) + Sync) -> Option<[Vec<f64>; 2]> {
         let flux = self.view.flux?;
         let earlier = self.earlier.get_or_init(|| {
             flux.forces.iter().map(|acted| acted.at.as_ref().map(|at| self.earlier(at))).collect()
         });
-        let ways = flux.ways.chunks(LINES).map(|lines| Part::Recorded(Carrier::Particle, lines));
-        let drag = flux.drag.iter().flat_map(|drag| &drag.lines);
-        let recorded = ways.chain(drag.map(|lines| Part::Recorded(Carrier::Pair, lines)));
-        let forces = flux.forces.iter().zip(earlier).flat_map(|(acted, earlier)| {
-            let evaluation =
-                earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation);
-            let x = acted.at.as_ref().map_or(self.view.x, |at| &at.x);
-            let displacements = earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements);
-            (0..evaluation.parts()).map(move |part| Part::Forces {
-                acted,
-                evaluation,
-                part,
-                x,
-                displacements,
-            })
-        });
-        let of_walls = flux.forces.iter().zip(earlier).map(|(acted, earlier)| Part::Walls {
-            acted,
-            evaluation: earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation),
-            x: acted.at.as_ref().map_or(self.view.x, |at| &at.x),
-            displacements: earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements),
-        });
-        let forces = forces.chain(of_walls);
-        let mut work: Vec<(Part, Vec<f64>)> = recorded.chain(forces).map(|part| (part, Vec::new())).collect();
-        self.view.pool.each(&mut work, |(part, sums)| {
+        let mut parts: Vec<(Part, Carrier, usize)> = Vec::new();
+        parts.extend(
+            flux.ways.chunks(LINES).map(|ways| (Part::Recorded(ways), Carrier::Particle, ways.len())),
+        );
+        for drag in &flux.drag {
+            parts.push((Part::Recorded(&drag.friction), Carrier::Pair, drag.friction.len()));
+            let of_pairs = |pairs| (Part::Drag { pairs, x: &drag.x }, Carrier::Pair, pairs.i.len());
+            parts.extend(drag.pairs.iter().map(of_pairs));
+        }
+        for (acted, earlier) in flux.forces.iter().zip(earlier) {
+            let forces = Forces {
+                share: acted.share,
+                evaluation: earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation),
+                x: acted.at.as_ref().map_or(self.view.x, |at| &at.x),
+                displacements: earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements),
+            };
+            let of_pairs = forces.evaluation.parts().enumerate();
+            parts.extend(of_pairs.map(|(part, count)| (Part::Forces(forces, part), Carrier::Pair, count)));
+            parts.push((Part::Walls(forces), Carrier::Pair, forces.evaluation.near_walls.len()));
+        }
+        let mut work: Vec<Work> = Vec::new();
+        for (part, carrier, count) in parts {
+            match work.last_mut() {
+                Some(last) if last.carrier == carrier && last.count < LINES => {
+                    last.count += count;
+                    last.parts.push(part);
+                }
+                _ => work.push(Work { carrier, count, parts: vec![part], sums: Vec::new() }),
+            }
+        }
+        self.view.pool.each(&mut work, |Work { parts, sums, .. }| {
             sums.resize(width, 0.0);
-            part.in_blocks(|lines| add(lines, sums));
+            let mut lines = Lines::default();
+            parts.iter().for_each(|part| part.in_blocks(&mut lines, |lines| add(lines, sums)));
         });
-        let mut all = vec![0.0; width];
-        for (_, sums) in &work {
-            all.iter_mut().zip(sums).for_each(|(all, sum)| *all += sum);
+        let mut all = [vec![0.0; width], vec![0.0; width]];
+        for Work { carrier, sums, .. } in &work {
+            all[*carrier as usize].iter_mut().zip(sums).for_each(|(all, sum)| *all += sum);
         }
         Some(all)
     }
@@ -165,55 +174,66 @@ impl Drop for Frame<'_> {
     }
 }
 
-/// Lines that one thread adds up.
+/// Lines of one carrier that one thread adds up.
+struct Work<'a> {
+    carrier: Carrier,
+    count: usize,
+    parts: Vec<Part<'a>>,
+    sums: Vec<f64>,
+}
+
 enum Part<'a> {
-    Recorded(Carrier, &'a [Line]),
-    /// A part of the pairs of an evaluation, whose forces acted on particles at `x`.
-    Forces {
-        acted: &'a Acted,
-        evaluation: &'a Evaluation,
-        part: usize,
+    Recorded(&'a [Line]),
+    /// The drag of pairs on particles at `x`.
+    Drag {
+        pairs: &'a Pulls,
         x: &'a [[f64; 3]],
-        displacements: &'a [[f64; 3]],
     },
-    /// The forces of walls, along the lines from their surfaces to the particles at `x`.
-    Walls {
-        acted: &'a Acted,
-        evaluation: &'a Evaluation,
-        x: &'a [[f64; 3]],
-        displacements: &'a [[f64; 3]],
-    },
+    /// A part of the pairs of an evaluation.
+    Forces(Forces<'a>, usize),
+    /// The forces of walls, along the lines from their surfaces to the particles.
+    Walls(Forces<'a>),
+}
+
+/// Forces of an evaluation that acted, for a share of the step, on particles at `x`.
+#[derive(Clone, Copy)]
+struct Forces<'a> {
+    share: f64,
+    evaluation: &'a Evaluation,
+    x: &'a [[f64; 3]],
+    displacements: &'a [[f64; 3]],
 }
 
 impl Part<'_> {
-    fn in_blocks(&self, visit: impl FnMut(&Lines)) {
+    /// Passes the lines on in blocks.
+    fn in_blocks(&self, lines: &mut Lines, mut visit: impl FnMut(&Lines)) {
         match *self {
-            // A particle that met a face turned on its way.
-            Part::Recorded(carrier, lines) => {
-                Lines::in_blocks(carrier, carrier == Carrier::Pair, lines.iter().copied(), visit);
+            // A particle that met a face turned on its way, and friction is across its line.
+            Part::Recorded(all) => lines.in_blocks(false, all.iter().copied(), visit),
+            Part::Drag { pairs: Pulls { i, d, strengths }, x } => {
+                for from in (0..i.len()).step_by(BLOCK) {
+                    let pairs = from..(from + BLOCK).min(i.len());
+                    let (d, strengths) = (d.each_ref().map(|d| &d[pairs.clone()]), &strengths[pairs.clone()]);
+                    let particles = i[pairs].iter().map(|i| [*i as usize; 2]);
+                    lines.join(particles, (x, &[]), Pull { d, strengths, share: 1.0 });
+                    visit(lines);
+                }
             }
-            Part::Forces { acted, evaluation, part, x, displacements } => {
-                let back = |k: usize| displacements.get(k).copied().unwrap_or([0.0; 3]);
-                // Pairs at zero distance have no direction.
-                let apart = evaluation.pairs_of(part).filter(|(pair, _)| pair.r > 0.0);
-                let lines = apart.map(|(pair, force)| {
-                    let (from_i, from_j) = (back(pair.i), back(pair.j));
-                    Line {
-                        from: x[pair.i],
-                        d: std::array::from_fn(|c| pair.d[c] - (from_i[c] - from_j[c])),
-                        f: pair.d.map(|d| acted.share * force / pair.r * d),
-                    }
-                });
-                Lines::in_blocks(Carrier::Pair, displacements.is_empty(), lines, visit);
+            Part::Forces(Forces { share, evaluation, x, displacements }, part) => {
+                for block in evaluation.blocks_of(part) {
+                    let pull = Pull { d: block.d, strengths: block.strengths, share };
+                    lines.join(block.particles(), (x, displacements), pull);
+                    visit(lines);
+                }
             }
-            Part::Walls { acted, evaluation, x, displacements } => {
-                let lines = evaluation.near_walls.iter().map(|near| {
+            Part::Walls(Forces { share, evaluation, x, displacements }) => {
+                let all = evaluation.near_walls.iter().map(|near| {
                     let mut d = displacements.get(near.particle).map_or([0.0; 3], |by| by.map(|by| -by));
                     d.iter_mut().zip(near.line()).for_each(|(d, line)| *d += line);
-                    let f = near.force().map(|f| acted.share * f);
+                    let f = near.force().map(|f| share * f);
                     Line { from: x[near.particle], d, f }
                 });
-                Lines::in_blocks(Carrier::Pair, displacements.is_empty(), lines, visit);
+                lines.in_blocks(displacements.is_empty(), all, visit);
             }
         }
     }

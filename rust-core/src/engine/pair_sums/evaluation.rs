@@ -3,7 +3,7 @@
 
 use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
-use super::plane_list::{PlaneList, merge};
+use super::plane_list::{PairBlock, PlaneList, merge};
 use super::sweep_pairs::SweepPairs;
 use crate::engine::components::COMPONENTS;
 use crate::engine::plan::Plan;
@@ -35,17 +35,13 @@ struct Work {
     spare: Vec<Vec<PlaneList>>,
 }
 
-/// Energy, densities, forces and virial of one configuration.
+/// Energy, densities and pairs with their forces of one configuration.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluation {
     /// Potential energy `U`.
     pub energy: f64,
     /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub densities: Vec<f64>,
-    /// Conservative forces on the particles.
-    pub forces: Vec<[f64; 3]>,
-    /// Virial `Σ r_ij ⊗ F_ij` of the conservative forces: xx, yy, zz, xy, xz, yz.
-    pub virial: [f64; 6],
     /// ψ of the particles with its derivatives.
     pub psi: Psi,
     /// Sum `Σ ψ` over the particles of each species.
@@ -110,26 +106,16 @@ impl Evaluator {
         let mut planes = self.planes(pool, x, species, domain, reach);
         let faces = walls::faces(&self.fluid.walls, domain, self.fluid.dimensions);
         let (densities, psi) = self.excess(pool, &mut planes, (x, species), &faces);
-        pool.each(&mut planes, |plane| plane.add_forces(&self.plan, &psi.slopes));
-        let mut forces = merge(planes.iter().map(PlaneList::sums), x.len(), 3).as_chunks().0.to_vec();
+        pool.each(&mut planes, |plane| plane.find_forces(&self.plan, &psi.slopes));
         let mut excess = vec![0.0; self.fluid.species.len()];
         psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
-        let (mut energy, mut virial) = (excess.iter().sum::<f64>(), [0.0; 6]);
-        for tally in planes.iter().map(PlaneList::tally) {
-            energy += tally.pair;
-            (0..6).for_each(|c| virial[c] += tally.virial[c]);
-        }
+        let mut energy = excess.iter().sum::<f64>() + planes.iter().map(PlaneList::energy).sum::<f64>();
         let mut near_walls = Vec::new();
         self.for_each_near_wall(&faces, x, species, &psi, |near, of_wall| {
             energy += of_wall;
-            let (line, force) = (near.line(), near.force());
-            for (virial, (a, b)) in virial.iter_mut().zip(COMPONENTS) {
-                *virial += line[a] * force[b];
-            }
-            (0..3).for_each(|c| forces[near.particle][c] += force[c]);
             near_walls.push(near);
         });
-        Evaluation { energy, densities, forces, virial, psi, excess, planes, near_walls, range, reach }
+        Evaluation { energy, densities, psi, excess, planes, near_walls, range, reach }
     }
 
     /// Computes the energy `U` only.
@@ -208,7 +194,7 @@ impl Evaluator {
         mut visit: impl FnMut(Pair),
     ) {
         let planes = self.planes(pool, x, &vec![0; x.len()], domain, range);
-        planes.iter().flat_map(|plane| plane.pairs(range)).for_each(|(pair, _)| visit(pair));
+        planes.iter().flat_map(|plane| plane.pairs(range)).for_each(&mut visit);
         self.work().spare.push(planes);
     }
 
@@ -254,7 +240,7 @@ impl Evaluator {
         let Evaluator { fluid, plan, free_energy, .. } = self;
         let variables = fluid.variables();
         pool.each(planes, |plane| plane.add_densities(plan));
-        let mut densities = merge(planes.iter().map(PlaneList::sums), species.len(), variables);
+        let mut densities = merge(planes.iter().map(PlaneList::densities), species.len(), variables);
         for (d, density) in fluid.densities.iter().enumerate().filter(|(_, density)| density.includes_self) {
             let own = density.kernel.value(0.0);
             for (k, s) in species.iter().enumerate() {
@@ -284,7 +270,7 @@ fn pair_energies(pool: &Pool, planes: &[PlaneList], fluid: &Fluid) -> Vec<f64> {
 impl Evaluation {
     /// Uncorrected local densities of one particle.
     pub fn densities_of(&self, particle: usize) -> &[f64] {
-        let variables = self.densities.len() / self.forces.len();
+        let variables = self.densities.len() / self.psi.value.len();
         &self.densities[particle * variables..(particle + 1) * variables]
     }
 
@@ -293,15 +279,48 @@ impl Evaluation {
         pair_energies(pool, &self.planes, fluid)
     }
 
-    /// The number of parts that the pairs are in, for threads that share them. It does not depend on their number.
-    pub fn parts(&self) -> usize {
-        self.planes.len()
+    /// Conservative forces on the particles.
+    pub fn forces(&self, pool: &Pool) -> Vec<[f64; 3]> {
+        let mut work: Vec<(&PlaneList, Vec<f64>)> =
+            self.planes.iter().map(|plane| (plane, Vec::new())).collect();
+        pool.each(&mut work, |(plane, sums)| *sums = plane.forces());
+        let parts = work.iter().map(|(plane, sums)| (&plane.hosts[..], &sums[..]));
+        let mut forces = merge(parts, self.psi.value.len(), 3).as_chunks().0.to_vec();
+        for near in &self.near_walls {
+            let of_wall = near.force();
+            (0..3).for_each(|c| forces[near.particle][c] += of_wall[c]);
+        }
+        forces
     }
 
-    /// The pairs of a part in the range of the conservative interactions, with their force along `ê_ij = (r_i − r_j)/r_ij`,
-    /// positive if repulsive.
-    pub fn pairs_of(&self, part: usize) -> impl Iterator<Item = (Pair, f64)> {
+    /// Virial `Σ r_ij ⊗ F_ij` of the conservative forces: xx, yy, zz, xy, xz, yz.
+    pub fn virial(&self) -> [f64; 6] {
+        COMPONENTS.map(|(a, b)| {
+            let of_block = |block: PairBlock| -> f64 {
+                let [x, y] = [a, b].map(|c| block.d[c]);
+                block.strengths.iter().zip(x).zip(y).map(|((strength, x), y)| strength * x * y).sum()
+            };
+            let of_pairs: f64 = self.planes.iter().flat_map(PlaneList::blocks).map(of_block).sum();
+            let of_walls = self.near_walls.iter().map(|near| near.line()[a] * near.force()[b]);
+            of_pairs + of_walls.sum::<f64>()
+        })
+    }
+
+    /// The number of pairs in each of the parts that they are in, for threads that share them. It does not depend on the number of
+    /// threads.
+    pub fn parts(&self) -> impl Iterator<Item = usize> {
+        self.planes.iter().map(PlaneList::len)
+    }
+
+    /// The pairs of a part in the range of the conservative interactions.
+    pub fn pairs_of(&self, part: usize) -> impl Iterator<Item = Pair> {
         self.planes[part].pairs(self.range)
+    }
+
+    /// The pairs of a part with their forces, in blocks of at most [`PAIR_BLOCK`](super::PAIR_BLOCK). Pairs a little beyond the range
+    /// may be among them, without a force.
+    pub fn blocks_of(&self, part: usize) -> impl Iterator<Item = PairBlock<'_>> {
+        self.planes[part].blocks()
     }
 }
 
@@ -378,15 +397,15 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             let truth = crate::truth::conservative(&evaluator.fluid, &x, &indices, &domain).unwrap();
             let energies =
                 found.excess.iter().chain(&found.pair_energies(&alone(), &evaluator.fluid)).sum::<f64>();
-            let alone = evaluator.energy(&alone(), &x, &species, &domain);
-            assert!((alone - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
+            let energy = evaluator.energy(&alone(), &x, &species, &domain);
+            assert!((energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             assert!((energies - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
             assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
-            for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
+            for (f, g) in found.forces(&alone()).iter().flatten().zip(truth.forces.iter().flatten()) {
                 assert!((f - g).abs() < 1e-11 * scale, "{f} {g}");
             }
-            for (w, v) in found.virial.iter().zip(truth.virial) {
+            for (w, v) in found.virial().iter().zip(truth.virial) {
                 assert!((w - v).abs() < 1e-10 * scale, "{w} {v}");
             }
         }
@@ -424,8 +443,8 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             let found = evaluator.evaluate(&alone(), &x, &species, domain);
             let shared = evaluator.evaluate(&three, &x, &species, domain);
             assert_eq!(
-                (&found.forces, found.energy, found.virial),
-                (&shared.forces, shared.energy, shared.virial)
+                (found.forces(&alone()), found.energy, found.virial()),
+                (shared.forces(&three), shared.energy, shared.virial())
             );
             let laplacians = [&alone(), &three].map(|pool| found.laplacians(pool, &evaluator.fluid));
             assert_eq!(laplacians[0], laplacians[1]);
@@ -433,10 +452,10 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             let truth = crate::truth::conservative(&evaluator.fluid, &inside, &indices, domain).unwrap();
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
             assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0), "{domain:?}");
-            for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
+            for (f, g) in found.forces(&alone()).iter().flatten().zip(truth.forces.iter().flatten()) {
                 assert!((f - g).abs() < 1e-11 * scale, "{domain:?}: {f} {g}");
             }
-            for (w, v) in found.virial.iter().zip(truth.virial) {
+            for (w, v) in found.virial().iter().zip(truth.virial) {
                 assert!((w - v).abs() < 1e-10 * scale, "{domain:?}: {w} {v}");
             }
         }
@@ -483,7 +502,8 @@ range = 1.0
         let (evaluator, ..) = random(model, 13);
         let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
         let found = evaluator.evaluate(&alone(), &[[1.0; 3], [1.7, 1.0, 1.0]], &[0, 0], &domain);
-        assert!((found.forces[0][0] + 7.5).abs() < 1e-12 && found.forces[1][0] == -found.forces[0][0]);
+        let forces = found.forces(&alone());
+        assert!((forces[0][0] + 7.5).abs() < 1e-12 && forces[1][0] == -forces[0][0]);
     }
 
     /// Compares the Laplacian of U with differences of forces.
@@ -501,7 +521,7 @@ range = 1.0
                     let force = |h: f64| {
                         let mut x = x.clone();
                         x[k][c] += h;
-                        evaluator.evaluate(&alone(), &x, &species, &domain).forces[k][c]
+                        evaluator.evaluate(&alone(), &x, &species, &domain).forces(&alone())[k][c]
                     };
                     divergence += (force(h) - force(-h)) / (2.0 * h);
                 }

@@ -20,7 +20,7 @@ impl Evaluation {
     ///
     /// The result is exact where each two particles form one pair, in boxes at least twice the range wide.
     pub fn laplacians(&self, pool: &Pool, fluid: &Fluid) -> Vec<f64> {
-        let (variables, count) = (fluid.variables(), self.forces.len());
+        let (variables, count) = (fluid.variables(), self.psi.value.len());
         let width = 1 + 3 * variables;
         let mut work: Vec<(&PlaneList, Vec<f64>)> =
             self.planes.iter().map(|plane| (plane, Vec::new())).collect();

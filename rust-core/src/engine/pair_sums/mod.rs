@@ -37,6 +37,7 @@ pub use super::components::COMPONENTS;
 pub use evaluation::{Evaluation, Evaluator, NearWall};
 pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
+pub use plane_list::{BLOCK as PAIR_BLOCK, PairBlock};
 pub use shells::count_in_shells;
 
 use super::counts::PassCounts;

@@ -13,7 +13,6 @@ use crate::engine::vectors::{Loop, run_best};
 use crate::model::PairTerm;
 use crate::model::pair::PairForm;
 use psidpd_passes::plane::list::pairs_of_each;
-use psidpd_passes::tally::Tally;
 
 /// Number of pairs in a block, whose scalars stay in the first-level cache.
 pub const BLOCK: usize = 256;
@@ -29,12 +28,33 @@ pub struct PlaneList {
     species: Vec<i32>,
     /// The pairs by local numbers.
     pub(super) list: PairList,
-    /// Conservative force of each pair along `ê_ij`, once forces are computed.
-    forces: Vec<f64>,
-    /// Sums of the particles, a number of them for each.
+    /// Conservative force of each pair along `ê_ij`, positive if repulsive, divided by its distance, once forces are computed; none
+    /// at zero distance.
+    strengths: Vec<f64>,
+    /// Densities of the particles, a number of them for each.
     sums: Vec<f64>,
-    /// Energy and virial of the pairs.
-    tally: Tally,
+    /// Energy of the pairs.
+    energy: f64,
+}
+
+/// A block of the pairs of a plane with their conservative forces.
+#[derive(Debug, Clone, Copy)]
+pub struct PairBlock<'a> {
+    hosts: &'a [u32],
+    pairs: [&'a [u32]; 2],
+    /// The components of `r_i − r_j`.
+    pub d: [&'a [f64]; 3],
+    /// The force on particle `i`, divided by `d`.
+    pub strengths: &'a [f64],
+}
+
+impl PairBlock<'_> {
+    /// The particles `i` and `j` of each pair, with the indices of the host.
+    #[inline(always)]
+    pub fn particles(&self) -> impl Iterator<Item = [usize; 2]> {
+        let PairBlock { hosts, pairs: [i, j], .. } = *self;
+        i.iter().zip(j).map(|(i, j)| [i, j].map(|k| hosts[*k as usize] as usize))
+    }
 }
 
 impl PlaneList {
@@ -95,63 +115,78 @@ impl PlaneList {
         }
     }
 
-    /// Computes the force of each pair, and sums forces, energies and virials. `slopes` are those of all particles of the host.
-    pub fn add_forces(&mut self, plan: &Plan, slopes: &[f64]) {
+    /// Computes the force of each pair, and sums energies. `slopes` are those of all particles of the host.
+    pub fn find_forces(&mut self, plan: &Plan, slopes: &[f64]) {
         let width = plan.slope_width();
         let slopes: Vec<f64> =
             self.hosts.iter().flat_map(|k| &slopes[*k as usize * width..][..width]).copied().collect();
-        let PlaneList { hosts, list, forces, sums, tally, .. } = self;
+        let PlaneList { hosts, list, strengths, energy, .. } = self;
         let input = ForceInput::conservative(plan, list, hosts.len(), &slopes);
-        sums.clear();
-        sums.resize(3 * hosts.len(), 0.0);
-        forces.resize(list.len(), 0.0);
-        *tally = Tally::default();
+        strengths.resize(list.len(), 0.0);
+        *energy = 0.0;
         let mut block = Block::<BLOCK>::new();
-        let mut per_distance = [0.0; BLOCK];
         for from in (0..list.len()).step_by(BLOCK) {
             let pairs = from..(from + BLOCK).min(list.len());
             block.conserve(&input, pairs.clone(), true);
             let count = pairs.len();
-            forces[pairs.clone()].copy_from_slice(&block.conservative[..count]);
-            let d = list.d.each_ref().map(|d| &d[pairs.clone()]);
-            let virial = run_best(Virial {
-                force: &block.conservative[..count],
-                r: &list.r[pairs.clone()],
-                d,
-                per_distance: &mut per_distance[..count],
-            });
-            (0..6).for_each(|c| tally.virial[c] += virial[c]);
-            tally.pair += block.pair[..count].iter().sum::<f64>();
-            for (k, scale) in per_distance[..count].iter().enumerate() {
-                let (i, j) = (3 * list.i[from + k] as usize, 3 * list.j[from + k] as usize);
-                for c in 0..3 {
-                    let f = scale * d[c][k];
-                    sums[i + c] += f;
-                    sums[j + c] -= f;
-                }
-            }
+            let (force, r, strengths) =
+                (&block.conservative[..count], &list.r[pairs.clone()], &mut strengths[pairs]);
+            run_best(PerDistance { force, r, strengths });
+            *energy += block.pair[..count].iter().sum::<f64>();
         }
     }
 
-    /// The pairs within `range`, with their force along `ê_ij = (r_i − r_j)/r_ij`, positive if repulsive; that of an earlier
-    /// configuration, or 0, before forces are computed. Particles have the indices of the host.
-    pub fn pairs(&self, range: f64) -> impl Iterator<Item = (Pair, f64)> {
-        let PlaneList { hosts, list, forces, .. } = self;
-        (0..list.len()).filter(move |k| list.r[*k] < range).map(move |k| {
-            let [i, j] = [list.i[k], list.j[k]].map(|k| hosts[k as usize] as usize);
-            let d = list.d.each_ref().map(|d| d[k]);
-            (Pair { i, j, d, r: list.r[k] }, forces.get(k).copied().unwrap_or(0.0))
+    /// The pairs with their forces in blocks of at most [`BLOCK`]. Those a little beyond the range have no force.
+    pub fn blocks(&self) -> impl Iterator<Item = PairBlock<'_>> {
+        let PlaneList { hosts, list, strengths, .. } = self;
+        (0..list.len()).step_by(BLOCK).map(move |from| {
+            let pairs = from..(from + BLOCK).min(list.len());
+            PairBlock {
+                hosts,
+                pairs: [&list.i, &list.j].map(|of| &of[pairs.clone()]),
+                d: list.d.each_ref().map(|d| &d[pairs.clone()]),
+                strengths: &strengths[pairs],
+            }
         })
     }
 
-    /// The sums of the particles, with their indices, for [`merge`].
-    pub fn sums(&self) -> (&[u32], &[f64]) {
+    /// The sums of the forces on the particles, by local numbers.
+    pub fn forces(&self) -> Vec<f64> {
+        let PlaneList { hosts, list: PairList { i, j, d, .. }, strengths, .. } = self;
+        let mut sums = vec![0.0; 3 * hosts.len()];
+        for (k, strength) in strengths.iter().enumerate() {
+            let (i, j) = (3 * i[k] as usize, 3 * j[k] as usize);
+            for c in 0..3 {
+                let f = strength * d[c][k];
+                sums[i + c] += f;
+                sums[j + c] -= f;
+            }
+        }
+        sums
+    }
+
+    /// The pairs within `range`. Particles have the indices of the host.
+    pub fn pairs(&self, range: f64) -> impl Iterator<Item = Pair> {
+        let PlaneList { hosts, list, .. } = self;
+        (0..list.len()).filter(move |k| list.r[*k] < range).map(move |k| {
+            let [i, j] = [list.i[k], list.j[k]].map(|k| hosts[k as usize] as usize);
+            Pair { i, j, d: list.d.each_ref().map(|d| d[k]), r: list.r[k] }
+        })
+    }
+
+    /// The densities of the particles, with their indices, for [`merge`].
+    pub fn densities(&self) -> (&[u32], &[f64]) {
         (&self.hosts, &self.sums)
     }
 
-    /// Energy and virial of the pairs.
-    pub fn tally(&self) -> &Tally {
-        &self.tally
+    /// Energy of the pairs.
+    pub fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    /// Number of pairs.
+    pub fn len(&self) -> usize {
+        self.list.len()
     }
 
     /// The sum `Σ φ` of a pair term.
@@ -232,42 +267,21 @@ impl Loop for Stretch<'_> {
     }
 }
 
-/// The virial of a block of pairs, and the force of each divided by its distance; pairs at zero distance have none.
-struct Virial<'a> {
+/// Divides the forces of pairs by their distances; pairs at zero distance have none.
+struct PerDistance<'a> {
     force: &'a [f64],
     r: &'a [f64],
-    d: [&'a [f64]; 3],
-    per_distance: &'a mut [f64],
+    strengths: &'a mut [f64],
 }
 
-impl Loop for Virial<'_> {
-    type Out = [f64; 6];
+impl Loop for PerDistance<'_> {
+    type Out = ();
 
     #[inline(always)]
-    fn run(self) -> [f64; 6] {
-        let Virial { force, r, d: [x, y, z], per_distance } = self;
-        for ((scale, force), r) in per_distance.iter_mut().zip(force).zip(r) {
-            *scale = if *r > 0.0 { force / r } else { 0.0 };
+    fn run(self) {
+        let PerDistance { force, r, strengths } = self;
+        for ((strength, force), r) in strengths.iter_mut().zip(force).zip(r) {
+            *strength = if *r > 0.0 { force / r } else { 0.0 };
         }
-        let mut sums = [[0.0; LANES]; 6];
-        let ((scale, scale_rest), [(x, x_rest), (y, y_rest), (z, z_rest)]) =
-            (per_distance.as_chunks::<LANES>(), [x, y, z].map(|c| c.as_chunks::<LANES>()));
-        for (((scale, x), y), z) in scale.iter().zip(x).zip(y).zip(z) {
-            for k in 0..LANES {
-                add_dyad(&mut sums, k, scale[k], [x[k], y[k], z[k]]);
-            }
-        }
-        for (((scale, x), y), z) in scale_rest.iter().zip(x_rest).zip(y_rest).zip(z_rest) {
-            add_dyad(&mut sums, 0, *scale, [*x, *y, *z]);
-        }
-        sums.map(|lanes| lanes.iter().sum())
-    }
-}
-
-#[inline(always)]
-fn add_dyad(sums: &mut [[f64; LANES]; 6], lane: usize, scale: f64, [x, y, z]: [f64; 3]) {
-    let terms = [x * x, y * y, z * z, x * y, x * z, y * z];
-    for (sum, term) in sums.iter_mut().zip(terms) {
-        sum[lane] += scale * term;
     }
 }

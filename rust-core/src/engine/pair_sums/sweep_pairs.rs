@@ -118,7 +118,7 @@ mod tests {
             let signed =
                 |i: usize, j: usize, d: [f64; 3]| if i < j { (i, j, d) } else { (j, i, d.map(|c| -c)) };
             let pairs = planes.iter().flat_map(|plane| plane.pairs(0.9));
-            let mut found: Vec<_> = pairs.map(|(p, _)| signed(p.i, p.j, p.d)).collect();
+            let mut found: Vec<_> = pairs.map(|p| signed(p.i, p.j, p.d)).collect();
             let mut expected = Vec::new();
             for_each_pair(&x, &domain, dimensions, 0.9, |p| expected.push(signed(p.i, p.j, p.d)));
             found.sort_by_key(|p| (p.0, p.1));

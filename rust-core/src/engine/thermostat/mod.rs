@@ -41,7 +41,7 @@ mod tests;
 
 pub use bodies::Bodies;
 pub use effort::Effort;
-pub use pulls::{Pull, Pulls};
+pub use pulls::Pulls;
 pub use rank::{Need, Rank};
 
 use super::error::EngineError;

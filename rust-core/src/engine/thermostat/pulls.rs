@@ -4,94 +4,148 @@
 //! contributes only scatter to a mean.
 
 use super::PairThermostat;
-use crate::engine::sweep::Pool;
+use crate::engine::sweep::{PlanePairs, Pool};
+use crate::engine::vectors::{Loop, run_best};
 
-/// A pair and the mean force of drag on it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pull {
-    /// Index of the first particle.
-    pub i: usize,
-    /// Separation `r_i − r_j`.
-    pub d: [f64; 3],
-    /// The force on the first particle, divided by `d`.
-    pub strength: f64,
+/// Pairs of a plane of cells and the mean forces of drag on them, as parallel arrays.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Pulls {
+    /// Indices of the first particles.
+    pub i: Vec<u32>,
+    /// The components of the separations `r_i − r_j`.
+    pub d: [Vec<f64>; 3],
+    /// The forces on the first particles, divided by `d`.
+    pub strengths: Vec<f64>,
 }
 
-/// The forces of drag on all pairs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pulls<T> {
-    /// The virial `Σ r_ij ⊗ F_ij`: xx, yy, zz, xy, xz, yz.
-    pub virial: [f64; 6],
-    /// What is made of each pair, plane by plane; nothing if nothing was asked for.
-    pub of_planes: Vec<Vec<T>>,
-}
-
-impl<T> Default for Pulls<T> {
-    fn default() -> Pulls<T> {
-        Pulls { virial: [0.0; 6], of_planes: Vec::new() }
+impl Pulls {
+    /// Empties the arrays, and makes room for so many pairs.
+    fn begin(&mut self, count: usize) {
+        self.i.clear();
+        self.i.reserve(count);
+        for array in self.d.iter_mut().chain([&mut self.strengths]) {
+            array.clear();
+            array.reserve(count);
+        }
     }
 }
 
 impl PairThermostat {
-    /// Drag at the velocities `v`, in the particle order of the last search for pairs. Zero if distances were not stored.
-    /// `make` is applied to each pair, if it is there. Results do not depend on the number of threads.
-    pub fn drags<T: Send>(
-        &self,
-        pool: &Pool,
-        v: &[[f64; 3]],
-        make: Option<&(dyn Fn(Pull) -> T + Sync)>,
-    ) -> Pulls<T> {
+    /// The virial `Σ r_ij ⊗ F_ij` of the drag at the velocities `v`: xx, yy, zz, xy, xz, yz. It is that of the pairs that were found
+    /// last, and zero if distances were not stored. `pulls` get the pairs, plane by plane. Results do not depend on the number of
+    /// threads.
+    pub fn drags(&self, pool: &Pool, v: &[[f64; 3]], pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
         let order = self.lists.order();
-        let strength = |i: usize, j: usize, _: usize, _: usize, g: [f64; 3]| {
+        let factor = |[i, j, _]: [usize; 3], _: usize, g: [f64; 3]| {
             let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
-            let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-            -2.0 / self.dt * along
+            -2.0 / self.dt * (g[0] * (a[0] - b[0]) + g[1] * (a[1] - b[1]) + g[2] * (a[2] - b[2]))
         };
-        self.pulls_by(pool, strength, make)
+        self.pulls_by(pool, factor, pulls)
     }
 
-    /// The impulses of the last sequential update, without the noise of each pair itself, as forces
-    /// over its time. Zero if distances were not stored. `make` is as in [`PairThermostat::drags`].
-    pub fn pulls<T: Send>(&self, pool: &Pool, make: Option<&(dyn Fn(Pull) -> T + Sync)>) -> Pulls<T> {
-        self.pulls_by(pool, |_, _, plane, k, _| self.impulses[plane][k] / self.dt, make)
+    /// The virial of the impulses of the last sequential update, without the noise of each pair itself, as forces over its time.
+    /// Otherwise as [`PairThermostat::drags`].
+    pub fn pulls(&self, pool: &Pool, pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
+        self.pulls_by(pool, |[_, _, k], plane, _| self.impulses[plane][k] / self.dt, pulls)
     }
 
-    /// Computes pulls from `strength`, the factor of `g`, which takes the two sorted particles, the
-    /// plane, the pair in it, and `g`.
-    fn pulls_by<T: Send>(
+    /// Computes pulls from the `factor` of `g`, which takes the two sorted particles and the pair, the plane, and `g`.
+    fn pulls_by(
         &self,
         pool: &Pool,
-        strength: impl Fn(usize, usize, usize, usize, [f64; 3]) -> f64 + Sync,
-        make: Option<&(dyn Fn(Pull) -> T + Sync)>,
-    ) -> Pulls<T> {
+        factor: impl Fn([usize; 3], usize, [f64; 3]) -> f64 + Sync,
+        pulls: Option<&mut Vec<Pulls>>,
+    ) -> [f64; 6] {
         self.assert_pairs();
-        let order = self.lists.order();
+        let mut none = Vec::new();
+        let is_asked = pulls.is_some();
+        let pulls = pulls.unwrap_or(&mut none);
+        pulls.resize_with(self.planes.len(), Pulls::default);
         let mut work: Vec<_> =
-            self.planes.iter().enumerate().map(|plane| (plane, [0.0; 6], Vec::new())).collect();
-        pool.each(&mut work, |((number, plane), virial, made)| {
-            let list = &plane.lists.own;
-            if list.stretch.is_empty() {
-                return;
-            }
-            made.reserve(if make.is_some() { list.count() } else { 0 });
-            for [i, j, k] in plane.pairs() {
-                let (stretch, g) = (list.stretch[k], list.g(k));
-                let strength = strength(i, j, *number, k, g) / stretch;
-                let d @ [x, y, z] = g.map(|g| stretch * g);
-                let dyad = [x * x, y * y, z * z, x * y, x * z, y * z];
-                virial.iter_mut().zip(dyad).for_each(|(sum, term)| *sum += strength * term);
-                if let Some(make) = make {
-                    made.push(make(Pull { i: order[i] as usize, d, strength }));
-                }
-            }
+            self.planes.iter().zip(pulls).enumerate().map(|plane| (plane, [0.0; 6])).collect();
+        pool.each(&mut work, |((number, (plane, pulls)), virial)| {
+            let pulls = is_asked.then_some(&mut **pulls);
+            *virial = of_plane(plane, self.lists.order(), |pair, g| factor(pair, *number, g), pulls);
         });
-        let mut pulls = Pulls::default();
-        for (_, virial, made) in work {
-            (0..6).for_each(|c| pulls.virial[c] += virial[c]);
-            if make.is_some() {
-                pulls.of_planes.push(made);
+        let mut sum = [0.0; 6];
+        work.iter().for_each(|(_, virial)| (0..6).for_each(|c| sum[c] += virial[c]));
+        sum
+    }
+}
+
+/// The virial of the pairs of a plane, whose `pulls` are written if asked for.
+fn of_plane(
+    plane: &PlanePairs,
+    order: &[u32],
+    factor: impl Fn([usize; 3], [f64; 3]) -> f64,
+    mut pulls: Option<&mut Pulls>,
+) -> [f64; 6] {
+    let list = &plane.lists.own;
+    let count = list.stretch.len();
+    if let Some(pulls) = &mut pulls {
+        pulls.begin(count);
+    }
+    let mut virial = [0.0; 6];
+    if count == 0 {
+        return virial;
+    }
+    let mut block = Block { d: [[0.0; BLOCK]; 3], strengths: [0.0; BLOCK] };
+    plane.pairs().for_each(|[i, j, k]| {
+        let (at, g) = (k % BLOCK, list.g(k));
+        (0..3).for_each(|c| block.d[c][at] = g[c]);
+        block.strengths[at] = factor([i, j, k], g);
+        if let Some(pulls) = &mut pulls {
+            pulls.i.push(order[i]);
+        }
+        if at + 1 == BLOCK || k + 1 == count {
+            let of_block = run_best(Stretch { block: &mut block, stretch: &list.stretch[k - at..=k] });
+            (0..6).for_each(|c| virial[c] += of_block[c]);
+            if let Some(pulls) = &mut pulls {
+                (0..3).for_each(|c| pulls.d[c].extend_from_slice(&block.d[c][..=at]));
+                pulls.strengths.extend_from_slice(&block.strengths[..=at]);
             }
         }
-        pulls
+    });
+    virial
+}
+
+/// Number of pairs in a block, and in a vector.
+const BLOCK: usize = 128;
+const LANES: usize = 8;
+
+/// Vectors `g` and factors of them, which become separations and the factors of these.
+struct Block {
+    d: [[f64; BLOCK]; 3],
+    strengths: [f64; BLOCK],
+}
+
+/// Stretches the vectors of a block to separations; returns their virial.
+struct Stretch<'a> {
+    block: &'a mut Block,
+    stretch: &'a [f64],
+}
+
+impl Loop for Stretch<'_> {
+    type Out = [f64; 6];
+
+    #[inline(always)]
+    fn run(self) -> [f64; 6] {
+        let Stretch { block: Block { d: [x, y, z], strengths }, stretch } = self;
+        for (k, stretch) in stretch.iter().enumerate() {
+            (x[k], y[k], z[k]) = (stretch * x[k], stretch * y[k], stretch * z[k]);
+            strengths[k] /= stretch;
+        }
+        let mut sums = [[0.0; LANES]; 6];
+        for k in stretch.len()..stretch.len().next_multiple_of(LANES) {
+            strengths[k] = 0.0;
+        }
+        for k in (0..stretch.len()).step_by(LANES) {
+            for lane in 0..LANES {
+                let (s, x, y, z) = (strengths[k + lane], x[k + lane], y[k + lane], z[k + lane]);
+                let dyad = [x * x, y * y, z * z, x * y, x * z, y * z];
+                (0..6).for_each(|c| sums[c][lane] += s * dyad[c]);
+            }
+        }
+        sums.map(|lanes| lanes.iter().sum())
     }
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::scene::Scene;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::thermostat::Pulls;
 use psidpd_observe::flux::{Drag, Line};
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
@@ -13,7 +14,17 @@ fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
 }
 
 fn checkpoint(step: u64) -> Checkpoint {
-    let drag = Drag { sum: [0.3; 6], lines: vec![vec![Line { from: HARD, d: HARD, f: HARD }], Vec::new()] };
+    let pulls = Pulls {
+        i: vec![0, u32::MAX],
+        d: [HARD[..2].to_vec(), vec![0.1; 2], vec![0.2; 2]],
+        strengths: HARD[1..].to_vec(),
+    };
+    let drag = Drag {
+        sum: [0.3; 6],
+        x: vec![HARD; 2],
+        pairs: vec![pulls, Pulls::default()],
+        friction: vec![Line { from: HARD, d: HARD, f: HARD }],
+    };
     Checkpoint {
         instructions: "portable".into(),
         program: "1.2.3".into(),

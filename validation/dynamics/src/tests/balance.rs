@@ -164,7 +164,7 @@ fn displaced_forces_carry_nothing_across_a_film() {
             let there =
                 fluid.evaluate(simulation.engine().pool(), to, &place.species, &simulation.state().domain);
             sums[0] += carried;
-            sums[1] += carried + kick.share * (there.virial[2] - kick.virial[2]) / frame.volume();
+            sums[1] += carried + kick.share * (there.virial()[2] - kick.virial[2]) / frame.volume();
         }
         carried.push(sums[0] / f64::from(steps));
         elsewhere.push(sums[1] / f64::from(steps));

@@ -189,8 +189,11 @@ fn recorded_drag_is_what_slows_particles() {
             let drag: f64 = flux
                 .drag
                 .iter()
-                .flat_map(|drag| drag.lines.iter().flatten())
-                .map(|line| line.f[0] * dot(line.d).signum())
+                .flat_map(|drag| &drag.pairs)
+                .flat_map(|pairs| {
+                    (0..pairs.i.len()).map(|k| (pairs.d.each_ref().map(|d| d[k]), pairs.strengths[k]))
+                })
+                .map(|(d, strength)| strength * d[0] * dot(d).signum())
                 .sum();
             acted += usize::from(drag != 0.0);
             if in_forces {

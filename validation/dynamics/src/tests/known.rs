@@ -93,7 +93,7 @@ fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
 fn drag(line: Line) -> Vec<Arc<Drag>> {
     let Line { d, f, .. } = line;
     let sum = COMPONENTS.map(|(a, b)| 0.5 * (d[a] * f[b] + d[b] * f[a]));
-    vec![Arc::new(Drag { sum, lines: vec![vec![line]] })]
+    vec![Arc::new(Drag { sum, friction: vec![line], ..Drag::default() })]
 }
 
 /// One direction lies along the interface in a plane, two directions in space; P_T is their mean.

@@ -110,7 +110,7 @@ fn stretching_and_stress_agree_on_every_configuration() {
     }
     let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
     let frame = Frame::new(simulation.view(0.0), &fluid);
-    let virial = frame.evaluation().virial;
+    let virial = frame.evaluation().virial();
     for axis in 0..3 {
         let others: f64 = (0..3).filter(|c| *c != axis).map(|c| virial[c]).sum();
         // The derivative dU/d ln A follows from ∂U/∂ε_cc = −W_cc.

@@ -152,7 +152,7 @@ fn a_liquid_in_equilibrium() {
     let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
     let frame = frame::Frame::new(simulation.view(0.0), &fluid);
     assert!((frame.evaluation().energy - simulation.potential_energy()).abs() < 1e-9);
-    for (a, b) in frame.evaluation().virial.iter().zip(simulation.tally().virial) {
+    for (a, b) in frame.evaluation().virial().iter().zip(simulation.tally().virial) {
         assert!((a - b).abs() < 1e-8);
     }
 }

@@ -2,7 +2,6 @@ use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
 use super::spheres::{Around, Spheres};
 use super::*;
-use crate::flux::Carrier;
 use crate::profile::flank_interface;
 use std::f64::consts::TAU;
 
@@ -204,12 +203,9 @@ impl Meter for Drop {
         }
         let spheres = Spheres::new(self.bins, self.thickness(), self.dimensions);
         let around = Around::new(domain, centre, mean);
-        let carried = frame.sum_lines(2 * spheres.width(), |lines, sums| {
-            let first = spheres.width() * usize::from(lines.carrier == Carrier::Pair);
-            spheres.add(&around, lines, &mut sums[first..first + spheres.width()]);
-        });
+        let carried = frame.sum_lines(spheres.width(), |lines, sums| spheres.add(&around, lines, sums));
         let Some(carried) = carried else { return false };
-        for (carrier, sums) in carried.chunks_exact(spheres.width()).enumerate() {
+        for (carrier, sums) in carried.iter().enumerate() {
             for (shell, [normal, whole]) in spheres.shells(sums).enumerate() {
                 let (at, volume) = (shell * WIDTH + 1 + 2 * carrier, self.volume(shell));
                 row[at] = normal / volume;

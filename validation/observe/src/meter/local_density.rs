@@ -122,10 +122,10 @@ impl Meter for LocalDensity {
             |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
         let means: Vec<f64> = self.shells.iter().enumerate().map(|(k, w)| w / volume_of(k)).collect();
         let mut parts: Vec<(usize, Vec<f64>)> =
-            (0..evaluation.parts()).map(|part| (part, Vec::new())).collect();
+            (0..evaluation.parts().count()).map(|part| (part, Vec::new())).collect();
         view.pool.each(&mut parts, |(part, sums)| {
             sums.resize(2 * kinds * kinds, 0.0);
-            for (p, _) in evaluation.pairs_of(*part) {
+            for p in evaluation.pairs_of(*part) {
                 let (a, b) = (species[p.i] as usize, species[p.j] as usize);
                 let shell = means.get((p.r / width) as usize).copied().unwrap_or(0.0);
                 let slope = p.r * density.force_kernel.slope(p.r) / self.dimensions as f64;

@@ -344,7 +344,7 @@ fn ln(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flux::{Carrier, Line};
+    use crate::flux::Line;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 
     #[test]
@@ -435,7 +435,7 @@ mod tests {
                 dot(area, area).sqrt() < 1e-12
             });
             for (parallel, lines) in [(true, along), (false, across)] {
-                Lines::in_blocks(Carrier::Pair, parallel, lines.into_iter(), |lines| {
+                Lines::default().in_blocks(parallel, lines.into_iter(), |lines| {
                     spheres.add(&around, lines, &mut sums);
                 });
             }

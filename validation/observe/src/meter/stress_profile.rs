@@ -1,7 +1,7 @@
 use super::across::Across;
 use super::strips::{Ends, Strips};
 use super::*;
-use crate::flux::{BLOCK, Carrier, Lines};
+use crate::flux::{BLOCK, Lines};
 use crate::keys::RECENTRE;
 use psidpd_core::engine::vectors::{Loop, run_best};
 
@@ -31,13 +31,11 @@ impl StressProfile {
             rest: (self.dimensions - 1) as f64,
         };
         let strips = Strips::of(&self.across);
-        let sums = frame.sum_lines(2 * strips.width(), |lines, sums| {
-            let own =
-                &mut sums[strips.width() * usize::from(lines.carrier == Carrier::Pair)..][..strips.width()];
+        let sums = frame.sum_lines(strips.width(), |lines, sums| {
             let mut ends = run_best(Project { lines, stresses });
-            strips.add(&mut ends, lines.count, own);
+            strips.add(&mut ends, lines.count, sums);
         })?;
-        let [momenta, forces] = [0, 1].map(|k| strips.bins(&sums[k * strips.width()..][..strips.width()]));
+        let [momenta, forces] = sums.map(|sums| strips.bins(&sums));
         let bins = momenta.as_chunks::<2>().0.iter().zip(forces.as_chunks::<2>().0);
         Some(bins.flat_map(|([a, b], [c, d])| [*a, *b, *c, *d]).collect())
     }

@@ -31,7 +31,7 @@ use motion::Motion;
 use particles::Particles;
 use psidpd_core::engine::{Step, Want, check_reach};
 use psidpd_core::model::Model;
-use record::Record;
+use record::{Record, Spare};
 use thermostat::Thermostat;
 
 /// Particles in a box, with the forces of one fluid.
@@ -55,6 +55,7 @@ pub struct Simulation {
     forces_at: Place,
     /// The transport of momentum in the present step; `None` without recording.
     record: Option<Box<Record>>,
+    spare: Spare,
     /// The GPU that makes the steps; `None` for the CPU.
     #[cfg(feature = "gpu")]
     gpu: Option<Box<gpu::Gpu>>,
@@ -95,6 +96,7 @@ impl Simulation {
             number: 0,
             forces_at: Place::End,
             record: None,
+            spare: Spare::default(),
             #[cfg(feature = "gpu")]
             gpu: None,
         })
@@ -240,7 +242,7 @@ impl Simulation {
 
     fn forget_impulses(&mut self) {
         self.thermostat.impulse_virial = [0.0; 6];
-        self.thermostat.held_drag.clear();
+        self.spare.keep_drag(std::mem::take(&mut self.thermostat.held_drag));
     }
 
     /// The virial and the drag that the thermostat holds until it acts again, for a checkpoint.

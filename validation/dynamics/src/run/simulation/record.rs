@@ -3,7 +3,8 @@
 use super::{Simulation, State};
 use crate::integrator::Integrator;
 use crate::run::integrator::reflection::{Hit, Leg, Path};
-use psidpd_core::engine::thermostat::{Pull, Pulls};
+use psidpd_core::engine::Pool;
+use psidpd_core::engine::thermostat::{PairThermostat, Pulls};
 use psidpd_observe::flux::{Acted, Drag, Flux, Line, OnWall, Place, Recorded};
 use std::sync::Arc;
 
@@ -17,11 +18,35 @@ pub struct Record {
     open: bool,
 }
 
+/// Arrays of earlier records, for reuse: new ones cost more than what fills them.
+#[derive(Debug, Default)]
+pub(super) struct Spare {
+    ways: Vec<Line>,
+    drag: Vec<Drag>,
+}
+
+impl Spare {
+    fn keep(&mut self, flux: Flux) {
+        self.ways = flux.ways;
+        self.keep_drag(flux.drag);
+    }
+
+    /// Keeps the pairs that nobody else has.
+    pub fn keep_drag(&mut self, drag: Vec<Arc<Drag>>) {
+        let drag = drag.into_iter().filter_map(Arc::into_inner);
+        self.drag.extend(drag.filter(|drag| !drag.pairs.is_empty()));
+    }
+}
+
 impl Simulation {
     /// Sets what later steps record of the transport of momentum. Trajectories do not depend on it.
     pub fn record_flux(&mut self, what: Recorded) {
         match what {
-            Recorded::Nothing => self.record = None,
+            Recorded::Nothing => {
+                if let Some(record) = self.record.take() {
+                    self.spare.keep(record.flux);
+                }
+            }
             _ => self.record.get_or_insert_default().what = what,
         }
     }
@@ -40,17 +65,22 @@ impl Simulation {
     }
 
     pub(super) fn open_record(&mut self, dt: f64) {
-        if let Some(record) = &mut self.record {
-            // Between two actions the drag of the last goes on.
-            let flux = Flux { drag: self.thermostat.held_drag.clone(), ..Flux::default() };
-            **record = Record { what: record.what, dt, flux, open: true };
+        let Some(record) = self.record.as_deref_mut() else { return };
+        if record.dt > 0.0 {
+            self.spare.keep(std::mem::take(&mut record.flux));
         }
+        let mut ways = std::mem::take(&mut self.spare.ways);
+        ways.clear();
+        // Between two actions the drag of the last goes on.
+        record.flux = Flux { ways, drag: self.thermostat.held_drag.clone(), ..Flux::default() };
+        (record.dt, record.open) = (dt, true);
     }
 
     /// Keeps the drag of this step for the records of the next ones.
     pub(super) fn hold_drag(&mut self) {
         if let Some(record) = &self.record {
-            self.thermostat.held_drag.clone_from(&record.flux.drag);
+            let before = std::mem::replace(&mut self.thermostat.held_drag, record.flux.drag.clone());
+            self.spare.keep_drag(before);
         }
     }
 
@@ -75,7 +105,9 @@ impl Simulation {
         }
         self.record_hits(hits);
         let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
-        let mut ways = Vec::with_capacity(self.len() + legs.len());
+        let mut ways =
+            self.record.as_deref_mut().map_or_else(Vec::new, |record| std::mem::take(&mut record.flux.ways));
+        ways.reserve(self.len() + legs.len());
         let mut legs = legs.iter().peekable();
         for k in 0..self.len() {
             let mass = self.particles.mass_of(k);
@@ -93,7 +125,7 @@ impl Simulation {
             ways.push(Line { from, d: u.map(|u| path.time * u), f: u.map(|u| momentum * u) });
         }
         if let Some(record) = self.record.as_deref_mut() {
-            record.flux.ways.extend(ways);
+            record.flux.ways = ways;
         }
     }
 
@@ -166,22 +198,30 @@ impl Simulation {
         }
     }
 
-    /// Records the drag during a part `share` of the step, which `of` computes: it is called with the function that makes lines of
-    /// pairs, if lines are recorded.
+    /// Records the drag during a part `share` of the step. `find` computes its virial, and its pairs if lines are recorded.
     pub(super) fn record_drag(
         &mut self,
         share: f64,
-        of: impl FnOnce(&Simulation, Option<LineOf>) -> Pulls<Line>,
+        find: impl FnOnce(&PairThermostat, &Pool, Option<&mut Vec<Pulls>>) -> [f64; 6],
     ) {
-        let x = &self.particles.now().x;
-        let line =
-            |pull: Pull| Line { from: x[pull.i], d: pull.d, f: pull.d.map(|d| share * pull.strength * d) };
-        let line: LineOf = &line;
-        let Pulls { virial, of_planes } = of(self, self.records_lines().then_some(line));
-        if let Some(record) = &mut self.record {
-            let drag = Drag { sum: virial.map(|w| share * w), lines: of_planes };
-            record.flux.drag.push(Arc::new(drag));
+        let lines = self.records_lines();
+        let Some(mut record) = self.record.take() else { return };
+        let spare = if lines { self.spare.drag.pop() } else { None };
+        let mut drag = spare.unwrap_or_default();
+        drag.sum = match self.thermostat.pairs() {
+            Some(pairs) => find(pairs, self.engine().pool(), lines.then_some(&mut drag.pairs)),
+            None => [0.0; 6],
+        };
+        drag.sum.iter_mut().for_each(|w| *w *= share);
+        if lines {
+            drag.x.clone_from(&self.particles.now().x);
+            drag.pairs
+                .iter_mut()
+                .flat_map(|pairs| &mut pairs.strengths)
+                .for_each(|strength| *strength *= share);
         }
+        record.flux.drag.push(Arc::new(drag));
+        self.record = Some(record);
     }
 }
 
@@ -191,6 +231,3 @@ fn add_to_walls(sums: &mut Vec<OnWall>, given: &[OnWall]) {
         (0..4).for_each(|c| sum[c] += given[c]);
     }
 }
-
-/// Makes a line of the drag of a pair.
-pub(super) type LineOf<'a> = &'a (dyn Fn(Pull) -> Line + Sync);

@@ -5,7 +5,7 @@ use super::forces::Forces;
 use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Pulls, Stream, Update, Warmth};
+use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
 use psidpd_core::engine::{Step, Want};
 use psidpd_observe::flux::Drag;
 use std::sync::Arc;
@@ -64,6 +64,10 @@ impl Thermostat {
     /// Whether the present forces are those that an integrator needs which has drag in them, or has not.
     pub fn fits(&self, drag_in_forces: bool) -> bool {
         !self.on || self.in_forces.is_none_or(|there| there == drag_in_forces)
+    }
+
+    pub fn pairs(&self) -> Option<&PairThermostat> {
+        self.pairs.as_ref()
     }
 
     /// Iterations since the start.
@@ -198,10 +202,7 @@ impl Simulation {
 
     /// Records the drag at velocities `v` during a part `share` of the step.
     fn record_drag_at(&mut self, share: f64, v: &[[f64; 3]]) {
-        self.record_drag(share, |system, line| {
-            let pairs = system.thermostat.pairs.as_ref();
-            pairs.map_or_else(Pulls::default, |pairs| pairs.drags(system.engine().pool(), v, line))
-        });
+        self.record_drag(share, |pairs, pool, pulls| pairs.drags(pool, v, pulls));
     }
 
     /// Announces that the thermostat will act where the next forces are computed.
@@ -260,10 +261,7 @@ impl Simulation {
                     self.record_drag_at(part, &acting);
                 }
                 Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => {
-                    self.record_drag(part, |system, line| {
-                        let pairs = system.thermostat.pairs.as_ref();
-                        pairs.map_or_else(Pulls::default, |pairs| pairs.pulls(system.engine().pool(), line))
-                    });
+                    self.record_drag(part, |pairs, pool, pulls| pairs.pulls(pool, pulls));
                 }
             }
         }

@@ -71,8 +71,8 @@ impl Simulation {
         particles.put_velocities(v);
         self.motion.wall_virial = virial;
         if recording {
-            let lines = if self.records_lines() { vec![lines] } else { Vec::new() };
-            self.record_friction(Arc::new(Drag { sum: drag, lines }), &given);
+            let friction = if self.records_lines() { lines } else { Vec::new() };
+            self.record_friction(Arc::new(Drag { sum: drag, friction, ..Drag::default() }), &given);
         }
         Ok(())
     }
