@@ -79,7 +79,12 @@ impl<'a> Frame<'a> {
     /// `None` if the step did not record them.
     ///
     /// Threads share the lines. The parts of their sums, and the order in which these are added, do not depend on the number of threads.
-    pub fn sum_lines(&self, width: usize, add: impl Fn(&Lines, &mut [f64]) + Sync) -> Option<[Vec<f64>; 2]> {
+    /// `add` gets a block of lines, arrays of its own, which it may leave as they are, and the sums.
+    pub fn sum_lines<A: Default>(
+        &self,
+        width: usize,
+        add: impl Fn(&Lines, &mut A, &mut [f64]) + Sync,
+    ) -> Option<[Vec<f64>; 2]> {
         let flux = self.view.flux?;
         let earlier = self.earlier.get_or_init(|| {
             flux.forces.iter().map(|acted| acted.at.as_ref().map(|at| self.earlier(at))).collect()
@@ -116,8 +121,8 @@ impl<'a> Frame<'a> {
         }
         self.view.pool.each(&mut work, |Work { parts, sums, .. }| {
             sums.resize(width, 0.0);
-            let mut lines = Lines::default();
-            parts.iter().for_each(|part| part.in_blocks(&mut lines, |lines| add(lines, sums)));
+            let (mut lines, mut arrays) = (Lines::default(), A::default());
+            parts.iter().for_each(|part| part.in_blocks(&mut lines, |lines| add(lines, &mut arrays, sums)));
         });
         let mut all = [vec![0.0; width], vec![0.0; width]];
         for Work { carrier, sums, .. } in &work {
@@ -141,10 +146,20 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// Computes the present forces if [`Frame::sum_lines`] will need them; then pairs need no search of their own.
+    pub fn expect_lines(&self) {
+        if self.view.flux.is_some_and(|flux| flux.forces.iter().any(|acted| acted.at.is_none())) {
+            self.evaluation();
+        }
+    }
+
     /// Calls `visit` with every pair of particles closer than `range`, each once.
     pub fn for_each_pair(&self, range: f64, visit: impl FnMut(Pair)) {
         let View { pool, x, domain, .. } = self.view;
-        self.evaluator.for_each_pair(pool, x, domain, range, visit);
+        match self.evaluation.get().and_then(|done| done.pairs_within(range)) {
+            Some(pairs) => pairs.for_each(visit),
+            None => self.evaluator.for_each_pair(pool, x, domain, range, visit),
+        }
     }
 
     /// The pressure tensor of the momentum transport in the whole box; `None` if the step did not record it.

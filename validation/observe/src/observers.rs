@@ -112,6 +112,13 @@ impl Observers {
             self.fluid = fluid.map(|fluid| (view.kt, fluid));
         }
         let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(view, fluid));
+        for observer in self.observers.iter_mut().filter(|o| due(o)) {
+            for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
+                let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));
+                sampled.left_out = sampled.left_out.saturating_add(u64::from(!taken));
+            }
+        }
+        // Behind the observables, whose pairs it may take.
         let of_liquids = |o: &Observer| o.stages.iter().any(|s| s.stage == stage && s.meter.of_liquids());
         if let Some(frame) = &frame
             && self.observers.iter().any(|o| due(o) && of_liquids(o))
@@ -123,12 +130,6 @@ impl Observers {
             });
             let pairs = |range: f64, visit: &mut dyn FnMut(Pair)| frame.for_each_pair(range, visit);
             self.order[at].1.sample(&sight(frame, &pairs), |k| frame.moves(k));
-        }
-        for observer in self.observers.iter_mut().filter(|o| due(o)) {
-            for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
-                let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));
-                sampled.left_out = sampled.left_out.saturating_add(u64::from(!taken));
-            }
         }
     }
 

@@ -312,6 +312,11 @@ impl Evaluation {
         self.planes.iter().map(PlaneList::len)
     }
 
+    /// The pairs closer than a range, if that is at most the range of the conservative interactions.
+    pub fn pairs_within(&self, range: f64) -> Option<impl Iterator<Item = Pair>> {
+        (range <= self.range).then(|| self.planes.iter().flat_map(move |plane| plane.pairs(range)))
+    }
+
     /// The pairs of a part in the range of the conservative interactions.
     pub fn pairs_of(&self, part: usize) -> impl Iterator<Item = Pair> {
         self.planes[part].pairs(self.range)

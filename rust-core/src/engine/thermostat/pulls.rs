@@ -90,7 +90,7 @@ fn of_plane(
         return virial;
     }
     let mut block = Block { d: [[0.0; BLOCK]; 3], strengths: [0.0; BLOCK] };
-    plane.pairs().for_each(|[i, j, k]| {
+    plane.for_each_pair(|[i, j, k]| {
         let (at, g) = (k % BLOCK, list.g(k));
         (0..3).for_each(|c| block.d[c][at] = g[c]);
         block.strengths[at] = factor([i, j, k], g);

@@ -1,6 +1,6 @@
 use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
-use super::spheres::{Around, Spheres};
+use super::spheres::{Around, Seen, Spheres};
 use super::*;
 use crate::profile::flank_interface;
 use std::f64::consts::TAU;
@@ -174,6 +174,7 @@ impl Meter for Drop {
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let (x, domain) = (view.x, view.domain);
+        frame.expect_lines();
         let distance = self.distance.at(x, domain, self.dimensions, |_| true);
         let linked = Linked::of(frame, distance, |_| true);
         let Some(largest) = linked.largest() else { return false };
@@ -203,7 +204,9 @@ impl Meter for Drop {
         }
         let spheres = Spheres::new(self.bins, self.thickness(), self.dimensions);
         let around = Around::new(domain, centre, mean);
-        let carried = frame.sum_lines(spheres.width(), |lines, sums| spheres.add(&around, lines, sums));
+        let carried = frame.sum_lines(spheres.width(), |lines, seen: &mut Seen, sums| {
+            spheres.add(&around, lines, seen, sums);
+        });
         let Some(carried) = carried else { return false };
         for (carrier, sums) in carried.iter().enumerate() {
             for (shell, [normal, whole]) in spheres.shells(sums).enumerate() {

@@ -131,10 +131,10 @@ impl Spheres {
     }
 
     /// Adds lines to `sums`.
-    pub fn add(&self, around: &Around, lines: &Lines, sums: &mut [f64]) {
+    pub fn add(&self, around: &Around, lines: &Lines, seen: &mut Seen, sums: &mut [f64]) {
         match lines.parallel {
-            true => run_best(Share::<true> { spheres: self, around, lines, sums }),
-            false => run_best(Share::<false> { spheres: self, around, lines, sums }),
+            true => run_best(Share::<true> { spheres: self, around, lines, seen, sums }),
+            false => run_best(Share::<false> { spheres: self, around, lines, seen, sums }),
         }
     }
 
@@ -153,11 +153,13 @@ struct Share<'a, const PARALLEL: bool> {
     spheres: &'a Spheres,
     around: &'a Around,
     lines: &'a Lines,
+    seen: &'a mut Seen,
     sums: &'a mut [f64],
 }
 
 /// A block of lines as seen from the centre.
-struct Seen {
+#[derive(Debug)]
+pub struct Seen {
     /// The distance of the line from the centre.
     b: [f32; BLOCK],
     /// F and `f·p`.
@@ -172,23 +174,29 @@ struct Seen {
     outwards: [[f32; BLOCK]; 2],
 }
 
+impl Default for Seen {
+    fn default() -> Seen {
+        let (numbers, none) = ([0.0; BLOCK], [[0.0; BLOCK]; 2]);
+        Seen {
+            b: numbers,
+            force: numbers,
+            across: numbers,
+            shell: [[0; BLOCK]; 2],
+            normal: [[0.0; BLOCK]; 2],
+            whole: [[0.0; BLOCK]; 2],
+            inwards: none,
+            outwards: none,
+        }
+    }
+}
+
 impl<const PARALLEL: bool> Loop for Share<'_, PARALLEL> {
     type Out = ();
 
     #[inline(always)]
     fn run(self) {
-        let Share { spheres, around, lines, sums } = self;
-        let mut seen = Seen {
-            b: [0.0; BLOCK],
-            force: [0.0; BLOCK],
-            across: [0.0; BLOCK],
-            shell: [[0; BLOCK]; 2],
-            normal: [[0.0; BLOCK]; 2],
-            whole: [[0.0; BLOCK]; 2],
-            inwards: [[0.0; BLOCK]; 2],
-            outwards: [[0.0; BLOCK]; 2],
-        };
-        see::<PARALLEL>(spheres, around, lines, &mut seen);
+        let Share { spheres, around, lines, seen, sums } = self;
+        see::<PARALLEL>(spheres, around, lines, seen);
         let entries = spheres.entries();
         let (of_shells, of_spheres) = sums.split_at_mut(2 * entries);
         let (normal, whole) = of_shells.split_at_mut(entries);
@@ -436,7 +444,7 @@ mod tests {
             });
             for (parallel, lines) in [(true, along), (false, across)] {
                 Lines::default().in_blocks(parallel, lines.into_iter(), |lines| {
-                    spheres.add(&around, lines, &mut sums);
+                    spheres.add(&around, lines, &mut Seen::default(), &mut sums);
                 });
             }
             let scale = expected.iter().flatten().fold(1.0f64, |most, x| most.max(x.abs()));

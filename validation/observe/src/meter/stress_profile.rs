@@ -31,9 +31,9 @@ impl StressProfile {
             rest: (self.dimensions - 1) as f64,
         };
         let strips = Strips::of(&self.across);
-        let sums = frame.sum_lines(strips.width(), |lines, sums| {
-            let mut ends = run_best(Project { lines, stresses });
-            strips.add(&mut ends, lines.count, sums);
+        let sums = frame.sum_lines(strips.width(), |lines, ends: &mut Ends, sums| {
+            run_best(Project { lines, stresses, ends });
+            strips.add(ends, lines.count, sums);
         })?;
         let [momenta, forces] = sums.map(|sums| strips.bins(&sums));
         let bins = momenta.as_chunks::<2>().0.iter().zip(forces.as_chunks::<2>().0);
@@ -58,18 +58,18 @@ struct Stresses<'a> {
 struct Project<'a> {
     lines: &'a Lines,
     stresses: Stresses<'a>,
+    ends: &'a mut Ends,
 }
 
 impl Loop for Project<'_> {
-    type Out = Ends;
+    type Out = ();
 
     #[inline(always)]
-    fn run(self) -> Ends {
-        let Project { lines: Lines { from, d, f, .. }, stresses } = self;
+    fn run(self) {
+        let Project { lines: Lines { from, d, f, .. }, stresses, ends } = self;
         let Stresses { across, normal: n, along, origin, shift, rest } = stresses;
         let (bins, volume) = (across.bins as f64, across.bin_volume());
         let per_length = bins / across.height;
-        let mut ends = Ends { from: [0.0; BLOCK], to: [0.0; BLOCK], weights: [[0.0; BLOCK]; 2] };
         for k in 0..BLOCK {
             let x = [from[0][k] - origin[0], from[1][k] - origin[1], from[2][k] - origin[2]];
             let start = along[0] * x[0] + along[1] * x[1] + along[2] * x[2] + shift;
@@ -82,7 +82,6 @@ impl Loop for Project<'_> {
             ends.weights[0][k] = normal;
             ends.weights[1][k] = (whole - normal) / rest;
         }
-        ends
     }
 }
 

@@ -15,8 +15,8 @@ pub const WEIGHTS: usize = 2;
 /// The numbers in a strip: what the bin gets, then what each bin from there on gets.
 const WIDTH: usize = 2 * WEIGHTS;
 
-/// How lines are added to strips, of which there are more than bins: a line may go on beyond the end of a periodic box, and may
-/// begin or end outside another box.
+/// How lines are added to strips, of which there are more than bins: in a periodic box lines begin in the middle one of three copies of
+/// the bins, and may go on in the others; in another box they may begin or end outside.
 #[derive(Debug, Clone, Copy)]
 pub struct Strips {
     bins: usize,
@@ -29,6 +29,14 @@ pub struct Ends {
     pub from: [f64; BLOCK],
     pub to: [f64; BLOCK],
     pub weights: [[f64; BLOCK]; WEIGHTS],
+    steps: Steps,
+}
+
+impl Default for Ends {
+    fn default() -> Ends {
+        let none = [0.0; BLOCK];
+        Ends { from: none, to: none, weights: [none; WEIGHTS], steps: Steps::default() }
+    }
 }
 
 impl Strips {
@@ -37,7 +45,7 @@ impl Strips {
     }
 
     fn count(&self) -> usize {
-        if self.periodic { 2 * self.bins + 1 } else { self.bins + 2 }
+        if self.periodic { 3 * self.bins + 1 } else { self.bins + 2 }
     }
 
     /// The number of sums over lines.
@@ -47,23 +55,15 @@ impl Strips {
 
     /// Adds `count` lines to `sums`.
     pub fn add(&self, lines: &mut Ends, count: usize, sums: &mut [f64]) {
-        for k in 0..count {
-            if self.periodic && (lines.to[k] - lines.from[k]).abs() > self.bins as f64 {
-                self.take_turns(lines, k, sums);
-            }
-        }
-        let mut steps = Steps::default();
-        run_best(Place { strips: *self, lines, steps: &mut steps });
-        let Steps { at, here, after } = &steps;
-        for k in 0..count {
-            for end in 0..2 {
-                let strip = &mut sums[WIDTH * at[end][k] as usize..][..WIDTH];
-                for (c, weights) in lines.weights.iter().enumerate() {
-                    strip[c] += weights[k] * here[end][k];
-                    strip[WEIGHTS + c] += weights[k] * after[end][k];
+        if run_best(Place { strips: *self, lines }) && self.periodic {
+            for k in 0..count {
+                if (lines.to[k] - lines.from[k]).abs() > self.bins as f64 {
+                    self.take_turns(lines, k, sums);
                 }
             }
+            run_best(Place { strips: *self, lines });
         }
+        run_best(Add { lines, count, sums });
     }
 
     /// Adds the whole turns of a line that is longer than a period, and leaves the rest of it.
@@ -100,52 +100,93 @@ impl Strips {
 }
 
 /// The strip of each end of a block of lines, and which parts of the weights it gets.
+#[derive(Debug)]
 struct Steps {
     at: [[u32; BLOCK]; 2],
     here: [[f64; BLOCK]; 2],
-    after: [[f64; BLOCK]; 2],
+    /// What each strip behind the first end gets, and those behind the other end lose.
+    after: [f64; BLOCK],
 }
 
 impl Default for Steps {
     fn default() -> Steps {
-        Steps { at: [[0; BLOCK]; 2], here: [[0.0; BLOCK]; 2], after: [[0.0; BLOCK]; 2] }
+        Steps { at: [[0; BLOCK]; 2], here: [[0.0; BLOCK]; 2], after: [0.0; BLOCK] }
     }
 }
 
 /// Finds the strips of a block of lines.
 struct Place<'a> {
     strips: Strips,
-    lines: &'a Ends,
-    steps: &'a mut Steps,
+    lines: &'a mut Ends,
 }
 
 impl Loop for Place<'_> {
+    type Out = bool;
+
+    /// Returns whether a line may be longer than a period.
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Place { strips, lines: Ends { from, to, steps, .. } } = self;
+        let Steps { at: [at_from, at_to], here: [here_from, here_to], after } = steps;
+        let (bins, periodic, top) = (strips.bins as f64, strips.periodic, (strips.count() - 1) as f64);
+        let mut is_long = false;
+        for k in 0..BLOCK {
+            // Outside a box that is not periodic is a strip at either end.
+            let shift = if periodic { bins - (from[k] / bins).floor() * bins } else { 1.0 };
+            let (start, end) = (from[k] + shift, to[k] + shift);
+            let (first, last, slope) = (start.floor(), end.floor(), 1.0 / (end - start));
+            let (up, down) = (first + 1.0 - start, last + 1.0 - end);
+            let is_short = (last - first).abs() < 1.5;
+            let rises = start <= end;
+            let of_lower = (if rises { up } else { down } * slope.abs()).min(1.0);
+            let of_upper = 1.0 - of_lower;
+            let [short_from, short_to] = if rises { [of_lower, of_upper] } else { [of_upper, of_lower] };
+            here_from[k] = if is_short { short_from } else { up * slope };
+            here_to[k] = if is_short { short_to } else { -down * slope };
+            after[k] = if is_short { 0.0 } else { slope };
+            at_from[k] = first.max(0.0).min(top) as u32;
+            at_to[k] = last.max(0.0).min(top) as u32;
+            is_long |= (to[k] - from[k]).abs() > bins;
+        }
+        is_long
+    }
+}
+
+/// Adds a block of lines to the sums of their strips.
+struct Add<'a> {
+    lines: &'a Ends,
+    count: usize,
+    sums: &'a mut [f64],
+}
+
+impl Loop for Add<'_> {
     type Out = ();
 
     #[inline(always)]
     fn run(self) {
-        let Place { strips: Strips { bins, periodic }, lines: Ends { from, to, .. }, steps } = self;
-        let Steps { at: [at_low, at_high], here: [here_low, here_high], after: [after_low, after_high] } =
-            steps;
-        let (bins, top) = (bins as f64, if periodic { 2.0 * bins as f64 } else { bins as f64 + 1.0 });
-        for k in 0..BLOCK {
-            let (low, high) = (from[k].min(to[k]), from[k].max(to[k]));
-            // Outside a box that is not periodic is a strip at either end.
-            let shift = if periodic { -(low / bins).floor() * bins } else { 1.0 };
-            let (low, high) = (low + shift, high + shift);
-            let (first, last, length) = (low.floor(), high.floor(), high - low);
-            let (up, down) = (first + 1.0 - low, last + 1.0 - high);
-            let is_short = last - first < 1.5;
-            let slope = 1.0 / length;
-            let part = (up * slope).min(1.0);
-            here_low[k] = part;
-            here_high[k] = if is_short { 1.0 - part } else { -down * slope };
-            after_low[k] = if is_short { 0.0 } else { slope };
-            after_high[k] = if is_short { 0.0 } else { -slope };
-            at_low[k] = first.max(0.0).min(top) as u32;
-            at_high[k] = last.max(0.0).min(top) as u32;
+        let Add { lines: Ends { weights: [normal, rest], steps, .. }, count, sums } = self;
+        let Steps { at: [at_from, at_to], here: [here_from, here_to], after } = steps;
+        let (strips, _) = sums.as_chunks_mut::<WIDTH>();
+        // Lines follow each other that begin at one particle, so that what begins in one strip is added up first.
+        let (mut strip, mut here) = (at_from[0] as usize, [0.0; WIDTH]);
+        for k in 0..count {
+            let weights = [normal[k], rest[k], normal[k], rest[k]];
+            let (from, to, behind) = (here_from[k], here_to[k], after[k]);
+            if at_from[k] as usize != strip {
+                add(&mut strips[strip], [1.0; WIDTH], here);
+                (strip, here) = (at_from[k] as usize, [0.0; WIDTH]);
+            }
+            add(&mut here, [from, from, behind, behind], weights);
+            add(&mut strips[at_to[k] as usize], [to, to, -behind, -behind], weights);
         }
+        add(&mut strips[strip], [1.0; WIDTH], here);
     }
+}
+
+/// Adds weights times factors.
+#[inline(always)]
+fn add(sums: &mut [f64; WIDTH], factors: [f64; WIDTH], weights: [f64; WIDTH]) {
+    (0..WIDTH).for_each(|c| sums[c] += factors[c] * weights[c]);
 }
 
 #[cfg(test)]
@@ -161,7 +202,7 @@ mod tests {
         for (bins, periodic) in [(7, true), (7, false), (1, true), (1, false), (40, true)] {
             let strips = Strips { bins, periodic };
             let n = bins as f64;
-            let mut lines = Ends { from: [0.0; BLOCK], to: [0.0; BLOCK], weights: [[0.0; BLOCK]; WEIGHTS] };
+            let mut lines = Ends::default();
             for k in 0..BLOCK {
                 let from = n * (3.0 * random.random::<f64>() - 1.0);
                 let length =

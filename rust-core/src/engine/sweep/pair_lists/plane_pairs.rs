@@ -23,6 +23,19 @@ impl PlanePairs {
         self.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
     }
 
+    /// Calls `visit` with what [`PlanePairs::pairs`] gives, in a loop that the compiler can see through.
+    #[inline(always)]
+    pub fn for_each_pair(&self, mut visit: impl FnMut([usize; 3])) {
+        let PlanePairs { own, next, lists } = self;
+        for (i, of_i) in pairs_of_each(&lists.own.start) {
+            for k in of_i {
+                let j = lists.own.second(k);
+                let second = if j < own.len() { own.start + j } else { next.start + (j - own.len()) };
+                visit([own.start + i, second, k]);
+            }
+        }
+    }
+
     /// The sorted indices of the two particles of each pair without a ghost, and the index of the pair in its list.
     pub fn pairs(&self) -> impl Iterator<Item = [usize; 3]> {
         let PlanePairs { own, next, lists } = self;
