@@ -110,13 +110,17 @@ impl Around {
 impl Spheres {
     pub fn new(bins: usize, thickness: f64, dimensions: usize) -> Spheres {
         let radius: Vec<f64> = (0..bins + 1 + LANES).map(|k| k as f64 * thickness).collect();
+        // No line crosses the sphere of no radius.
+        let of_radii = |f: fn(f64) -> f64| -> Vec<f32> {
+            std::iter::once(0.0).chain(radius[1..].iter().map(|r| f(*r) as f32)).collect()
+        };
         Spheres {
             bins,
             thickness,
             dimensions,
-            inverse: radius.iter().map(|r| (1.0 / r) as f32).collect(),
-            logarithm: radius.iter().map(|r| r.ln() as f32).collect(),
-            radius: radius.into_iter().map(|r| r as f32).collect(),
+            inverse: of_radii(|r| 1.0 / r),
+            logarithm: of_radii(f64::ln),
+            radius: radius.iter().map(|r| *r as f32).collect(),
         }
     }
 
@@ -172,6 +176,8 @@ pub struct Seen {
     /// The spheres `first < k ≤ last` that the line crosses inwards, and those that it crosses outwards.
     inwards: [[f32; BLOCK]; 2],
     outwards: [[f32; BLOCK]; 2],
+    /// The first of whole vectors of spheres that hold all of these, and the one past the last of them.
+    crossed: [[u32; BLOCK]; 2],
 }
 
 impl Default for Seen {
@@ -186,6 +192,7 @@ impl Default for Seen {
             whole: [[0.0; BLOCK]; 2],
             inwards: none,
             outwards: none,
+            crossed: [[0; BLOCK]; 2],
         }
     }
 }
@@ -209,16 +216,9 @@ impl<const PARALLEL: bool> Loop for Share<'_, PARALLEL> {
             }
             let [in_first, in_last] = [seen.inwards[0][k], seen.inwards[1][k]];
             let [out_first, out_last] = [seen.outwards[0][k], seen.outwards[1][k]];
-            let crosses = [(in_first, in_last), (out_first, out_last)].map(|(first, last)| first < last);
-            let first = match crosses {
-                [true, true] => in_first.min(out_first),
-                [true, false] => in_first,
-                [false, true] => out_first,
-                [false, false] => continue,
-            };
-            let (first, last) = (first as usize + 1, in_last.max(out_last) as usize);
             let (b, force, across) = (seen.b[k], seen.force[k], seen.across[k]);
-            for at in (first..=last).step_by(LANES) {
+            let [first, end] = [seen.crossed[0][k], seen.crossed[1][k]].map(|k| k as usize);
+            for at in (first..end).step_by(LANES) {
                 let radius = lanes(&spheres.radius, at);
                 let inverse = lanes(&spheres.inverse, at);
                 let logarithm = lanes(&spheres.logarithm, at);
@@ -290,10 +290,16 @@ fn see<const PARALLEL: bool>(spheres: &Spheres, around: &Around, lines: &Lines, 
         let [of_start, of_end] = shells;
         let comes = start < 0.0;
         let goes = end > 0.0;
-        seen.inwards[0][k] = if goes { nearest } else { of_end };
-        seen.inwards[1][k] = if comes { of_start } else { 0.0 };
-        seen.outwards[0][k] = if comes { nearest } else { of_start };
-        seen.outwards[1][k] = if goes { of_end } else { 0.0 };
+        let inwards = [if goes { nearest } else { of_end }, if comes { of_start } else { 0.0 }];
+        let outwards = [if comes { nearest } else { of_start }, if goes { of_end } else { 0.0 }];
+        for side in 0..2 {
+            (seen.inwards[side][k], seen.outwards[side][k]) = (inwards[side], outwards[side]);
+        }
+        let [of_inwards, of_outwards] =
+            [inwards, outwards].map(|[first, last]| if first < last { first } else { most as f32 });
+        let first = (of_inwards.min(of_outwards) + 1.0) as u32;
+        seen.crossed[0][k] = first - first % LANES as u32;
+        seen.crossed[1][k] = inwards[1].max(outwards[1]) as u32 + 1;
     }
 }
 
