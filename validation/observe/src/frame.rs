@@ -62,7 +62,7 @@ struct Earlier {
 }
 
 /// The least number of lines, if there are so many, that a thread adds to sums of its own.
-const LINES: usize = 4096;
+const LINES: usize = 2048;
 
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {

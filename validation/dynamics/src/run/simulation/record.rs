@@ -210,7 +210,10 @@ impl Simulation {
         let mut drag = spare.unwrap_or_default();
         drag.sum = match self.thermostat.pairs() {
             Some(pairs) => find(pairs, self.engine().pool(), lines.then_some(&mut drag.pairs)),
-            None => [0.0; 6],
+            None => {
+                drag.pairs.clear();
+                [0.0; 6]
+            }
         };
         drag.sum.iter_mut().for_each(|w| *w *= share);
         if lines {
