@@ -287,7 +287,7 @@ mod tests {
             let (folder, scene) = (tempfile::tempdir().unwrap(), crowd());
             let mut frames = Frames::create(&scene, folder.path()).unwrap();
             write(folder.path().join("vtk"), "no folder").unwrap();
-            let mut put =
+            let put =
                 |frames: &mut Frames, step| frames.write(step, 0.0, Cow::Owned(moved(&scene, step)), true);
             put(&mut frames, 3).unwrap();
             frames.note();
