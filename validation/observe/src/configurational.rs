@@ -33,19 +33,20 @@ pub fn sums(frame: &Frame) -> [f64; 2] {
     sums
 }
 
-/// The weight of a particle and its gradient: 1, but near reflecting faces and round walls the distance from them in ranges of the forces.
+/// The weight of a particle and its gradient: that of the piece, which is 1 without one, and near reflecting faces and round walls the
+/// distance from them in ranges of the forces.
 ///
 /// `kT = ⟨w F·F⟩/⟨−∇·(w F)⟩` holds for any weight that is 0 where space ends. Without a weight a face adds `ρ F` to the divergence,
 /// with the density and the mean outward force of the particles that touch it.
 fn weight(frame: &Frame, rounds: &[Face], range: f64, x: [f64; 3]) -> (f64, [f64; 3]) {
     let domain = frame.view.domain;
-    let (mut weight, mut gradient) = (1.0, [0.0; 3]);
+    let (mut weight, mut gradient) = frame.piece.map_or((1.0, [0.0; 3]), |piece| piece.weight(x));
     for k in (0..frame.view.dimensions).filter(|k| !domain.periodic()[*k]) {
         let (below, length) = (x[k] - domain.origin()[k], domain.lengths()[k]);
         let (distance, slope) = if below < 0.5 * length { (below, 1.0) } else { (length - below, -1.0) };
         let (part, slope) = if distance < range { (distance / range, slope / range) } else { (1.0, 0.0) };
         gradient = gradient.map(|g| g * part);
-        gradient[k] = weight * slope;
+        gradient[k] += weight * slope;
         weight *= part;
     }
     for Face { place, .. } in rounds {
@@ -100,6 +101,12 @@ pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
 /// The mean square frequency of a particle in the field of the others, `⟨Σ ∇²U/m⟩/(dN)`.
 pub fn mean_square_frequency(frame: &Frame) -> f64 {
     let laplacians = frame.evaluation().laplacians(frame.view.pool, &frame.evaluator.fluid);
-    let sum: f64 = laplacians.into_iter().enumerate().map(|(k, l)| l / frame.mass(k)).sum();
-    sum / (frame.view.dimensions * frame.view.x.len()) as f64
+    let weight = |k: usize| frame.piece.map_or(1.0, |piece| piece.weight(frame.view.x[k]).0);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (k, l) in laplacians.into_iter().enumerate() {
+        let weight = weight(k);
+        sum += weight * l / frame.mass(k);
+        weights += weight;
+    }
+    sum / (frame.view.dimensions as f64 * weights)
 }

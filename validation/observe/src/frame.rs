@@ -1,6 +1,7 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
 use super::flux::{BLOCK, Carrier, Flux, Line, Lines, Place, Pull};
+use super::piece::Piece;
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair};
 use psidpd_core::engine::thermostat::Pulls;
 use psidpd_core::engine::{PeriodicBox, Pool};
@@ -49,6 +50,8 @@ pub struct Frame<'a> {
     pub view: View<'a>,
     /// It belongs to the fluid of the configuration.
     pub evaluator: &'a Evaluator,
+    /// The piece that the configuration is of a larger one.
+    pub piece: Option<&'a Piece>,
     evaluation: OnceCell<Evaluation>,
     /// The evaluations of forces that acted at positions other than the present ones.
     earlier: OnceCell<Vec<Option<Earlier>>>,
@@ -66,7 +69,14 @@ const LINES: usize = 2048;
 
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
-        Frame { view, evaluator, evaluation: OnceCell::new(), earlier: OnceCell::new() }
+        Frame { view, evaluator, piece: None, evaluation: OnceCell::new(), earlier: OnceCell::new() }
+    }
+
+    /// A piece of a configuration, or all of it.
+    pub fn of_piece(view: View<'a>, piece: Option<&'a Piece>, evaluator: &'a Evaluator) -> Frame<'a> {
+        let mut frame = Frame::new(piece.map_or(view, |piece| piece.view(view)), evaluator);
+        frame.piece = piece;
+        frame
     }
 
     /// Energies and conservative forces.

@@ -18,6 +18,7 @@ pub mod observation;
 pub mod observers;
 pub mod options;
 pub mod order;
+pub mod piece;
 pub mod profile;
 pub mod request;
 pub mod series;

@@ -1,5 +1,6 @@
 //! Advice about an integrator with larger steps than velocity Verlet.
 
+use super::watch::{LEAST, piece};
 use super::{Integrator, Simulation, State};
 use crate::integrator::Coupling;
 use crate::scene::Stage;
@@ -19,9 +20,6 @@ const ADVISED: Integrator = Integrator::ForceGradient {
 
 /// Cost of a recommended step in steps of velocity Verlet: three evaluations of forces and half a thermostat.
 const PRICE: f64 = 4.5;
-
-/// Largest number of particles for which drag and stiffness are computed, because both computations store all pairs.
-pub(super) const MOST: usize = 500_000;
 
 /// Smallest relative error that deserves advice.
 const WORTH: f64 = 0.01;
@@ -52,15 +50,19 @@ impl Advice {
         if stage.integrator != Integrator::VelocityVerlet || !stage.thermostat {
             return None;
         }
+        // The pairs of the thermostat, which many particles have gigabytes of, are not listed in vain.
+        if stage.steps < LEAST.max(TRIAL.div_ceil(simulation.len().max(1) as u64)) {
+            return None;
+        }
         // The estimate does not hold beside frozen walls, and a driven flow is hot by itself.
-        if simulation.has_body_forces() || !simulation.frozen().is_empty() || simulation.len() > MOST {
+        if simulation.has_body_forces() || !simulation.frozen().is_empty() {
             return None;
         }
         let drag = simulation.warmth(stage.dt).ok()??.rate;
         let frequency = frequency(simulation)?;
         let errors = stage.integrator.properties().accuracy.errors(stage.dt, frequency, drag);
         let worst = |errors: [f64; 2]| errors[0].max(errors[1]);
-        if worst(errors) <= WORTH || stage.steps.saturating_mul(simulation.len() as u64) < TRIAL {
+        if worst(errors) <= WORTH {
             return None;
         }
         let State { mass, .. } = simulation.state();
@@ -131,8 +133,10 @@ fn frequency(simulation: &Simulation) -> Option<f64> {
     if configurational::missing(&fluid, &simulation.state().domain).is_some() {
         return None;
     }
+    let piece = piece(simulation, &fluid, 1);
     let evaluator = Evaluator::new(fluid).ok()?;
-    let square = configurational::mean_square_frequency(&Frame::new(simulation.view(0.0), &evaluator));
+    let frame = Frame::of_piece(simulation.view(0.0), piece.as_ref(), &evaluator);
+    let square = configurational::mean_square_frequency(&frame);
     Some(square.max(0.0).sqrt())
 }
 

@@ -9,11 +9,12 @@
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
-use super::advice::MOST;
 use super::{RunError, Simulation};
 use crate::scene::Stage;
 use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::model::Fluid;
 use psidpd_observe::frame::Frame;
+use psidpd_observe::piece::Piece;
 use psidpd_observe::series::Series;
 use psidpd_observe::statistics::MINIMUM_SAMPLES;
 use psidpd_observe::{Estimate, Measured, configurational, difference};
@@ -30,6 +31,9 @@ const SAMPLES: u64 = 24;
 /// costs about as much as ten steps of velocity Verlet.
 const RARE: u64 = 1000;
 const LEAST_RARE: u64 = 250;
+
+/// Of more particles a configurational temperature takes a piece with about so many, which bounds its time and its memory.
+pub(super) const FEW: usize = 20_000;
 
 /// Target number of configurational temperatures in a stage.
 const LOOKS: u64 = 60;
@@ -214,13 +218,13 @@ impl Watch {
         let due = looks && looks_at_forces(stage, done);
         if !stage.integrator.has_time() {
             // Monte Carlo draws velocities at kT, so their temperature reveals no error.
-            self.configurational.extend(due.then(|| configurational(simulation)).flatten());
+            self.configurational.extend(due.then(|| configurational(simulation, done)).flatten());
             return Ok(());
         }
         let Some(warmth) = simulation.warmth(stage.dt)? else { return Ok(()) };
         let ratio = warmth.kt / stage.kt;
         self.kinetic.push(ratio);
-        if due && let Some(sums) = configurational(simulation) {
+        if due && let Some(sums) = configurational(simulation, done) {
             self.configurational.push(sums);
         }
         // A body force or a wall may drive a flow that is hot by itself.
@@ -330,18 +334,28 @@ fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Esti
     (error.is_finite() && error > 0.0).then_some(found)
 }
 
-/// The sums for a configurational temperature; `None` if the model has none, if the blocks are too few for an error, and with
-/// so many particles that their pairs would fill the memory.
-fn configurational(simulation: &Simulation) -> Option<Configurational> {
+/// The sums for a configurational temperature: of all particles if there are few, or else of a piece around one that `number` chooses. `None`
+/// if the model has none, or if the blocks are too few for an error.
+fn configurational(simulation: &Simulation, number: u64) -> Option<Configurational> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
     let missing = configurational::missing(&fluid, &simulation.state().domain).is_some();
-    if simulation.len() > MOST || simulation.has_body_forces() || missing {
+    if simulation.has_body_forces() || missing {
         return None;
     }
+    let piece = piece(simulation, &fluid, number);
     let evaluator = Evaluator::new(fluid).ok()?;
-    let blocks = configurational::sums_of_blocks(&Frame::new(simulation.view(0.0), &evaluator));
+    let frame = Frame::of_piece(simulation.view(0.0), piece.as_ref(), &evaluator);
+    let blocks = configurational::sums_of_blocks(&frame);
     let sums = Configurational::of(&blocks);
     (sums.b > 0.0 && blocks.len() > 1).then_some(sums)
+}
+
+/// A piece of many particles, each time around another.
+pub(super) fn piece(simulation: &Simulation, fluid: &Fluid, number: u64) -> Option<Piece> {
+    // A multiple of the golden ratio visits all places evenly.
+    let middle = (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % simulation.len().max(1);
+    let range = fluid.conservative_range().max(f64::MIN_POSITIVE);
+    Piece::of(&simulation.view(0.0), range, FEW, middle)
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ mod carried;
 mod crystals;
 mod known;
 mod meters;
+mod pieces;
 pub mod support;
 
 /// Two species with a density, for tests of keys.
