@@ -1,7 +1,7 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
 use super::flux::{BLOCK, Carrier, Flux, Line, Lines, Place, Pull};
-use super::piece::Piece;
+use super::piece::{Piece, Whole};
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair};
 use psidpd_core::engine::thermostat::Pulls;
 use psidpd_core::engine::{PeriodicBox, Pool};
@@ -45,6 +45,14 @@ pub struct View<'a> {
     pub flux: Option<&'a Flux>,
 }
 
+impl View<'_> {
+    /// All particles, of which a [`Piece`] can be taken.
+    pub fn whole(&self) -> Whole<'_> {
+        let View { domain, dimensions, x, species, frozen, .. } = *self;
+        Whole { domain, dimensions, x, species, frozen }
+    }
+}
+
 /// A configuration with cached results that several observables share.
 pub struct Frame<'a> {
     pub view: View<'a>,
@@ -74,7 +82,17 @@ impl<'a> Frame<'a> {
 
     /// A piece of a configuration, or all of it.
     pub fn of_piece(view: View<'a>, piece: Option<&'a Piece>, evaluator: &'a Evaluator) -> Frame<'a> {
-        let mut frame = Frame::new(piece.map_or(view, |piece| piece.view(view)), evaluator);
+        let of_piece = |Piece { x, species, still, .. }: &'a Piece| View {
+            x,
+            species,
+            frozen: still,
+            v: &[],
+            images: &[],
+            tags: &[],
+            flux: None,
+            ..view
+        };
+        let mut frame = Frame::new(piece.map_or(view, of_piece), evaluator);
         frame.piece = piece;
         frame
     }

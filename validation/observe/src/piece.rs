@@ -4,52 +4,56 @@
 //! kT = ⟨Σ w F·F⟩/⟨Σ (w ∇²U − ∇w·F)⟩ holds wherever the piece lies. The particles around, within twice the range of the forces, are those on
 //! which forces within depend.
 
-use crate::frame::View;
 use psidpd_core::engine::PeriodicBox;
 
 /// Ranges of the forces between the middle of a piece and its end, particles around included, at least.
 const LEAST: f64 = 4.5;
 
+/// All particles in their box, from which a piece is taken.
+#[derive(Clone, Copy)]
+pub struct Whole<'a> {
+    pub domain: &'a PeriodicBox,
+    pub dimensions: usize,
+    pub x: &'a [[f64; 3]],
+    pub species: &'a [i32],
+    /// True for particles that never move; empty if all particles move.
+    pub frozen: &'a [bool],
+}
+
 /// The particles of a piece and those around it.
 #[derive(Debug, Clone)]
 pub struct Piece {
-    x: Vec<[f64; 3]>,
-    species: Vec<i32>,
+    pub x: Vec<[f64; 3]>,
+    pub species: Vec<i32>,
     /// Whether a particle counts for nothing: one around the piece, or one that never moves.
-    still: Vec<bool>,
+    pub still: Vec<bool>,
     space: Space,
 }
 
 impl Piece {
     /// A piece around a particle, `middle`, with about `few` particles, those around included, or more where a piece of so few would be
     /// smaller than forces reach. `None` if the configuration has no more than that.
-    pub fn of(view: &View, range: f64, few: usize, middle: usize) -> Option<Piece> {
-        let (count, center) = (view.x.len(), *view.x.get(middle)?);
+    pub fn of(whole: Whole, range: f64, few: usize, middle: usize) -> Option<Piece> {
+        let (count, center) = (whole.x.len(), *whole.x.get(middle)?);
         if count <= few {
             return None;
         }
-        let space = |half: f64| Space::new(view, center, half, range);
+        let space = |half: f64| Space::new(whole, center, half, range);
         let everywhere = space(f64::INFINITY);
-        let away: Vec<f64> = view.x.iter().map(|x| everywhere.away(*x)).collect();
+        let away: Vec<f64> = whole.x.iter().map(|x| everywhere.away(*x)).collect();
         let mut sorted = away.clone();
         let end = sorted.select_nth_unstable_by(few, f64::total_cmp).1.max(LEAST * range);
         let space = space(end - 2.0 * range);
         let near = (0..count).filter(|k| away[*k] <= end);
         let mut piece = Piece { x: Vec::new(), species: Vec::new(), still: Vec::new(), space };
         for k in near {
-            let x = view.x[k];
-            let is_frozen = view.frozen.get(k).is_some_and(|frozen| *frozen);
+            let x = whole.x[k];
+            let is_frozen = whole.frozen.get(k).is_some_and(|frozen| *frozen);
             piece.x.push(x);
-            piece.species.push(view.species[k]);
+            piece.species.push(whole.species[k]);
             piece.still.push(is_frozen || piece.space.weight(x).0 == 0.0);
         }
         Some(piece)
-    }
-
-    /// The configuration of the piece: positions and species, in the box of `view`.
-    pub fn view<'a>(&'a self, view: View<'a>) -> View<'a> {
-        let Piece { x, species, still, .. } = self;
-        View { x, species, frozen: still, v: &[], images: &[], tags: &[], flux: None, ..view }
     }
 
     /// The weight at a point, and its gradient.
@@ -72,8 +76,8 @@ struct Space {
 }
 
 impl Space {
-    fn new(view: &View, center: [f64; 3], half: f64, range: f64) -> Space {
-        let (domain, dimensions) = (view.domain.clone(), view.dimensions);
+    fn new(whole: Whole, center: [f64; 3], half: f64, range: f64) -> Space {
+        let (domain, dimensions) = (whole.domain.clone(), whole.dimensions);
         let ends = |k: usize| {
             let across = domain.periodic()[k] && half + 2.0 * range >= 0.5 * domain.height(k);
             if k >= dimensions || across { f64::INFINITY } else { half }

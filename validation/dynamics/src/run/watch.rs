@@ -355,7 +355,7 @@ pub(super) fn piece(simulation: &Simulation, fluid: &Fluid, number: u64) -> Opti
     // A multiple of the golden ratio visits all places evenly.
     let middle = (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % simulation.len().max(1);
     let range = fluid.conservative_range().max(f64::MIN_POSITIVE);
-    Piece::of(&simulation.view(0.0), range, FEW, middle)
+    Piece::of(simulation.view(0.0).whole(), range, FEW, middle)
 }
 
 #[cfg(test)]

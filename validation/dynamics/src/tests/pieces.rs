@@ -49,9 +49,9 @@ fn a_piece_has_the_forces_of_the_whole() {
             false => simulation.view(0.0),
         };
         let range = evaluator.fluid.conservative_range();
-        assert!(Piece::of(&view, range, view.x.len(), 3).is_none());
+        assert!(Piece::of(view.whole(), range, view.x.len(), 3).is_none());
         for middle in [0, 7, view.x.len() - 1] {
-            let piece = Piece::of(&view, range, 2000, middle).unwrap();
+            let piece = Piece::of(view.whole(), range, 2000, middle).unwrap();
             let few = Frame::of_piece(view, Some(&piece), &evaluator);
             let mut all = Frame::new(view, &evaluator);
             all.piece = Some(&piece);
@@ -77,7 +77,7 @@ fn weights_fall_by_their_gradient() {
     let (simulation, evaluator) = crowd(SET6, "lengths = [11.0, 12.0, 13.0]", 3.0);
     let (domain, x) = tilted(&simulation);
     let view = View { domain: &domain, x: &x, ..simulation.view(0.0) };
-    let piece = Piece::of(&view, evaluator.fluid.conservative_range(), 2000, 40).unwrap();
+    let piece = Piece::of(view.whole(), evaluator.fluid.conservative_range(), 2000, 40).unwrap();
     let h = 1e-6;
     let (mut inside, mut kinks) = (0, 0);
     for x in view.x {
