@@ -51,7 +51,7 @@ impl Advice {
             return None;
         }
         // The pairs of the thermostat, which many particles have gigabytes of, are not listed in vain.
-        if stage.steps < LEAST.max(TRIAL.div_ceil(simulation.len().max(1) as u64)) {
+        if !is_worth_a_trial(stage, simulation.len()) {
             return None;
         }
         // The estimate does not hold beside frozen walls, and a driven flow is hot by itself.
@@ -87,6 +87,11 @@ impl Advice {
             time,
         })
     }
+}
+
+/// Whether a stage is so long that a trial is a small part of it.
+pub(super) fn is_worth_a_trial(stage: &Stage, particles: usize) -> bool {
+    stage.steps >= LEAST && stage.steps.saturating_mul(particles as u64) >= TRIAL
 }
 
 /// Whether a setting with a smaller error is worth what it takes, in times of the stage's.

@@ -61,7 +61,7 @@ const FACES: f64 = 1.2;
 
 /// A stage of at least this many steps is sampled for its configurational temperature. If the thermostat
 /// keeps velocities right at any time step, only this temperature reveals a step that is too long.
-const WORTH_A_LOOK: u64 = 1000;
+pub(super) const WORTH_A_LOOK: u64 = 1000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
