@@ -6,10 +6,10 @@ use psidpd_dynamics::run::{Advice, Begin, FILES, Length, Outcome, Runner, Start,
 use psidpd_experiments::check::uncalibrated;
 use psidpd_report::{Headline, headline, write_run_report};
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
+use signal_hook::low_level::{emulate_default_handler, register};
 use std::ffi::OsStr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Run a scene natively.
 ///
@@ -251,12 +251,16 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
 /// Returns a number that the first SIGINT or SIGTERM sets to its signal number. The second signal kills the program.
 pub fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
     let stop = Arc::new(AtomicUsize::new(0));
-    let stopping = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // The order matters: the second signal finds the flag that the first set.
-        flag::register_conditional_default(signal, stopping.clone())?;
-        flag::register(signal, stopping.clone())?;
-        flag::register_usize(signal, stop.clone(), signal as usize)?;
+        let stop = stop.clone();
+        let action = move || {
+            // Two signals may arrive in two threads at once, of which one is the second all the same.
+            if stop.compare_exchange(0, signal as usize, Ordering::Relaxed, Ordering::Relaxed).is_err() {
+                let _ = emulate_default_handler(signal);
+            }
+        };
+        // SAFETY: the action writes an atomic number and calls a function that is made for signal handlers; it never allocates or panics.
+        unsafe { register(signal, action)? };
     }
     Ok(stop)
 }
