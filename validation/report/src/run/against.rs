@@ -13,7 +13,7 @@ use std::path::Path;
 /// How often two runs of one scene from different seeds are said to differ, at most.
 pub const FALSE_ALARM: f64 = 0.01;
 
-/// What errors may be too small by: those of the coverage test are within it (docs/observables.md, "Errors").
+/// What errors may be too small by: those of all observables are within it (`errors_are_the_spread_of_means`).
 const ERRORS: f64 = 1.15;
 
 /// A quantity of both runs; of a curve the point where they differ most.
