@@ -31,6 +31,11 @@ impl Observe {
         };
         self.requests.iter().map(of_request).sum()
     }
+
+    /// Whether all pairs of a configuration may be listed.
+    pub fn lists_pairs(&self) -> bool {
+        self.requests.iter().any(|request| request.meter.lists_pairs())
+    }
 }
 
 /// Reads `[observe]`.

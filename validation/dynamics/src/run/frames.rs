@@ -25,8 +25,9 @@ const FEW: usize = 1000;
 
 /// Writes frames beside the steps, one at a time and in their order.
 pub(super) struct Frames {
-    /// `None` while a thread has them.
+    /// `None` while a thread has them, and once no thread could be started for them.
     files: Option<Files>,
+    folder: PathBuf,
     writing: Option<JoinHandle<(Files, Result<(), RunError>)>>,
     /// What was written of the growing files when it was last noted; `None` if a frame before that could not be written.
     noted: Option<BTreeMap<String, Written>>,
@@ -75,28 +76,31 @@ impl Frames {
             xyz,
             gsd,
         };
-        let noted = Some(files.written());
-        Ok(Frames { files: Some(files), writing: None, noted, notes: false, failed: false })
+        let (folder, files) = (folder.to_owned(), Some(files));
+        Ok(Frames { files, folder, writing: None, noted: None, notes: false, failed: false })
     }
 
     /// Writes the particles to the files that are due after a step, at once or `beside` the next steps; the error may be that of the
     /// frame before. `time` is measured from the start of the run.
     pub fn write(&mut self, step: u64, time: f64, state: Cow<State>, beside: bool) -> Result<(), RunError> {
         self.wait()?;
-        let Some(mut files) = self.files.take() else { return Ok(()) };
+        let Some(mut files) = self.files.take() else { return Err(self.missing()) };
         if !beside || state.len() < FEW {
             let done = files.write(step, time, &state);
             return self.take_back(files, done);
         }
         let state = state.into_owned();
-        let path = files.folder.clone();
         let write = move || {
             let done = files.write(step, time, &state);
             (files, done)
         };
         let thread = Builder::new().name("psidpd-output".into()).spawn(write);
-        self.writing = Some(thread.map_err(PathError::at("write", &path))?);
+        self.writing = Some(thread.map_err(PathError::at("write", &self.folder))?);
         Ok(())
+    }
+
+    fn missing(&self) -> RunError {
+        PathError::at("write", &self.folder)(io::Error::other("a frame is missing")).into()
     }
 
     /// Waits for the frame that is being written.
@@ -126,10 +130,9 @@ impl Frames {
     /// Syncs all files to the disk, and returns what was written of the growing ones when it was last noted.
     pub fn sync(&mut self) -> Result<BTreeMap<String, Written>, RunError> {
         self.wait()?;
-        let missing = |folder| PathError::at("write", folder)(io::Error::other("a frame is missing"));
-        let Some(files) = &mut self.files else { return Ok(BTreeMap::new()) };
+        let Some(files) = &mut self.files else { return Err(self.missing()) };
         files.sync()?;
-        self.noted.clone().ok_or_else(|| missing(&files.folder).into())
+        self.noted.clone().ok_or_else(|| self.missing())
     }
 }
 
@@ -303,6 +306,9 @@ mod tests {
             }
             frames.note();
             assert!(frames.sync().is_err());
+            // As after a thread that could not be started.
+            frames.files = None;
+            assert!(frames.sync().is_err() && put(&mut frames, 6).is_err());
         }
     }
 }

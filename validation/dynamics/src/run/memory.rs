@@ -9,6 +9,9 @@ use psidpd_formats::memory::{self, MemoryError, PARTICLE};
 const PAIRS: f64 = 900.0;
 const EVALUATION: f64 = 1300.0;
 
+/// Bytes per particle where observables list all pairs: `temperature` of 106 000 particles took 1970.
+const OBSERVED: f64 = 2000.0;
+
 /// What runs of fewer particles take besides: bytes per particle, and bytes in all. Two steps of 6 050 to 106 000 particles took 720 to 810
 /// bytes each, of 238 000 580, of 515 000 460.
 const BESIDES: [f64; 2] = [340.0, 29e6];
@@ -60,9 +63,13 @@ fn bytes_per_particle(scene: &Scene) -> f64 {
         0.0
     };
     let evaluates = heated().any(|stage| stage.steps >= WORTH_A_LOOK || is_worth_a_trial(stage, particles));
-    let evaluated = if evaluates { particles.min(FEW) as f64 / particles as f64 } else { 0.0 };
+    let evaluated = match (scene.observe.lists_pairs(), evaluates) {
+        (true, _) => OBSERVED,
+        (_, true) => EVALUATION * particles.min(FEW) as f64 / particles as f64,
+        _ => 0.0,
+    };
     let [each, all] = BESIDES;
-    PARTICLE + each.min(all / particles as f64) + pairs + EVALUATION * evaluated
+    PARTICLE + each.min(all / particles as f64) + pairs + evaluated
 }
 
 #[cfg(test)]
@@ -84,6 +91,11 @@ mod tests {
         let bytes = |edge: f64| bytes_per_particle(&of(edge, ""));
         let share = 20_000.0 / 756_250.0;
         let besides = 340.0 - 29e6 / 756_250.0;
+        let of = |observe: &str| bytes_per_particle(&of(50.0, &format!("[observe]\n{observe} = true\n")));
+        assert_eq!(of("density_profile"), bytes(50.0));
+        for observe in ["temperature", "stress_profile", "clusters", "msd"] {
+            assert!((of(observe) - bytes(50.0) - OBSERVED + share * EVALUATION).abs() < 1e-9, "{observe}");
+        }
         assert!((bytes(4.0) - bytes(50.0) - (1.0 - share) * EVALUATION - besides).abs() < 1e-9);
     }
 

@@ -31,6 +31,8 @@ impl Meter for Clusters {
         ..PLAIN
     };
 
+    const LISTS_PAIRS: bool = true;
+
     fn read(options: &Options) -> Result<Clusters, FileError> {
         Ok(Clusters {
             distance: Distance::read(options)?,

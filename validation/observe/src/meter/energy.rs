@@ -19,6 +19,8 @@ impl Meter for Energy {
 
     const NEEDS: Want = Want { energy: true, ..Want::FORCES };
 
+    const LISTS_PAIRS: bool = true;
+
     fn read(options: &Options) -> Result<Energy, FileError> {
         let fluid = options.place.fluid;
         let mut names: Vec<String> = fluid.species.iter().map(|s| format!("psi_{s}")).collect();

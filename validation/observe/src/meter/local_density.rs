@@ -65,6 +65,8 @@ impl Meter for LocalDensity {
         ..PLAIN
     };
 
+    const LISTS_PAIRS: bool = true;
+
     fn read(options: &Options) -> Result<LocalDensity, FileError> {
         let fluid = options.place.fluid;
         let names: Vec<(&str, usize)> =

@@ -60,6 +60,9 @@ pub trait Meter: Sized {
     /// True if the results mean nothing for a crystal.
     const OF_LIQUIDS: bool = false;
 
+    /// True if all pairs of a configuration may be listed for it: for its samples, or for the test whether it is a crystal.
+    const LISTS_PAIRS: bool = Self::OF_LIQUIDS;
+
     fn read(options: &Options) -> Result<Self, FileError>;
 
     /// Takes a sample; returns false if the configuration allows none.
@@ -108,6 +111,10 @@ macro_rules! meters {
 
             pub fn of_liquids(&self) -> bool {
                 match self { $(AnyMeter::$variant(_) => <$meter as Meter>::OF_LIQUIDS),+ }
+            }
+
+            pub fn lists_pairs(&self) -> bool {
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::LISTS_PAIRS),+ }
             }
 
             pub fn sample(&mut self, frame: &Frame) -> bool {

@@ -24,6 +24,8 @@ impl Meter for Temperature {
         ..PLAIN
     };
 
+    const LISTS_PAIRS: bool = true;
+
     fn read(options: &Options) -> Result<Temperature, FileError> {
         let missing = configurational::missing(options.place.fluid, options.place.domain).unwrap_or("");
         let width = if missing.is_empty() { 3 } else { 1 };

@@ -83,9 +83,15 @@ impl Against {
             return;
         }
         for column in &a.columns {
-            let Some(other) = b.get(&column.name).filter(|other| other.unit == column.unit) else { continue };
             let several = a.columns.len() > 1;
             let name = if several { format!("{}: {}", a.name, column.name) } else { a.name.clone() };
+            let Some(other) = b.get(&column.name).filter(|other| other.unit == column.unit) else {
+                self.left_out.push(format!("{name}: the second run has it not, or in another unit"));
+                continue;
+            };
+            if [column, other].iter().any(|c| c.errors.iter().all(|error| error.is_nan())) {
+                self.left_out.push(format!("{name}: a run does not know its error"));
+            }
             let mut points = 0;
             let mut worst: Option<(usize, f64)> = None;
             for (k, deviation) in deviations(column, other) {
@@ -224,6 +230,7 @@ mod tests {
             curve("infinite", &[], &[f64::INFINITY], &[1.0]),
             curve("one error", &[], &[2.0], &[0.0]),
             curve("same", &[], &[2.0], &[0.5]),
+            curve("other unit", &[], &[2.0], &[0.5]),
         ];
         let second = [
             curve("u", &[], &[1.3], &[0.08]),
@@ -236,6 +243,9 @@ mod tests {
             curve("same", &[], &[2.0], &[0.5]),
             curve("new", &[], &[1.0], &[0.1]),
         ];
+        let mut second = second.to_vec();
+        second.push(curve("other unit", &[], &[2.0], &[0.5]));
+        second[9].columns[0].unit = "length".into();
         let found = Against::of(&first, &second);
         let rows: Vec<_> = found.rows.iter().map(|r| (r.name.as_str(), r.points, r.deviation)).collect();
         let expected =
@@ -255,6 +265,8 @@ mod tests {
             [
                 "moved in a: the runs have it at other points",
                 "alone in a: only the first run has it",
+                "unknown: a run does not know its error",
+                "other unit: the second run has it not, or in another unit",
                 "new in a: only the second run has it"
             ]
         );
