@@ -88,20 +88,39 @@ impl Coupling {
 /// What is known of an integrator's errors, for estimates; `docs/integrators.md` has the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// The relative error of the configurational temperature: `a` and `b` of `a (ωΔt)⁴ + b κΔt`.
-    pub temperature: [f64; 2],
-    /// The error of the pressure of the momentum flux, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
-    pub pressure: [f64; 3],
+    /// The relative error of the temperatures: `a`, `b` and `c` of the largest of `a (ΩΔt)²`, `b κΔt` and `c νΔt`.
+    pub temperature: [f64; 3],
+    /// The error of the pressure of the momentum flux, in ρkT: `a` and `b` of `a (ΩΔt)² + b κΔt`.
+    pub pressure: [f64; 2],
+}
+
+/// How fast a fluid is, in units of one over time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// The root mean square frequency Ω of the forces, of ∇²U.
+    pub frequency: f64,
+    /// The rate κ at which drag takes kinetic energy.
+    pub drag: f64,
+    /// The rate ν at which particles cross the range of the forces, by [`crossing`].
+    pub crossing: f64,
+}
+
+/// The rate ν at which particles of the least of `masses` cross a range: `√(kT/m)` over it, or 0 where it is 0.
+pub fn crossing(kt: f64, masses: &[f64], range: f64) -> f64 {
+    let lightest = masses.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    if range > 0.0 { (kt / lightest).sqrt() / range } else { 0.0 }
 }
 
 impl Accuracy {
-    /// Errors at a step of `dt`: of the temperature of configurations, and in ρkT of the carried pressure, for forces of mean
-    /// square `frequency` ω and kinetic energy lost to drag at the rate κ.
-    pub fn errors(&self, dt: f64, frequency: f64, drag: f64) -> [f64; 2] {
-        let Accuracy { temperature: [stiffness, of_drag], pressure: [second, first, fourth] } = self;
-        let square = (frequency * dt).powi(2);
-        let temperature = stiffness * square * square + of_drag * drag * dt;
-        [temperature, second * square + first * drag * dt + fourth * square * square]
+    /// Nothing that short steps would show.
+    const EXACT: Accuracy = Accuracy { temperature: [0.0; 3], pressure: [0.0; 2] };
+
+    /// Errors at a step of `dt`: of the temperatures, and in ρkT of the carried pressure.
+    pub fn errors(&self, dt: f64, rates: Rates) -> [f64; 2] {
+        let Accuracy { temperature: [stiff, dragged, crossed], pressure: [second, first] } = self;
+        let (square, lost) = ((rates.frequency * dt).powi(2), rates.drag * dt);
+        let temperature = (stiff * square).max(dragged * lost).max(crossed * rates.crossing * dt);
+        [temperature, second * square + first * lost]
     }
 }
 
@@ -215,11 +234,11 @@ impl Integrator {
         noise.or(coupling.map(|coupling| &mut coupling.noise))
     }
 
-    /// What is known of it. Errors are right within a factor of three or so for standard DPD and Warren's liquid.
+    /// What is known of it. Errors are right within a factor of two in the fluids of `docs/integrators.md`.
     pub fn properties(&self) -> Properties {
         // Drag and noise in the forces, forces at the end of a step.
-        let verlet = |drag: f64, lammps| Properties {
-            accuracy: Accuracy { temperature: [5.0, drag], pressure: [0.5, 0.75, 0.0] },
+        let verlet = |temperature, lammps| Properties {
+            accuracy: Accuracy { temperature, pressure: [0.5, 0.75] },
             lammps,
             drag_in_forces: true,
             evaluations: 1,
@@ -227,47 +246,44 @@ impl Integrator {
             forces_at_end: true,
         };
         // Velocity Verlet with a thermostat apart from the forces, before or behind it.
-        let apart = Properties {
-            accuracy: Accuracy { temperature: [5.0, 0.0], pressure: [0.5, 0.0, 0.0] },
+        let apart = |stiff: f64| Properties {
+            accuracy: Accuracy { temperature: [stiff, 0.0, 0.0], pressure: [0.5, 0.0] },
             drag_in_forces: false,
-            ..verlet(0.0, Counterpart::None)
+            ..verlet([0.0; 3], Counterpart::None)
         };
+        let exact = Properties { accuracy: Accuracy::EXACT, ..apart(0.0) };
         let splitting = |coupling: &Coupling| {
             if coupling.update == Update::Midpoint { Counterpart::Splitting } else { Counterpart::None }
         };
         match self {
-            Integrator::VelocityVerlet => verlet(0.25, Counterpart::Nve),
+            Integrator::VelocityVerlet => verlet([0.65, 0.0, 0.6], Counterpart::Nve),
             Integrator::GrootWarren { lambda } => {
-                verlet(0.12, if *lambda == 0.5 { Counterpart::Nve } else { Counterpart::None })
+                verlet([0.45, 0.08, 0.0], if *lambda == 0.5 { Counterpart::Nve } else { Counterpart::None })
             }
-            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => verlet(0.0, Counterpart::None),
+            Integrator::DpdVv { .. } => verlet([0.65, 0.12, 0.0], Counterpart::None),
+            Integrator::SelfConsistent { .. } => verlet([0.65, 0.24, 0.0], Counterpart::None),
             Integrator::ShardlowS1 { .. }
             | Integrator::ShardlowS2 { .. }
             | Integrator::Peters { .. }
-            | Integrator::LoweAndersen
-            | Integrator::Baoab(_) => apart,
+            | Integrator::LoweAndersen => apart(0.65),
+            Integrator::Baoab(_) => apart(0.3),
             Integrator::Aboba(coupling) => {
-                Properties { lammps: splitting(coupling), forces_at_end: false, ..apart }
+                Properties { lammps: splitting(coupling), forces_at_end: false, ..apart(0.3) }
             }
             Integrator::TwoStage { lambda, coupling } => Properties {
-                accuracy: Accuracy { temperature: [0.01, 0.0], pressure: [0.1, 0.0, 0.0] },
+                accuracy: Accuracy { temperature: [0.01, 0.0, 0.0], pressure: [0.1, 0.0] },
                 lammps: splitting(coupling),
                 evaluations: 2,
                 force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
-                ..apart
+                ..exact
             },
             Integrator::ForceGradient { lambda, coupling, .. } => Properties {
-                accuracy: Accuracy { temperature: [0.02, 0.0], pressure: [0.0, 0.0, 0.02] },
                 lammps: splitting(coupling),
                 evaluations: 3,
                 force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
-                ..apart
+                ..exact
             },
-            Integrator::MonteCarlo { .. } => Properties {
-                accuracy: Accuracy { temperature: [0.0; 2], pressure: [0.0; 3] },
-                forces_at_end: false,
-                ..apart
-            },
+            Integrator::MonteCarlo { .. } => Properties { forces_at_end: false, ..exact },
         }
     }
 

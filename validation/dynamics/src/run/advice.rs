@@ -2,7 +2,7 @@
 
 use super::watch::{LEAST, piece};
 use super::{Integrator, Simulation, State};
-use crate::integrator::Coupling;
+use crate::integrator::{Coupling, Rates, crossing};
 use crate::scene::Stage;
 use crate::trial::{Composition, Piece, percent, two_digits};
 use psidpd_core::engine::pair_sums::Evaluator;
@@ -32,7 +32,7 @@ const TRIAL: u64 = 50_000_000;
 pub struct Advice {
     pub stage: String,
     pub dt: f64,
-    /// The errors of the stage: of the configurational temperature, and of the carried pressure in ρkT.
+    /// The errors of the stage: of the temperatures, and of the carried pressure in ρkT.
     pub errors: [f64; 2],
     pub better_dt: f64,
     /// The errors of the better step, measured on a piece of the fluid, in the order of `errors`: of the temperatures, and in ρkT.
@@ -59,8 +59,10 @@ impl Advice {
             return None;
         }
         let drag = simulation.warmth(stage.dt).ok()??.rate;
-        let frequency = frequency(simulation)?;
-        let errors = stage.integrator.properties().accuracy.errors(stage.dt, frequency, drag);
+        let range = simulation.model().at(simulation.kt()).ok()?.cutoff();
+        let crossing = crossing(simulation.kt(), &simulation.state().mass, range);
+        let rates = Rates { frequency: frequency(simulation)?, drag, crossing };
+        let errors = stage.integrator.properties().accuracy.errors(stage.dt, rates);
         let worst = |errors: [f64; 2]| errors[0].max(errors[1]);
         if worst(errors) <= WORTH {
             return None;
@@ -157,7 +159,7 @@ impl fmt::Display for Advice {
         let lambda = advised.settings().lambda.map_or(0.0, |(lambda, _)| *lambda);
         write!(
             f,
-            "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate the configurational temperature is off by {}, and \
+            "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate a temperature is off by {}, and \
              the pressure of the momentum flux, which sets the density of a liquid in equilibrium with its vapour, by {} of rho kT. \
              integrator = \"{}\", lambda = {lambda}, thermostat_every = 2, dt = {better_dt} was off by {better} in a trial with a \
              piece of the fluid, in {} of the time; psidpd pareto measures it",

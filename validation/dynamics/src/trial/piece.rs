@@ -2,7 +2,7 @@
 
 use super::samples::StepErrors;
 use super::{CAP, GOAL, two_digits};
-use crate::integrator::{Coupling, Integrator};
+use crate::integrator::{Coupling, Integrator, crossing};
 use crate::run::{RunError, Simulation, State};
 use psidpd_core::engine::noise::{Law, PairNoise};
 use psidpd_core::engine::pair_sums::Evaluator;
@@ -81,6 +81,8 @@ pub struct Piece {
     pub mean_frequency: Option<f64>,
     /// The rate κ at which drag takes kinetic energy.
     pub drag: f64,
+    /// The rate ν at which particles cross the range of the forces.
+    pub crossing: f64,
     /// The pressure at kT of its configurations.
     pub pressure: f64,
     /// The thermal pressure of the piece, `∂p/∂kT / ρ`.
@@ -101,11 +103,7 @@ impl Piece {
         let evaluator = Evaluator::new(fluid)?;
         let (mut number, mut rates) = (3, [0.0; 2]);
         // Without forces a step is limited by the way of a particle through the range of another.
-        let lightest = of.masses.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-        let crossing = match evaluator.fluid.cutoff() {
-            range if range > 0.0 => (of.kt / lightest).sqrt() / range,
-            _ => 0.0,
-        };
+        let crossing = crossing(of.kt, of.masses, evaluator.fluid.cutoff());
         for _ in 0..ROUNDS {
             draw_velocities(&mut state, of, number);
             number += 3;
@@ -175,6 +173,7 @@ impl Piece {
             frequency,
             mean_frequency,
             drag,
+            crossing,
             pressure: ideal + virial,
             thermal_pressure: 1.0 + covariance.max(0.0),
         }))

@@ -7,15 +7,16 @@
 //! A liquid in equilibrium with its vapour has the carried pressure of the vapour: it is thinner by the error over ρ ∂p/∂ρ, which a
 //! second piece gives, a little denser.
 
-use psidpd_dynamics::integrator::Integrator;
+use psidpd_dynamics::integrator::{Integrator, Rates};
 use psidpd_dynamics::prediction::predict;
 use psidpd_dynamics::run::RunError;
 use psidpd_dynamics::scene::{Scene, Stage};
 use psidpd_dynamics::trial::{Composition, NoPiece, Piece};
 use serde::Serialize;
 
-/// Up to this ωΔt the rule holds.
+/// Up to this ωΔt, and this κΔt where drag is among the forces, the rule holds.
 const RULE: f64 = 0.25;
+const RULE_OF_DRAG: f64 = 0.3;
 
 /// Errors of the step of fourth order up to the ωΔt of the reference are less than this.
 const NONE: f64 = 0.002;
@@ -115,7 +116,7 @@ pub fn estimates(scene: &Scene) -> Result<Steps, RunError> {
             dt: stage.dt,
             frequency: sample.piece.frequency,
             mean_frequency: sample.piece.mean_frequency,
-            drag: if stage.thermostat { sample.piece.drag } else { 0.0 },
+            drag: drag(&sample.piece, stage),
             error,
             carried,
             resolution,
@@ -140,15 +141,22 @@ fn is_fourth_order(stage: &Stage) -> bool {
 
 /// Errors by the rule: of the temperature of configurations, and of the carried pressure.
 fn by_rule(piece: &Piece, stage: &Stage, dt: f64) -> Option<[f64; 2]> {
-    let drag = if stage.thermostat { piece.drag } else { 0.0 };
     let frequency = if is_fourth_order(stage) { Some(piece.frequency) } else { piece.mean_frequency };
-    Some(stage.integrator.properties().accuracy.errors(dt, frequency?, drag))
+    let of_drag = |rate: f64| if stage.thermostat { rate } else { 0.0 };
+    let rates = Rates { frequency: frequency?, drag: of_drag(piece.drag), crossing: of_drag(piece.crossing) };
+    Some(stage.integrator.properties().accuracy.errors(dt, rates))
+}
+
+fn drag(piece: &Piece, stage: &Stage) -> f64 {
+    if stage.thermostat { piece.drag } else { 0.0 }
 }
 
 /// Errors of the temperatures and of the carried pressure, and what is not told from none; `None` where nothing is known.
 fn errors(piece: &Piece, stage: &Stage) -> Result<Option<[f64; 3]>, RunError> {
     let rule = by_rule(piece, stage, stage.dt);
+    let lost = if stage.integrator.properties().drag_in_forces { drag(piece, stage) } else { 0.0 };
     if piece.frequency * stage.dt <= RULE
+        && lost * stage.dt <= RULE_OF_DRAG
         && let Some([error, carried]) = rule
     {
         let resolution = if is_fourth_order(stage) { NONE } else { 0.0 };

@@ -31,8 +31,8 @@ fn an_ideal_gas_has_the_step_of_its_drag() {
     for found in estimated(gas, 40.0, &[("velocity-verlet", 0.01), ("groot-warren", 0.02)]) {
         assert!(found.frequency == 0.0 && is_near(found.drag, drag, 0.02), "{found:?}");
         assert!(is_near(found.carried, 0.75 * found.drag * found.dt, 1e-12), "{found:?}");
-        let share = if found.stage == "velocity-verlet" { 0.25 } else { 0.12 };
-        assert!(is_near(found.error, share * found.drag * found.dt, 1e-12), "{found:?}");
+        let rate = if found.stage == "velocity-verlet" { 0.6 } else { 0.08 * found.drag };
+        assert!(is_near(found.error, rate * found.dt, 1e-12), "{found:?}");
         assert!(is_near(found.one_percent.unwrap(), 0.01 / 0.75 / found.drag, 1e-12), "{found:?}");
         // The pressure of the gas is ρkT: it thins by as much as its pressure errs.
         assert!(is_near(found.thinner.unwrap(), found.carried, 0.01), "{found:?}");
@@ -69,17 +69,16 @@ fn short_steps_have_the_errors_of_the_rule() {
         assert!(is_near(w, frequency, 0.07) && is_near(k, drag, 0.07), "{w} {k}");
         assert!((1.0..1.8).contains(&(found[0].frequency / w)), "{found:?}");
         let root = (-0.75 * k + (0.5625 * k * k + 0.02 * w * w).sqrt()) / (w * w);
-        let fourth = |found: &StepEstimate| (w * found.dt).powi(4);
         let square = |found: &StepEstimate| (w * found.dt).powi(2);
         let [verlet, baoab] = &found[..] else { panic!("{found:?}") };
         for (found, error, carried, step) in [
             (
                 verlet,
-                5.0 * fourth(verlet) + 0.25 * k * verlet.dt,
+                (0.65 * square(verlet)).max(0.6 * verlet.dt),
                 0.5 * square(verlet) + 0.75 * k * verlet.dt,
                 root,
             ),
-            (baoab, 5.0 * fourth(baoab), 0.5 * square(baoab), 0.02f64.sqrt() / w),
+            (baoab, 0.3 * square(baoab), 0.5 * square(baoab), 0.02f64.sqrt() / w),
         ] {
             assert!(
                 is_near(found.error, error, 1e-12) && is_near(found.carried, carried, 1e-12),
@@ -143,6 +142,18 @@ fn the_stiffest_part_decides() {
     // κ of Warren's liquid is 22.5; theory's liquid is up to 8 % denser, and a thin start that has not condensed has a fifth less.
     let thin = of(SET6, "density = 2.0\n");
     assert!(is_near(thin.drag, 22.5, 0.12), "{thin:?}");
+}
+
+/// Above κΔt = 0.3 the piece makes steps: velocity Verlet in standard DPD with γ = 60, of which the rule says 0.9 % of the temperatures
+/// at 0.0275, has T_kin 1.087(1) and T_conf 0.943(1), `docs/integrators.md`. Where drag is apart from the forces the rule holds.
+#[test]
+fn steps_with_strong_drag_are_tried() {
+    let strong = SOFT.replace("gamma = 4.5", "gamma = 60.0");
+    assert_ne!(strong, SOFT);
+    let found = estimated(&strong, 3.0, &[("velocity-verlet", 0.0275), ("shardlow-s1", 0.0275)]);
+    assert!(found[0].drag * 0.0275 > 0.6 && found[0].frequency * 0.0275 < 0.25, "{found:?}");
+    assert!((0.05..0.15).contains(&found[0].error) && found[0].resolution > 0.0, "{found:?}");
+    assert!(found[1].error < 0.03 && found[1].resolution == 0.0, "{found:?}");
 }
 
 /// `docs/force-gradient.md` has measured 1 % or less for Warren's liquid at 0.06, and for standard DPD at 0.12; at 0.19 this has
