@@ -186,7 +186,7 @@ fn a_thermostat_has_no_pairs_after_a_search_that_failed() {
             let update = updates[(k + number) % updates.len()];
             let act = AssertUnwindSafe(|| thermostat.act(&pool, update, &mut v));
             catch_unwind(act).unwrap_err();
-            catch_unwind(AssertUnwindSafe(|| thermostat.warmth(&cloud.v))).unwrap_err();
+            catch_unwind(AssertUnwindSafe(|| thermostat.warmth(&cloud.v, |_| 1.0))).unwrap_err();
             thermostat.begin_midpoint(&pool, &mut v).unwrap_err();
         }
         thermostat.find_pairs(&pool, &cloud.bodies(&[]), DT, true).unwrap_err();

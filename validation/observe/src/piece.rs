@@ -1,7 +1,7 @@
 //! A piece of a configuration of many particles, so that a temperature of its forces costs the same for any number of them.
 //!
 //! A particle of the piece has a weight w, 1 in the middle and 0 from the surface of the piece on, so that
-//! kT = ⟨Σ w F·F⟩/⟨Σ (w ∇²U − ∇w·F)⟩ holds wherever the piece lies. The particles around, within twice the range of the forces, are those on
+//! kT = ⟨Σ w F·F⟩/⟨Σ (w ∇²U − ∇w·F)⟩ holds wherever the piece lies, as does the kinetic temperature of its pairs. The particles around, within twice the range of the forces, are those on
 //! which forces within depend.
 
 use psidpd_core::engine::PeriodicBox;
@@ -23,6 +23,8 @@ pub struct Whole<'a> {
 /// The particles of a piece and those around it.
 #[derive(Debug, Clone)]
 pub struct Piece {
+    /// Which particles of all these are.
+    pub of: Vec<usize>,
     pub x: Vec<[f64; 3]>,
     pub species: Vec<i32>,
     /// Whether a particle counts for nothing: one around the piece, or one that never moves.
@@ -45,10 +47,12 @@ impl Piece {
         let end = sorted.select_nth_unstable_by(few, f64::total_cmp).1.max(LEAST * range);
         let space = space(end - 2.0 * range);
         let near = (0..count).filter(|k| away[*k] <= end);
-        let mut piece = Piece { x: Vec::new(), species: Vec::new(), still: Vec::new(), space };
+        let mut piece =
+            Piece { of: Vec::new(), x: Vec::new(), species: Vec::new(), still: Vec::new(), space };
         for k in near {
             let x = whole.x[k];
             let is_frozen = whole.frozen.get(k).is_some_and(|frozen| *frozen);
+            piece.of.push(k);
             piece.x.push(x);
             piece.species.push(whole.species[k]);
             piece.still.push(is_frozen || piece.space.weight(x).0 == 0.0);

@@ -260,27 +260,31 @@ impl PairThermostat {
     }
 
     /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
-    /// search for pairs; `None` if no pair is in range.
-    pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
+    /// search for pairs, where a particle counts with its `weight`; `None` if no pair is in range.
+    pub fn warmth(&self, v: &[[f64; 3]], weight: impl Fn(usize) -> f64) -> Option<Warmth> {
         self.assert_pairs();
-        let moving = self.masses.inertia.iter().filter(|m| **m > 0.0).count();
         let order = self.lists.order();
+        let counts: Vec<f64> = order.iter().map(|k| weight(*k as usize)).collect();
+        let moving: f64 =
+            self.masses.inertia.iter().zip(&counts).filter(|(m, _)| **m > 0.0).map(|(_, w)| w).sum();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
             for [i, j, k] in plane.pairs() {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
+                let [of_i, of_j] = [i, j].map(|k| counts[k] * self.masses.inverse[k]);
                 let inverse = self.masses.inverse[i] + self.masses.inverse[j];
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
-                    squares += along * along / inverse;
-                    weights += square;
-                    rates += square * inverse;
+                    let count = 0.5 * (counts[i] + counts[j]);
+                    squares += count * along * along / inverse;
+                    weights += count * square;
+                    rates += square * (of_i + of_j);
                 }
             }
         }
-        let freedom = (self.dimensions * moving) as f64;
+        let freedom = self.dimensions as f64 * moving;
         // The division by Δt uses |g|² = ½ΔtD.
         (weights > 0.0).then(|| Warmth { kt: squares / weights, rate: 4.0 * rates / (self.dt * freedom) })
     }

@@ -232,7 +232,7 @@ fn the_temperature_of_pairs_knows_their_masses() {
         });
         let dimensions = if model == FLAT { 2 } else { 3 };
         let moving = (0..cloud.x.len()).filter(|k| cloud.mass_of(*k).is_finite()).count();
-        match thermostat.warmth(&cloud.v) {
+        match thermostat.warmth(&cloud.v, |_| 1.0) {
             None => assert_eq!(drags, 0.0, "cloud {number}"),
             Some(Warmth { kt, rate }) => {
                 let expected = [squares / drags, rates / (dimensions * moving) as f64];
@@ -322,7 +322,7 @@ fn the_temperature_is_right() {
             thermostat.act(&pool, Update::Midpoint, &mut v);
             if step >= 500 {
                 all.push(v.as_flattened().iter().map(|v| v * v).sum::<f64>() / freedom);
-                of_pairs.push(thermostat.warmth(&v).unwrap().kt);
+                of_pairs.push(thermostat.warmth(&v, |_| 1.0).unwrap().kt);
                 iterations += thermostat.iterations();
             }
         }

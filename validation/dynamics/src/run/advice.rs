@@ -1,6 +1,7 @@
 //! Advice about an integrator with larger steps than velocity Verlet.
 
-use super::watch::{LEAST, piece};
+use super::looks::piece;
+use super::watch::LEAST;
 use super::{Integrator, Simulation, State};
 use crate::integrator::{Coupling, Rates, crossing};
 use crate::scene::Stage;
@@ -50,7 +51,6 @@ impl Advice {
         if stage.integrator != Integrator::VelocityVerlet || !stage.thermostat {
             return None;
         }
-        // The pairs of the thermostat, which many particles have gigabytes of, are not listed in vain.
         if !is_worth_a_trial(stage, simulation.len()) {
             return None;
         }
@@ -58,10 +58,11 @@ impl Advice {
         if simulation.has_body_forces() || !simulation.frozen().is_empty() {
             return None;
         }
-        let drag = simulation.warmth(stage.dt).ok()??.rate;
+        let piece = piece(simulation, 1);
+        let drag = simulation.warmth(stage.dt, piece.as_ref()).ok()??.rate;
         let range = simulation.model().at(simulation.kt()).ok()?.cutoff();
         let crossing = crossing(simulation.kt(), &simulation.state().mass, range);
-        let rates = Rates { frequency: frequency(simulation)?, drag, crossing };
+        let rates = Rates { frequency: frequency(simulation, piece.as_ref())?, drag, crossing };
         let errors = stage.integrator.properties().accuracy.errors(stage.dt, rates);
         let worst = |errors: [f64; 2]| errors[0].max(errors[1]);
         if worst(errors) <= WORTH {
@@ -134,15 +135,14 @@ fn densest(simulation: &Simulation) -> Vec<f64> {
     sum.into_iter().map(|n| n as f64 / here).collect()
 }
 
-/// The root mean square frequency of the particles; `None` if the forces have no Laplacian.
-fn frequency(simulation: &Simulation) -> Option<f64> {
+/// The root mean square frequency of the particles of a piece, or of all; `None` if the forces have no Laplacian.
+fn frequency(simulation: &Simulation, piece: Option<&psidpd_observe::piece::Piece>) -> Option<f64> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
     if configurational::missing(&fluid, &simulation.state().domain).is_some() {
         return None;
     }
-    let piece = piece(simulation, &fluid, 1);
     let evaluator = Evaluator::new(fluid).ok()?;
-    let frame = Frame::of_piece(simulation.view(0.0), piece.as_ref(), &evaluator);
+    let frame = Frame::of_piece(simulation.view(0.0), piece, &evaluator);
     let square = configurational::mean_square_frequency(&frame);
     Some(square.max(0.0).sqrt())
 }
@@ -243,7 +243,7 @@ mod tests {
         let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
         let state = State::at_rest(domain, vec![3.0], vec![[0.1, 1.0, 2.0], [4.3, 1.0, 2.0]]);
         let run = Simulation::new(&model, 0.7, state, 1).unwrap();
-        let found = frequency(&run).unwrap();
+        let found = frequency(&run, None).unwrap();
         assert!((found - (12.5f64 / 3.0 / 3.0).sqrt()).abs() < 1e-9, "{found}");
     }
 

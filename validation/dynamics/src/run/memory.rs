@@ -1,7 +1,8 @@
 //! The memory that a run of a scene takes.
 
 use super::advice::is_worth_a_trial;
-use super::watch::{FEW, LEAST, WORTH_A_LOOK};
+use super::looks::{FEW, WORTH_A_LOOK};
+use super::watch::LEAST;
 use crate::scene::Scene;
 use psidpd_formats::memory::{self, MemoryError, PARTICLE};
 
@@ -51,21 +52,23 @@ fn bytes_of_samples(scene: &Scene) -> f64 {
 }
 
 /// Bytes per particle, about those of Warren's liquid (docs/bench.md). The watch lists the pairs of the thermostat; in long stages it and
-/// advice evaluate forces with all their pairs too, of a piece if there are many particles.
+/// advice evaluate forces with all their pairs too; both of a piece if there are many particles.
 fn bytes_per_particle(scene: &Scene) -> f64 {
     let particles = scene.initial.count();
+    // Of a piece, where there are many particles.
+    let part = particles.min(FEW) as f64 / particles as f64;
     let heated = || scene.stages.iter().filter(|stage| stage.thermostat && stage.integrator.has_time());
     let pairs = if heated().any(|stage| !stage.integrator.properties().drag_in_forces) {
         APART
     } else if heated().any(|stage| stage.steps >= LEAST) {
-        PAIRS
+        PAIRS * part
     } else {
         0.0
     };
     let evaluates = heated().any(|stage| stage.steps >= WORTH_A_LOOK || is_worth_a_trial(stage, particles));
     let evaluated = match (scene.observe.lists_pairs(), evaluates) {
         (true, _) => OBSERVED,
-        (_, true) => EVALUATION * particles.min(FEW) as f64 / particles as f64,
+        (_, true) => EVALUATION * part,
         _ => 0.0,
     };
     let [each, all] = BESIDES;
@@ -96,7 +99,8 @@ mod tests {
         for observe in ["temperature", "stress_profile", "clusters", "msd"] {
             assert!((of(observe) - bytes(50.0) - OBSERVED + share * EVALUATION).abs() < 1e-9, "{observe}");
         }
-        assert!((bytes(4.0) - bytes(50.0) - (1.0 - share) * EVALUATION - besides).abs() < 1e-9);
+        let once = (1.0 - share) * (EVALUATION + PAIRS);
+        assert!((bytes(4.0) - bytes(50.0) - once - besides).abs() < 1e-9);
     }
 
     /// Rows of 8 bytes for each cell: 64 of a map, or as many as there are samples; 500 origins of 387 particles.

@@ -16,6 +16,7 @@ mod growing;
 mod integrator;
 mod length;
 mod live;
+mod looks;
 mod memory;
 mod outcome;
 mod output;

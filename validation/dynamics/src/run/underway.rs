@@ -1,8 +1,9 @@
 //! The course of a run: its steps, its output and its end.
 
+use super::looks::interval_of_looks;
 use super::output::{Output, write_json, write_observations};
 use super::simulation::Task;
-use super::watch::{Deviation, Thermometer, Watch, interval_of_looks};
+use super::watch::{Deviation, Thermometer, Watch};
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
 use crate::scene::{Stage, every};

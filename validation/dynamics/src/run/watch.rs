@@ -3,21 +3,17 @@
 //! The temperature is that of the relative velocities which drag and noise act on, so the motion of a drop or
 //! a flow does not count. Each stage has a number of samples, a long stage one every [`INTERVAL`] steps, at a
 //! hundredth of the cost of the steps; sampling changes no step. The configurational temperature, which is
-//! most sensitive to errors of the forces, is sampled [`LOOKS`] times in a stage of at least [`WORTH_A_LOOK`] steps, at
-//! most at a twentieth of the cost of the steps; not where an observable measures it with more configurations.
+//! most sensitive to errors of the forces, is sampled sixty times in a stage of a thousand steps or more, at
+//! most at a twentieth of the cost of the steps; not where an observable measures it with more configurations. Of many particles both are
+//! those of a piece.
 //!
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
+use super::looks::{Configurational, configurational, estimate_configurational, looks_at_forces, piece};
 use super::{RunError, Simulation};
 use crate::scene::Stage;
-use psidpd_core::engine::pair_sums::Evaluator;
-use psidpd_core::model::Fluid;
-use psidpd_observe::frame::Frame;
-use psidpd_observe::piece::Piece;
-use psidpd_observe::series::Series;
-use psidpd_observe::statistics::MINIMUM_SAMPLES;
-use psidpd_observe::{Estimate, Measured, configurational, difference};
+use psidpd_observe::{Estimate, Measured, difference};
 use std::fmt;
 
 /// Largest and smallest number of steps between samples.
@@ -26,21 +22,6 @@ pub(super) const LEAST: u64 = 10;
 
 /// Target number of samples in a short stage.
 const SAMPLES: u64 = 24;
-
-/// Largest number of steps between configurational temperatures, and the smallest number of evaluations of forces: one
-/// costs about as much as ten steps of velocity Verlet.
-const RARE: u64 = 1000;
-const LEAST_RARE: u64 = 250;
-
-/// Of more particles a configurational temperature takes a piece with about so many, which bounds its time and its memory.
-pub(super) const FEW: usize = 20_000;
-
-/// Target number of configurational temperatures in a stage.
-const LOOKS: u64 = 60;
-
-/// With as many configurations their scatter in time gives the error, which the scatter over blocks only bounds: in a slab
-/// blocks of the surface differ from those inside.
-const ENOUGH: usize = 20;
 
 /// A run stops if it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples, and
 /// has not cooled to [`COOLER`] of its lowest temperature for as long. A start that cools, even slowly, continues.
@@ -54,14 +35,6 @@ const TOLERANCE: f64 = 0.02;
 
 /// Probability of a false alarm for each thermometer of a stage.
 const ALARM: f64 = 1e-3;
-
-/// Ratio of the true error of a configurational temperature to the error from blocks taken as independent:
-/// blocks share the pairs across their faces. Measured 1.0 to 1.2 in Warren's set 6 and standard DPD.
-const FACES: f64 = 1.2;
-
-/// A stage of at least this many steps is sampled for its configurational temperature. If the thermostat
-/// keeps velocities right at any time step, only this temperature reveals a step that is too long.
-pub(super) const WORTH_A_LOOK: u64 = 1000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
@@ -167,39 +140,6 @@ impl Hot {
     }
 }
 
-/// Sums over the spatial blocks of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each block, and of their products.
-#[derive(Debug, Clone, Copy)]
-struct Configurational {
-    a: f64,
-    b: f64,
-    aa: f64,
-    ab: f64,
-    bb: f64,
-    /// Effective number of blocks; blocks with a small share of the sum count less.
-    blocks: f64,
-}
-
-impl Configurational {
-    fn of(blocks: &[[f64; 2]]) -> Configurational {
-        let sum = |f: &dyn Fn(f64, f64) -> f64| blocks.iter().map(|[a, b]| f(*a, *b)).sum::<f64>();
-        Configurational {
-            a: sum(&|a, _| a),
-            b: sum(&|_, b| b),
-            aa: sum(&|a, _| a * a),
-            ab: sum(&|a, b| a * b),
-            bb: sum(&|_, b| b * b),
-            blocks: sum(&|_, b| b.abs()).powi(2) / sum(&|_, b| b * b),
-        }
-    }
-
-    /// Variance of `a − ratio b`, from the scatter of its blocks.
-    fn variance(&self, ratio: f64) -> f64 {
-        let squares = self.aa - 2.0 * ratio * self.ab + ratio * ratio * self.bb;
-        let mean = (self.a - ratio * self.b) / self.blocks;
-        (squares - self.blocks * mean * mean).max(0.0) * self.blocks / (self.blocks - 1.0)
-    }
-}
-
 impl Watch {
     /// Whether a sample is due. Without `looks` there are no configurational temperatures.
     pub fn is_due(stage: &Stage, done: u64, looks: bool) -> bool {
@@ -216,15 +156,16 @@ impl Watch {
         looks: bool,
     ) -> Result<(), RunError> {
         let due = looks && looks_at_forces(stage, done);
+        let piece = piece(simulation, done);
         if !stage.integrator.has_time() {
             // Monte Carlo draws velocities at kT, so their temperature reveals no error.
-            self.configurational.extend(due.then(|| configurational(simulation, done)).flatten());
+            self.configurational.extend(due.then(|| configurational(simulation, piece.as_ref())).flatten());
             return Ok(());
         }
-        let Some(warmth) = simulation.warmth(stage.dt)? else { return Ok(()) };
+        let Some(warmth) = simulation.warmth(stage.dt, piece.as_ref())? else { return Ok(()) };
         let ratio = warmth.kt / stage.kt;
         self.kinetic.push(ratio);
-        if due && let Some(sums) = configurational(simulation, done) {
+        if due && let Some(sums) = configurational(simulation, piece.as_ref()) {
             self.configurational.push(sums);
         }
         // A body force or a wall may drive a flow that is hot by itself.
@@ -270,17 +211,6 @@ impl Watch {
     }
 }
 
-/// Whether a configurational temperature is due.
-fn looks_at_forces(stage: &Stage, done: u64) -> bool {
-    stage.steps >= WORTH_A_LOOK && stage.level.is_none() && done.is_multiple_of(interval_of_looks(stage))
-}
-
-/// The number of steps between configurational temperatures; odd, for steps with and without a thermostat.
-pub(super) fn interval_of_looks(stage: &Stage) -> u64 {
-    let least = LEAST_RARE / stage.integrator.properties().evaluations;
-    (stage.steps / LOOKS).clamp(least, RARE) | 1
-}
-
 /// Whether a temperature in units of kT deviates by more than [`TOLERANCE`] and chance.
 fn is_off(found: &Estimate) -> bool {
     let beyond = Estimate { mean: (found.mean - 1.0).abs() - TOLERANCE, ..*found };
@@ -311,51 +241,6 @@ fn estimate(samples: &[f64]) -> Option<Estimate> {
     let Measured { value: mean, error } = Measured::of_independent(samples);
     let plain = Estimate { mean, error, samples: samples.len(), tau: 0.5 };
     psidpd_observe::estimate(samples).ok().or((samples.len() >= 4 && mean.is_finite()).then_some(plain))
-}
-
-/// `Σ a/Σ b` in units of kT. The error of each configuration comes from its blocks, and their number sets the
-/// degrees of freedom of this error. The error of a longer series is at least that from its scatter, and from [`ENOUGH`]
-/// configurations on it is that.
-fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Estimate> {
-    let sum = |f: &dyn Fn(&Configurational) -> f64| samples.iter().map(f).sum::<f64>();
-    let (a, b) = (sum(&|s| s.a), sum(&|s| s.b));
-    let mut error = FACES * sum(&|s| s.variance(a / b)).sqrt() / b;
-    let mut freedom = sum(&|s| s.blocks - 1.0);
-    if samples.len() >= MINIMUM_SAMPLES {
-        let mut series = Series::new(2);
-        samples.iter().for_each(|s| _ = series.push(&[s.a, s.b]));
-        let in_time = series.ratio(|s| s[0], |s| s[1]).error;
-        (error, freedom) = match samples.len() >= ENOUGH {
-            true => (in_time, samples.len() as f64 - 1.0),
-            false => (error.max(in_time), freedom),
-        };
-    }
-    let found = Estimate { mean: a / b / kt, error: error / kt, samples: freedom as usize + 1, tau: 0.5 };
-    (error.is_finite() && error > 0.0).then_some(found)
-}
-
-/// The sums for a configurational temperature: of all particles if there are few, or else of a piece around one that `number` chooses. `None`
-/// if the model has none, or if the blocks are too few for an error.
-fn configurational(simulation: &Simulation, number: u64) -> Option<Configurational> {
-    let fluid = simulation.model().at(simulation.kt()).ok()?;
-    let missing = configurational::missing(&fluid, &simulation.state().domain).is_some();
-    if simulation.has_body_forces() || missing {
-        return None;
-    }
-    let piece = piece(simulation, &fluid, number);
-    let evaluator = Evaluator::new(fluid).ok()?;
-    let frame = Frame::of_piece(simulation.view(0.0), piece.as_ref(), &evaluator);
-    let blocks = configurational::sums_of_blocks(&frame);
-    let sums = Configurational::of(&blocks);
-    (sums.b > 0.0 && blocks.len() > 1).then_some(sums)
-}
-
-/// A piece of many particles, each time around another.
-pub(super) fn piece(simulation: &Simulation, fluid: &Fluid, number: u64) -> Option<Piece> {
-    // A multiple of the golden ratio visits all places evenly.
-    let middle = (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % simulation.len().max(1);
-    let range = fluid.conservative_range().max(f64::MIN_POSITIVE);
-    Piece::of(simulation.view(0.0).whole(), range, FEW, middle)
 }
 
 #[cfg(test)]
@@ -611,44 +496,6 @@ mod tests {
     fn stage(steps: u64, integrator: Integrator) -> Stage {
         let name = "run".to_owned();
         Stage { name, level: None, steps, dt: 0.01, integrator, kt: 2.0, thermostat: true, body_forces: true }
-    }
-
-    /// Four blocks with `a` of 1.1, 0.9, 1.3 and 0.7 for a `b` of 1: their ratio is 1, and the sum scatters by √(0.2 · 4/3), with the
-    /// share of faces 1.2 times that. Of two such configurations both sums are twice as large. kT is 2.
-    #[test]
-    fn the_error_of_few_configurations_is_the_scatter_of_their_blocks() {
-        let blocks = [[1.1, 1.0], [0.9, 1.0], [1.3, 1.0], [0.7, 1.0]];
-        let one = Configurational::of(&blocks);
-        for (count, samples) in [(1, 4), (2, 7)] {
-            let found = estimate_configurational(&vec![one; count], 2.0).unwrap();
-            let (n, variance) = (count as f64, 0.2 * 4.0 / 3.0);
-            let expected = 1.2 * (n * variance).sqrt() / (4.0 * n) / 2.0;
-            assert!((found.mean - 0.5).abs() < 1e-12 && (found.error - expected).abs() < 1e-12, "{found:?}");
-            assert_eq!(found.samples, samples);
-        }
-        // About a ratio that is not the mean they scatter as much.
-        for ratio in [0.3, 1.7] {
-            assert!((one.variance(ratio) - 0.2 * 4.0 / 3.0).abs() < 1e-12, "{}", one.variance(ratio));
-        }
-        // Blocks of another ratio that all agree have no scatter about it, and no error is known.
-        let alike = Configurational::of(&[[2.0, 1.0], [4.0, 2.0], [6.0, 3.0]]);
-        assert!(alike.variance(2.0).abs() < 1e-12 && estimate_configurational(&[alike], 2.0).is_none());
-        // A block with nearly all of the sum is nearly one block.
-        assert!((Configurational::of(&[[0.0, 3.0], [0.0, 1.0]]).blocks - 1.6).abs() < 1e-12);
-    }
-
-    /// Of many configurations it is their scatter in time: of forty that are 5 % off, up and down in turns of two, below 2 %, where their
-    /// blocks scatter by three times the sum.
-    #[test]
-    fn the_error_of_many_configurations_is_their_scatter_in_time() {
-        let of = |k: usize| {
-            let a = if (k / 2).is_multiple_of(2) { 1.05 } else { 0.95 };
-            Configurational::of(&[[a + 3.0, 1.0], [a - 3.0, 1.0]])
-        };
-        let of_blocks = estimate_configurational(&[of(0), of(2)], 1.0).unwrap();
-        let found = estimate_configurational(&(0..40).map(of).collect::<Vec<_>>(), 1.0).unwrap();
-        assert!((found.mean - 1.0).abs() < 1e-12 && found.samples == 40, "{found:?}");
-        assert!(found.error < 0.02 && of_blocks.error > 2.0, "{found:?} {of_blocks:?}");
     }
 
     fn kinetic(samples: impl IntoIterator<Item = f64>) -> Watch {

@@ -1,10 +1,12 @@
 //! Pieces of configurations of many particles.
 
 use super::support::{self, SET6};
-use crate::run::Simulation;
+use crate::particles::Tags;
+use crate::run::{Simulation, State};
 use nalgebra::Matrix3;
-use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::engine::thermostat::{Bodies, PairThermostat};
+use psidpd_core::engine::{PeriodicBox, Precision, Settings};
 use psidpd_observe::configurational::{mean_square_frequency, sums, sums_of_blocks};
 use psidpd_observe::frame::{Frame, View};
 use psidpd_observe::piece::Piece;
@@ -95,4 +97,50 @@ fn weights_fall_by_their_gradient() {
     }
     // A particle is within 10⁻⁶ of a kink with a probability of 10⁻⁵.
     assert!(inside > 300 && kinks <= 2, "{inside} {kinks}");
+}
+
+/// Temperature and rate of the thermostat in a piece are those of all pairs, weighted alike: in both precisions of the engine, in a tilted
+/// box, in the plane, and where many particles never move.
+#[test]
+fn the_thermostat_sees_a_piece_as_the_whole() {
+    for (model, space, density, precision) in [
+        (SET6, "lengths = [12.0, 11.0, 13.0]", 3.0, Precision::Mixed),
+        (SET6, "lengths = [11.0, 12.0, 13.0] # tilted", 3.0, Precision::Double),
+        (SET6, "lengths = [5.0, 6.0, 40.0]", 3.0, Precision::Mixed),
+        (PLANE, "lengths = [16.0, 18.0]", 20.0, Precision::Double),
+    ] {
+        let (mut simulation, _) = crowd(model, space, density);
+        if space.ends_with("tilted") {
+            let (domain, x) = tilted(&simulation);
+            let state = State { domain, x, ..simulation.state().clone() };
+            simulation = Simulation::new(simulation.model(), 1.0, state, 5).unwrap();
+        }
+        let settings = Settings { precision, ..simulation.settings() };
+        simulation.set_settings(settings).unwrap();
+        if density == 3.0 {
+            simulation.set_frozen(&Tags::Ranges((1..2000).step_by(3).map(|tag| tag..=tag).collect()));
+        }
+        let frozen = simulation.frozen().to_vec();
+        let mut all = PairThermostat::new(simulation.engine().plan(), &settings).unwrap();
+        let State { domain, x, v, tag, species, mass, .. } = simulation.state().clone();
+        let bodies =
+            Bodies { domain: &domain, x: &x, tag: &tag, species: &species, mass: &mass, frozen: &frozen };
+        all.find_pairs(simulation.engine().pool(), &bodies, 0.02, false).unwrap();
+        let whole = all.warmth(&v, |_| 1.0).unwrap();
+        for middle in [0, 7, x.len() - 1] {
+            let range = simulation.engine().plan().cutoff();
+            let piece = Piece::of(simulation.view(0.0).whole(), range, 2000, middle).unwrap();
+            assert!(piece.x.len() < x.len());
+            let expected = all.warmth(&v, |k| piece.weight(x[k]).0).unwrap();
+            let found = simulation.warmth(0.02, Some(&piece)).unwrap().unwrap();
+            for (found, expected) in [(found.kt, expected.kt), (found.rate, expected.rate)] {
+                assert!((found / expected - 1.0).abs() < 1e-5, "{space}: {found} {expected}");
+            }
+            // A part of the pairs has another temperature than all, of the same fluid.
+            assert!(
+                found.kt != whole.kt && (found.rate / whole.rate - 1.0).abs() < 0.2,
+                "{found:?} {whole:?}"
+            );
+        }
+    }
 }

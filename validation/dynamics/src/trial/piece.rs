@@ -305,7 +305,7 @@ fn frequency(run: &Simulation, evaluator: &Evaluator, number: u32) -> f64 {
 }
 
 fn drag(run: &mut Simulation) -> Result<f64, RunError> {
-    Ok(run.warmth(1e-3)?.map_or(0.0, |warmth| warmth.rate))
+    Ok(run.warmth(1e-3, None)?.map_or(0.0, |warmth| warmth.rate))
 }
 
 fn gaussian_or_uniform(of: &Composition, tags: &[u32], number: u32, law: Law) -> Vec<f32> {

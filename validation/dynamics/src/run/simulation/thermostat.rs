@@ -8,6 +8,7 @@ use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
 use psidpd_core::engine::{Step, Want};
 use psidpd_observe::flux::Drag;
+use psidpd_observe::piece::Piece;
 use std::sync::Arc;
 
 #[derive(Debug)]
@@ -305,11 +306,29 @@ impl Simulation {
         self.thermostat.effort()
     }
 
-    /// What the thermostat sees of the particles; `None` where it does not act, or sees none.
-    pub fn warmth(&mut self, dt: f64) -> Result<Option<Warmth>, RunError> {
+    /// What the thermostat sees of the particles, or of a piece of them; `None` where it does not act, or sees none.
+    pub fn warmth(&mut self, dt: f64, piece: Option<&Piece>) -> Result<Option<Warmth>, RunError> {
         let Simulation { particles, external, forces, thermostat, number, .. } = self;
-        let pairs = thermostat.find_pairs(particles, external, forces, (dt, false, *number))?;
-        Ok(pairs.and_then(|pairs| pairs.warmth(&particles.now().v)))
+        let Some(piece) = piece else {
+            let pairs = thermostat.find_pairs(particles, external, forces, (dt, false, *number))?;
+            return Ok(pairs.and_then(|pairs| pairs.warmth(&particles.now().v, |_| 1.0)));
+        };
+        let Some(mut pairs) = pairs_of(forces).filter(|_| thermostat.on) else { return Ok(None) };
+        let state = particles.now();
+        let of = |all: &[bool]| piece.of.iter().filter_map(|k| all.get(*k).copied()).collect::<Vec<_>>();
+        let bodies = Bodies {
+            domain: &state.domain,
+            x: &piece.x,
+            tag: &(1..=piece.x.len() as i32).collect::<Vec<_>>(),
+            species: &piece.species,
+            mass: &state.mass,
+            frozen: &of(&external.frozen),
+        };
+        forces.check_width(&state.domain)?;
+        let failed = |source| RunError::Engine { step: *number, source };
+        pairs.find_pairs(forces.engine.pool(), &bodies, dt, false).map_err(failed)?;
+        let v: Vec<[f64; 3]> = piece.of.iter().map(|k| state.v[*k]).collect();
+        Ok(pairs.warmth(&v, |k| piece.weight(piece.x[k]).0))
     }
 }
 
