@@ -1,18 +1,10 @@
 //! Tables of all keys of `[observe]`. They are the source of the reference `docs/observables.md`, and other
 //! keys are refused.
 
-pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
-
-/// Declares keys in short, as the macro of models does. Constants go before a key: `use AXIS;`.
-macro_rules! keys {
-    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*$(then $last:ident;)?) => {
-        &[$($($shared,)* $crate::keys::key($name, $value, $need, $about, $example),)* $($last)?]
-    };
-}
-pub(crate) use keys;
+pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key, keys};
 
 /// A table without keys, of which a file has one.
-pub const PLAIN: Table = Table { path: "", title: "", array: false, about: "", forms: ("", &[]), keys: &[] };
+pub const PLAIN: Table = Table::new("", "", &[]);
 
 /// The keys of `[observe]` for every observable, and the keys that each observable has in addition.
 pub const COMMON: &[Key] = keys! {

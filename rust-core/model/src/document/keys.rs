@@ -112,7 +112,9 @@ pub enum ValueKind {
     Formula,
     Correction,
     Excess,
+    Pressure,
     Slopes,
+    Measured,
     Words(&'static str),
 }
 
@@ -154,6 +156,8 @@ impl ValueKind {
             ValueKind::Excess => {
                 "string with a formula, `{ table = \"FILE\" }`, `{ pressure = \"FORMULA\" }` or `{ slopes = { … } }`"
             }
+            ValueKind::Pressure => "string with a formula, or `{ table = \"FILE\" }`",
+            ValueKind::Measured => "array of a number and its error, which is above 0",
             ValueKind::Slopes => "table of formulas by the variables of densities",
             ValueKind::Words(words) => words,
         };
@@ -170,6 +174,11 @@ impl Table {
     /// A table that a file may have several times, without forms.
     pub const fn array(path: &'static str, about: &'static str, keys: &'static [Key]) -> Table {
         Table { array: true, ..Table::new(path, about, keys) }
+    }
+
+    /// The table with a title of its own.
+    pub const fn titled(self, title: &'static str) -> Table {
+        Table { title, ..self }
     }
 
     /// The keys that a table of this form has; all keys if `form` is `None`.
@@ -196,6 +205,16 @@ impl Table {
         }
         text
     }
+}
+
+/// The names in a list of choices.
+pub fn names<T>(choices: &[(&'static str, T)]) -> Vec<&'static str> {
+    choices.iter().map(|(name, _)| *name).collect()
+}
+
+/// Whether the name of a key, or a part of the path of a table, stands for any name: those in capitals do.
+pub fn is_any_name(name: &str) -> bool {
+    name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase())
 }
 
 /// An error at `key`, for a file of another kind than the one expected.
@@ -230,7 +249,6 @@ fn refuse_strangers<'a>(
     more: &[&'static str],
     form: impl Fn(&Section<'a>, &Table) -> Option<&'a str>,
 ) -> Result<(), FileError> {
-    let is_chosen = |name: &str| name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase());
     for table in tables {
         for section in sections(root, table.path) {
             let mut known: Vec<&str> = table.keys_of(form(&section, table)).map(|k| k.name).collect();
@@ -239,7 +257,7 @@ fn refuse_strangers<'a>(
                 known.retain(|name| !name.is_empty());
                 known.extend(more);
             }
-            if !known.iter().any(|name| is_chosen(name)) {
+            if !known.iter().any(|name| is_any_name(name)) {
                 section.only(known)?;
             }
         }
@@ -256,17 +274,18 @@ fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
         let elements = value.as_array().unwrap_or_else(|| vec![value]);
         elements.iter().filter_map(Value::as_section).flat_map(|s| sections(&s, rest)).collect()
     };
-    if first.chars().all(|c| c.is_ascii_uppercase()) {
+    if is_any_name(first) {
         return root.entries().into_iter().flat_map(|(_, value)| inner(value)).collect();
     }
     root.get(first).map_or_else(Vec::new, inner)
 }
 
-/// Declares keys in short: `"name": VALUE, NEED, "meaning" => "example";`.
+/// Declares keys in short: `"name": VALUE, NEED, "meaning" => "example";`. Constants go before a key, `use AXIS;`, or after the
+/// last, `then AXIS;`.
 #[macro_export]
 macro_rules! keys {
-    ($($name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
-        &[$($crate::document::keys::key($name, $value, $need, $about, $example)),*]
+    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)* $(then $last:ident;)?) => {
+        &[$($($shared,)* $crate::document::keys::key($name, $value, $need, $about, $example),)* $($last)?]
     };
 }
 
