@@ -5,6 +5,9 @@ use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
 use serde::{Deserialize, Serialize};
 
+/// The names of the directions.
+pub const AXES: [(&str, usize); 3] = [("x", 0), ("y", 1), ("z", 2)];
+
 /// The names of the faces of a box: axis, and whether the face is the upper one.
 pub const FACES: [(&str, (usize, bool)); 6] = [
     ("xlo", (0, false)),
@@ -79,43 +82,45 @@ impl<'a> Options<'a> {
         self.section.as_ref()?.get(key)
     }
 
+    /// Reads an optional key; `None` if the observable lacks it.
+    fn read<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Option<T>, FileError> {
+        self.get(key).map(|value| read(&value)).transpose()
+    }
+
     pub fn positive(&self, key: &str) -> Result<Option<f64>, FileError> {
-        self.get(key).map(|value| value.positive()).transpose()
+        self.read(key, Value::positive)
     }
 
     pub fn number(&self, key: &str, low: f64, high: f64) -> Result<Option<f64>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        value.within(value.number()?, low, high).map(Some)
+        self.read(key, |value| value.within(value.number()?, low, high))
     }
 
     pub fn count(&self, key: &str, low: u64, high: u64) -> Result<Option<usize>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        Ok(Some(value.within(value.count()?, low, high)? as usize))
+        self.read(key, |value| Ok(value.within(value.count()?, low, high)? as usize))
     }
 
     pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        let items = value.array()?;
-        let [a, b] = items.as_slice() else {
-            return Err(value.error("expected two whole numbers"));
-        };
-        let read = |item: &Value| Ok(item.within(item.count()?, low, high)? as usize);
-        Ok(Some([read(a)?, read(b)?]))
+        let count = |item: &Value| Ok(item.within(item.count()?, low, high)? as usize);
+        self.read(key, |value| match &value.array()?[..] {
+            [a, b] => Ok([count(a)?, count(b)?]),
+            _ => Err(value.error("expected two whole numbers")),
+        })
     }
 
     pub fn flag(&self, key: &str) -> Result<Option<bool>, FileError> {
-        self.get(key).map(|value| value.boolean()).transpose()
+        self.read(key, Value::boolean)
     }
 
     pub fn axis(&self, key: &str) -> Result<Option<usize>, FileError> {
-        let names = [("x", 0), ("y", 1), ("z", 2)];
-        let names = &names[..self.place.fluid.dimensions];
-        self.get(key).map(|value| value.one_of("axis", names)).transpose()
+        self.read(key, |value| value.one_of("axis", &AXES[..self.place.fluid.dimensions]))
     }
 
     pub fn species(&self, key: &str) -> Result<Option<usize>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        value.string()?.among("species", self.place.fluid.species.iter().zip(0..)).map(Some)
+        self.read(key, |value| value.string()?.among("species", self.place.fluid.species.iter().zip(0..)))
     }
 
     /// The index of a species of the model, for keys whose value may be something other than a name.
@@ -124,7 +129,7 @@ impl<'a> Options<'a> {
     }
 
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
-        self.get(key).map(|value| value.one_of("choice", choices)).transpose()
+        self.read(key, |value| value.one_of("choice", choices))
     }
 
     /// An error about a key, or about the observable if the key is not set.

@@ -89,6 +89,15 @@ impl<'a> Section<'a> {
         self.get(key).ok_or_else(|| self.place_of(key, &self.place.span).error(FileErrorKind::Missing))
     }
 
+    /// Reads an optional key; `None` if the section lacks it.
+    pub fn read<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Option<T>, FileError> {
+        self.get(key).map(|value| read(&value)).transpose()
+    }
+
     /// Every key with its value, in the order of the file: for tables whose keys are names.
     pub fn entries(&self) -> Vec<(Located<String>, Value<'a>)> {
         let located = |entry: &'a Entry| {
