@@ -12,13 +12,17 @@ use std::path::PathBuf;
 use std::process::Command;
 use tables_of_keys::{Tables, assert_current, examples, put};
 
-/// The schema of `[observe]`: names and meanings; allowed values are described in words.
+/// The schema of `[observe]`.
 fn observe() -> Value {
     let named = |keys: &[observe::keys::Key]| -> Map<String, Value> {
-        let text = |k: &observe::keys::Key| {
-            format!("{} {}; {} if left out.", k.about, capital(&k.value.describe()), k.default())
+        let schema = |k: &observe::keys::Key| {
+            let mut schema = Tables(TABLES).schema_of_value(&k.value);
+            let words = k.value.describe();
+            schema["description"] =
+                format!("{} {}; {} if left out.", k.about, capital(&words), k.default()).into();
+            schema
         };
-        keys.iter().map(|k| (k.name.to_owned(), json!({ "description": text(k) }))).collect()
+        keys.iter().map(|k| (k.name.to_owned(), schema(k))).collect()
     };
     let mut properties = named(observe::keys::COMMON);
     for table in observe::request::tables() {
@@ -200,6 +204,9 @@ fn the_schema_refuses_unknown_and_missing_keys() {
         "[output]\nthermo = 1.5",
         "[observe]\nrfd = true",
         "[observe.rdf]\nbin = 50",
+        "[observe.rdf]\nbins = 0",
+        "[observe]\nevery = 1.5",
+        "[observe.pendant]\napex = \"top\"",
     ];
     for (text, complaint) in bad.iter().zip(complaints(&bad.map(completed))) {
         assert!(!complaint.is_empty(), "{text}");

@@ -13,18 +13,19 @@ impl Tables {
         self.0.iter().find(|table| table.path == path).unwrap_or_else(|| panic!("{path}"))
     }
 
-    fn schema_of_value(&self, kind: &ValueKind) -> Value {
+    pub fn schema_of_value(&self, kind: &ValueKind) -> Value {
+        let string = json!({ "type": "string" });
         let positive = json!({ "type": "number", "exclusiveMinimum": 0 });
         let formula = json!({ "$ref": "#/definitions/number" });
         let array = |items: &Value, fewest: usize, most: usize| json!({ "type": "array", "items": items, "minItems": fewest, "maxItems": most });
+        let whole = |low: u64, high: u64| json!({ "type": "integer", "minimum": low, "maximum": high });
         let each = |items: &Value| array(items, 2, 3);
-        match kind {
-            ValueKind::Text | ValueKind::File | ValueKind::TableFile | ValueKind::Formula => {
-                json!({ "type": "string" })
-            }
+        match *kind {
+            ValueKind::Text | ValueKind::File | ValueKind::TableFile | ValueKind::Formula => string,
+            ValueKind::Name(_) => string,
             ValueKind::Number => json!({ "type": "number" }),
             ValueKind::NumberOrFormula | ValueKind::Parameter => formula,
-            ValueKind::Positive => positive,
+            ValueKind::Positive | ValueKind::HalfBox => positive,
             ValueKind::Count => json!({ "type": "integer", "minimum": 0 }),
             ValueKind::Dimensions => json!({ "enum": [2, 3], "default": 3 }),
             ValueKind::Flag => json!({ "type": "boolean" }),
@@ -43,8 +44,8 @@ impl Tables {
                 names["uniqueItems"] = true.into();
                 names
             }
-            ValueKind::Between => array(&json!({ "type": "string" }), 2, 2),
-            ValueKind::Names => json!({ "type": "array", "items": { "type": "string" }, "minItems": 1 }),
+            ValueKind::Between => array(&string, 2, 2),
+            ValueKind::Names => json!({ "type": "array", "items": string, "minItems": 1 }),
             ValueKind::Fractions => json!({
                 "type": "object", "additionalProperties": { "type": "number", "minimum": 0, "maximum": 1 }
             }),
@@ -57,15 +58,20 @@ impl Tables {
                 let mut curve = self.object("excess_free_energy.SPECIES", None);
                 curve["oneOf"] =
                     ["table", "pressure", "slopes"].map(|key| json!({ "required": [key] })).into();
-                json!({ "anyOf": [{ "type": "string" }, curve] })
+                json!({ "anyOf": [string, curve] })
             }
             ValueKind::Pressure => json!({ "anyOf": [{ "type": "string" }, {
                 "type": "object", "properties": { "table": { "type": "string" } }, "required": ["table"],
                 "additionalProperties": false
             }]}),
-            ValueKind::Slopes => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
+            ValueKind::Slopes => json!({ "type": "object", "additionalProperties": string }),
             ValueKind::Measured => array(&json!({ "type": "number" }), 2, 2),
-            ValueKind::Words(_) => json!({}),
+            ValueKind::Whole(low, u64::MAX) => json!({ "type": "integer", "minimum": low }),
+            ValueKind::Whole(low, high) => whole(low, high),
+            ValueKind::Wholes(low, high) => array(&whole(low, high), 2, 2),
+            ValueKind::Within(low, f64::INFINITY) => json!({ "type": "number", "minimum": low }),
+            ValueKind::Within(low, high) => json!({ "type": "number", "minimum": low, "maximum": high }),
+            ValueKind::FlagOrSpecies => json!({ "anyOf": [{ "type": "boolean" }, string] }),
         }
     }
 

@@ -115,16 +115,25 @@ pub enum ValueKind {
     Pressure,
     Slopes,
     Measured,
-    Words(&'static str),
+    /// From the first to the second; without an end if that is `u64::MAX`.
+    Whole(u64, u64),
+    /// Two of [`ValueKind::Whole`].
+    Wholes(u64, u64),
+    /// From the first to the second, which may be infinite.
+    Within(f64, f64),
+    HalfBox,
+    Name(&'static str),
+    FlagOrSpecies,
 }
 
 impl ValueKind {
     /// Describes the type in words.
     pub fn describe(&self) -> String {
-        let list = |choices: &fn() -> Vec<&'static str>| {
+        let list = |choices: fn() -> Vec<&'static str>| {
             choices().iter().map(|c| format!("`\"{c}\"`")).collect::<Vec<_>>().join(", ")
         };
-        let words = match self {
+        let short = |x: f64| if x < 1e-4 && x > 0.0 { format!("{x:e}") } else { x.to_string() };
+        let words = match *self {
             ValueKind::Text => "string",
             ValueKind::File => "path of a file, relative to the folder of this one",
             ValueKind::TableFile => "path of a file in the folder of this one or below",
@@ -143,6 +152,15 @@ impl ValueKind {
             ValueKind::EachOf(choices) => {
                 return format!("{}, or an array of one for each direction", list(choices));
             }
+            ValueKind::Whole(low, u64::MAX) => return format!("whole number from {low}"),
+            ValueKind::Whole(low, high) => return format!("whole number from {low} to {high}"),
+            ValueKind::Wholes(low, high) => {
+                return format!("array of two whole numbers from {low} to {high}");
+            }
+            ValueKind::Within(low, f64::INFINITY) => return format!("number from {}", short(low)),
+            ValueKind::Within(low, high) => return format!("number from {} to {}", short(low), short(high)),
+            ValueKind::HalfBox => "number above 0, at most half the box",
+            ValueKind::Name(of) => return format!("name of {of}"),
             ValueKind::Temperature => "number above 0, or an array of two, `[from, to]`",
             ValueKind::Species => "array of names (letters, digits, underscores)",
             ValueKind::Between => "array of two species",
@@ -159,7 +177,7 @@ impl ValueKind {
             ValueKind::Pressure => "string with a formula, or `{ table = \"FILE\" }`",
             ValueKind::Measured => "array of a number and its error, which is above 0",
             ValueKind::Slopes => "table of formulas by the variables of densities",
-            ValueKind::Words(words) => words,
+            ValueKind::FlagOrSpecies => "true, false, or the name of a species",
         };
         words.to_owned()
     }

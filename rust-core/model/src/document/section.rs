@@ -189,6 +189,14 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// Reads a whole number from `low` to `high`; `u64::MAX` is no end.
+    pub fn whole(&self, low: u64, high: u64) -> Result<u64, FileError> {
+        match self.count()? {
+            number if number < low && high == u64::MAX => Err(self.error(format!("must be at least {low}"))),
+            number => self.within(number, low, high),
+        }
+    }
+
     /// Reads true or false.
     pub fn boolean(&self) -> Result<bool, FileError> {
         match &self.value.content {

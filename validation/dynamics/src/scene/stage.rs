@@ -178,7 +178,7 @@ fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError>
     let most = MOST_LEVELS.min(steps);
     let levels = match levels {
         None => DEFAULT_LEVELS.min(steps),
-        Some(value) => value.within(value.count()?, 1, most)?,
+        Some(value) => value.whole(1, most)?,
     };
     let level = |k: u64| Stage {
         level: Some([k, levels]),
