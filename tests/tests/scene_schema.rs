@@ -1,90 +1,28 @@
 //! The JSON schema and the reference of the scene file are written from the table of keys, are current, and
 //! agree with the reader.
 
+#[path = "../../rust-core/tests/tables_of_keys/mod.rs"]
+mod tables_of_keys;
+
 use psidpd::observe;
 use psidpd::scene::Scene;
-use psidpd::scene::keys::{
-    BODY_FORCE, BOX, INITIAL, MASSES, OUTPUT, PART, REQUIRED, STAGE, TABLES, TOP, Table, ValueKind, WALL,
-};
+use psidpd::scene::keys::TABLES;
 use serde_json::{Map, Value, json};
-use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::Command;
+use tables_of_keys::{Tables, assert_current, examples, put};
 
-fn schema_of_value(kind: &ValueKind) -> Value {
-    let positive = json!({ "type": "number", "exclusiveMinimum": 0 });
-    let each = |items: &Value| json!({ "type": "array", "items": items, "minItems": 2, "maxItems": 3 });
-    match kind {
-        ValueKind::Text | ValueKind::File => json!({ "type": "string" }),
-        ValueKind::Number => json!({ "type": "number" }),
-        ValueKind::Positive => positive,
-        ValueKind::Count => json!({ "type": "integer", "minimum": 0 }),
-        ValueKind::Flag => json!({ "type": "boolean" }),
-        ValueKind::Point => each(&json!({ "type": "number" })),
-        ValueKind::Lengths => json!({ "anyOf": [positive, each(&positive)] }),
-        ValueKind::Box => json!({ "anyOf": [positive, each(&positive), object(&BOX, None)] }),
-        ValueKind::EachOf(choices) => {
-            let one = json!({ "enum": choices() });
-            json!({ "anyOf": [one, each(&one)] })
-        }
-        ValueKind::Temperature => json!({ "anyOf": [
-            positive,
-            { "type": "array", "items": positive, "minItems": 2, "maxItems": 2 }
-        ]}),
-        ValueKind::Choice(choices) => json!({ "enum": choices() }),
-        ValueKind::Names => json!({ "type": "array", "items": { "type": "string" }, "minItems": 1 }),
-        ValueKind::Fractions => json!({
-            "type": "object", "additionalProperties": { "type": "number", "minimum": 0, "maximum": 1 }
-        }),
-        ValueKind::Ids => json!({
-            "type": "array", "items": { "type": "integer", "minimum": 0 }, "minItems": 2, "maxItems": 2
-        }),
-        other => panic!("no value of a scene: {other:?}"),
-    }
-}
-
-fn object(table: &Table, form: Option<&str>) -> Value {
-    let mut properties = Map::new();
-    let mut required = Vec::new();
-    let mut any_name = json!(false);
-    for key in table.keys_of(form) {
-        let mut schema = schema_of_value(&key.value);
-        if key.name == table.forms.0
-            && let Some(form) = form
-        {
-            schema = json!({ "const": form });
-        }
-        schema["description"] = json!(key.about);
-        if key.name.chars().all(|c| c.is_ascii_uppercase()) {
-            any_name = schema;
-        } else {
-            properties.insert(key.name.into(), schema);
-        }
-        if key.need == REQUIRED {
-            required.push(key.name);
-        }
-    }
-    json!({
-        "type": "object", "description": table.about, "properties": properties, "required": required,
-        "additionalProperties": any_name
-    })
-}
-
-/// The schema of a table, with one alternative for each of its forms.
-fn forms(table: &Table) -> Value {
-    match table.forms.1 {
-        [] => object(table, None),
-        forms => json!({ "oneOf": forms.iter().map(|f| object(table, Some(f))).collect::<Vec<_>>() }),
-    }
-}
-
-/// The schema of `[observe]`: names and meanings; allowed values are described in words.
+/// The schema of `[observe]`.
 fn observe() -> Value {
     let named = |keys: &[observe::keys::Key]| -> Map<String, Value> {
-        let text = |k: &observe::keys::Key| {
-            format!("{} {}; {} if left out.", k.about, capital(&k.value.describe()), k.default())
+        let schema = |k: &observe::keys::Key| {
+            let mut schema = Tables(TABLES).schema_of_value(&k.value);
+            let words = k.value.describe();
+            schema["description"] =
+                format!("{} {}; {} if left out.", k.about, capital(&words), k.default()).into();
+            schema
         };
-        keys.iter().map(|k| (k.name.to_owned(), json!({ "description": text(k) }))).collect()
+        keys.iter().map(|k| (k.name.to_owned(), schema(k))).collect()
     };
     let mut properties = named(observe::keys::COMMON);
     for table in observe::request::tables() {
@@ -100,53 +38,35 @@ fn observe() -> Value {
     })
 }
 
-fn schema() -> String {
-    let mut root = object(&TOP, None);
-    root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
-    root["title"] = json!("psidpd scene file");
-    let properties = &mut root["properties"];
-    for table in [&MASSES, &INITIAL, &PART, &WALL, &BODY_FORCE, &STAGE, &OUTPUT] {
-        properties[table.path] = match table.array {
-            true => json!({ "type": "array", "description": table.about, "items": forms(table) }),
-            false => forms(table),
-        };
-    }
-    properties["observe"] = observe();
-    serde_json::to_string_pretty(&root).unwrap() + "\n"
+fn schema() -> Value {
+    let mut schema = Tables(TABLES).schema("psidpd scene file");
+    schema["properties"]["observe"] = observe();
+    schema
 }
 
+const INTRODUCTION: &str = "# The scene file\n\n\
+    This page lists the keys of the scene file. A scene file is TOML; it states the fluid, the box, the initial\n\
+    state and the number of steps. Unknown keys are errors that name line and key. Editors that know JSON\n\
+    schemas (taplo, Even Better TOML) complete and check scene files with `#:schema scene.schema.json` in the\n\
+    first line; the schema is `validation/schema/scene.schema.json`.\n\n\
+    A scene needs five keys:\n\n\
+    ```toml\n\
+    model   = \"fluid.toml\"\n\
+    kT      = 1.0\n\
+    box     = 6.0\n\
+    density = 3.0\n\
+    steps   = 1000\n\
+    ```\n\n\
+    `psidpd new NAME --template …` writes a scene as a starting point, `psidpd check SCENE` says what a scene\n\
+    will do, and `validation/scenes/` has a scene for every system of the papers: small ones that take seconds\n\
+    and, in `full/`, those of the papers' own size.\n\n\
+    The examples below leave out what every scene needs. Their model has two species, `A` and `B`, in three\n\
+    dimensions. In two dimensions every array with a number for each direction has two numbers, and cylinders\n\
+    do not exist. The keys of `[observe]`, which set what is measured, have [their own page](observables.md).\n\n\
+    This page is written from the tables of keys in `validation/dynamics/src/scene/keys/`.\n";
+
 fn reference() -> String {
-    let mut text = "# The scene file\n\n\
-        This page lists the keys of the scene file. A scene file is TOML; it states the fluid, the box, the initial\n\
-        state and the number of steps. Unknown keys are errors that name line and key. Editors that know JSON\n\
-        schemas (taplo, Even Better TOML) complete and check scene files with `#:schema scene.schema.json` in the\n\
-        first line; the schema is `validation/schema/scene.schema.json`.\n\n\
-        A scene needs five keys:\n\n\
-        ```toml\n\
-        model   = \"fluid.toml\"\n\
-        kT      = 1.0\n\
-        box     = 6.0\n\
-        density = 3.0\n\
-        steps   = 1000\n\
-        ```\n\n\
-        `psidpd new NAME --template …` writes a scene as a starting point, `psidpd check SCENE` says what a scene\n\
-        will do, and `validation/scenes/` has a scene for every system of the papers: small ones that take seconds\n\
-        and, in `full/`, those of the papers' own size.\n\n\
-        The examples below leave out what every scene needs. Their model has two species, `A` and `B`, in three\n\
-        dimensions. In two dimensions every array with a number for each direction has two numbers, and cylinders\n\
-        do not exist. The keys of `[observe]`, which set what is measured, have [their own page](observables.md).\n\n\
-        This page is written from the tables of keys in `validation/dynamics/src/scene/keys/`.\n"
-        .to_owned();
-    // Writing to a String cannot fail.
-    for table in TABLES {
-        let heading = match (table.path, table.array) {
-            ("", _) => "Top level".to_owned(),
-            (path, true) => format!("`[[{path}]]`"),
-            (path, false) => format!("`[{path}]`"),
-        };
-        let _ = write!(text, "\n## {heading}\n\n{}", table.reference());
-    }
-    text
+    Tables(TABLES).page(INTRODUCTION)
 }
 
 fn capital(text: &str) -> String {
@@ -200,23 +120,11 @@ fn root() -> PathBuf {
     psidpd_tests::root().join("validation")
 }
 
-/// Compares a file with its expected text, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
-fn assert_current(file: &str, expected: &str) {
-    let path = root().join(file);
-    if std::env::var_os("PSIDPD_UPDATE_SCHEMA").is_some() {
-        std::fs::write(&path, expected).unwrap();
-    }
-    let found = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(
-        found.replace("\r\n", "\n") == expected,
-        "{file} is not current: run this test with PSIDPD_UPDATE_SCHEMA=1"
-    );
-}
-
 #[test]
 fn schema_and_reference_are_current() {
-    assert_current("schema/scene.schema.json", &schema());
-    assert_current("../docs/scene-file.md", &reference());
+    let schema = serde_json::to_string_pretty(&schema()).unwrap() + "\n";
+    assert_current(&root().join("schema/scene.schema.json"), &schema);
+    assert_current(&root().join("../docs/scene-file.md"), &reference());
 }
 
 /// Every scene that ships, quick and full-sized, and every template.
@@ -238,8 +146,7 @@ fn complaints(scenes: &[String]) -> Vec<String> {
     let scenes: Vec<Value> = scenes.iter().map(|text| toml::from_str(text).unwrap()).collect();
     let folder = tempfile::tempdir().unwrap();
     let question = folder.path().join("question.json");
-    let schema: Value = serde_json::from_str(&schema()).unwrap();
-    std::fs::write(&question, json!({ "schema": schema, "scenes": scenes }).to_string()).unwrap();
+    std::fs::write(&question, json!({ "schema": schema(), "scenes": scenes }).to_string()).unwrap();
     let script = psidpd_tests::root().join("tests/python/validate_scenes.py");
     let output = Command::new(psidpd_tests::python()).arg(script).arg(&question).output().unwrap();
     assert!(output.status.success(), "{}", psidpd_tests::said(&output));
@@ -262,8 +169,7 @@ fn every_scene_is_valid_by_the_schema() {
 fn every_example_of_the_reference_loads() {
     let page = reference();
     let folder = folder();
-    let blocks = page.split("```toml\n").skip(1);
-    let texts: Vec<String> = blocks.map(|block| completed(block.split("\n```").next().unwrap())).collect();
+    let texts: Vec<String> = examples(&page).into_iter().map(completed).collect();
     for text in &texts {
         let scene =
             Scene::parse("example.toml", text, folder.path()).unwrap_or_else(|e| panic!("{e}\n{text}"));
@@ -298,48 +204,19 @@ fn the_schema_refuses_unknown_and_missing_keys() {
         "[output]\nthermo = 1.5",
         "[observe]\nrfd = true",
         "[observe.rdf]\nbin = 50",
+        "[observe.rdf]\nbins = 0",
+        "[observe]\nevery = 1.5",
+        "[observe.pendant]\napex = \"top\"",
     ];
     for (text, complaint) in bad.iter().zip(complaints(&bad.map(completed))) {
         assert!(!complaint.is_empty(), "{text}");
     }
 }
 
-/// Puts another value for a key into the table at `path`, or takes the key away; false if the table lacks it.
-fn put(value: &mut toml::Value, path: &str, key: &str, new: Option<&toml::Value>) -> bool {
-    let is_chosen = |name: &str| name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase());
-    match value {
-        toml::Value::Array(items) => items.iter_mut().any(|item| put(item, path, key, new)),
-        toml::Value::Table(table) => {
-            let (name, rest) = path.split_once('.').unwrap_or((path, ""));
-            let (name, rest) = if path.is_empty() { (key, None) } else { (name, Some(rest)) };
-            let found: Vec<String> =
-                table.keys().filter(|k| *k == name || is_chosen(name)).cloned().collect();
-            found.into_iter().any(|k| match (rest, new) {
-                (Some(rest), _) => put(&mut table[&k], rest, key, new),
-                (None, Some(new)) => table.insert(k, new.clone()).is_some(),
-                (None, None) => table.remove(&k).is_some(),
-            })
-        }
-        _ => false,
-    }
-}
-
-/// The reader refuses a wrong type in every key of the tables: it reads all of them.
 #[test]
 fn every_key_is_read() {
     let folder = folder();
-    // Of a type that no key has.
-    let wrong = toml::Value::Array(vec![toml::Value::Array(Vec::new())]);
-    for table in TABLES {
-        for key in table.keys {
-            let mut scene: toml::Value = toml::from_str(&completed(key.example)).unwrap();
-            assert!(put(&mut scene, table.path, key.name, Some(&wrong)), "{}", key.example);
-            let text = toml::to_string(&scene).unwrap();
-            let error = Scene::parse("s.toml", &text, folder.path()).expect_err(&text).to_string();
-            let is_chosen = key.name == key.name.to_uppercase();
-            assert!(is_chosen || error.contains(key.name), "{}: {error}\n{text}", key.name);
-        }
-    }
+    Tables(TABLES).assert_all_are_read(completed, |text| Scene::parse("s.toml", text, folder.path()));
 }
 
 /// A key of another form is unknown, and the error lists the keys of this form.

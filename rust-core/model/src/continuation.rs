@@ -33,6 +33,12 @@ pub enum Continuation {
     Constant,
 }
 
+impl Continuation {
+    /// Their names in the model file.
+    pub const NAMED: [(&str, Continuation); 2] =
+        [("linear", Continuation::Linear), ("constant", Continuation::Constant)];
+}
+
 impl Bounds {
     /// The highest power of δ in the continuation: 2 where ψ′ is linear, 1 where it is constant.
     pub fn order(&self, beyond: f64) -> usize {

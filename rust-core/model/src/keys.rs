@@ -2,21 +2,14 @@
 //! editors and the reference `docs/model-file.md` are generated from the tables too.
 
 use super::kernel::KernelKind;
+use crate::continuation::Continuation;
 pub use crate::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
-use crate::document::keys::{count, joined, keys};
+use crate::document::keys::{count, joined, keys, names};
 use crate::pair::FORM_KEYS;
 pub use crate::pair::FORMS;
 
-fn forms() -> Vec<&'static str> {
-    FORMS.to_vec()
-}
-
 fn kernels() -> Vec<&'static str> {
     KernelKind::ALL.iter().map(|k| k.name()).collect()
-}
-
-fn continuations() -> Vec<&'static str> {
-    vec!["linear", "constant"]
 }
 
 /// Every table, in the order of the documentation.
@@ -103,7 +96,7 @@ const DENSITY: Table = Table::new(
              and to the total of a table or pressure. The number of evaluations outside the bounds is counted."
             => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.05, \
              20.0]\n[excess_free_energy]\nA = \"kT*ln(n)\"";
-        "below": ValueKind::Choice(continuations), OPTIONAL,
+        "below": ValueKind::Choice(|| names(&Continuation::NAMED)), OPTIONAL,
             "How psi' continues below the lower bound: `linear`, as above, if left out; `constant`, without the \
              last term, which makes the force there a pair force as in standard DPD. Trofimov suggests it where \
              psi is singular in thin regions. The force stays conservative, but the fluid does not follow its \
@@ -139,7 +132,7 @@ const CURVES: Table = Table::new(
              slope; beyond the ends psi' continues linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the environment \
              the file may be anywhere."
             => "[excess_free_energy]\nA = { table = \"psi.csv\" }";
-        "pressure": ValueKind::Words("string with a formula, or `{ table = \"FILE\" }`"), OPTIONAL,
+        "pressure": ValueKind::Pressure, OPTIONAL,
             "The target equation of state, for one species: a formula of `rho` and `kT`, or a table with rows \
              of `rho` and `p`, measured at the kT of the run. `psi' = (p - rho kT)/rho^2`; psi is the integral \
              of psi', from a density where it is finite. Beyond the ends of a table psi' continues linearly."
@@ -161,7 +154,8 @@ const CURVES: Table = Table::new(
             "With `slopes`: the reported energy of a particle, 0 if left out. The force is not its gradient."
             => "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }";
     },
-);
+)
+.titled("`SPECIES = { … }` in `[excess_free_energy]`");
 
 const PAIR: Table = Table {
     forms: ("form", FORMS),
@@ -178,7 +172,7 @@ const PAIR_KEYS: &[Key] = keys! {
     "between": ValueKind::Between, REQUIRED,
         "The two species."
         => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1.0";
-    "form": ValueKind::Choice(forms), REQUIRED,
+    "form": ValueKind::Choice(|| FORMS.to_vec()), REQUIRED,
         "The form of the potential; the keys of each form describe it."
         => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
          0.8\nrange_B = 1.0";
@@ -217,22 +211,20 @@ const LITERATURE: Table = Table::array(
         "density": ValueKind::Positive, OPTIONAL,
             "The number density that `pressure` belongs to."
             => "[[literature]]\nkT = 1.0\ndensity = 3.0\npressure = [23.65, 0.05]";
-        "pressure": ValueKind::Words(ERROR), OPTIONAL,
+        "pressure": ValueKind::Measured, OPTIONAL,
             "Pressure of the homogeneous fluid at `density`."
             => "[[literature]]\nkT = 1.0\ndensity = 3.0\npressure = [23.65, 0.05]";
-        "liquid": ValueKind::Words(ERROR), OPTIONAL,
+        "liquid": ValueKind::Measured, OPTIONAL,
             "Number density of the liquid in equilibrium with its vapour."
             => "[[literature]]\nkT = 1.0\nliquid = [6.05, 0.01]";
-        "vapour": ValueKind::Words(ERROR), OPTIONAL,
+        "vapour": ValueKind::Measured, OPTIONAL,
             "Number density of the vapour."
             => "[[literature]]\nkT = 0.5\nvapour = [0.03, 0.01]";
-        "tension": ValueKind::Words(ERROR), OPTIONAL,
+        "tension": ValueKind::Measured, OPTIONAL,
             "Surface tension."
             => "[[literature]]\nkT = 1.0\ntension = [7.45, 0.04]";
-        "width": ValueKind::Words(ERROR), OPTIONAL,
+        "width": ValueKind::Measured, OPTIONAL,
             "Width of the interface, `(rho_L - rho_V)/max|d rho/dz|`."
             => "[[literature]]\nkT = 1.0\nwidth = [0.66, 0.03]";
     },
 );
-
-const ERROR: &str = "array of a number and its error, which is above 0";

@@ -1,35 +1,28 @@
 //! Tables of all keys of `[observe]`. They are the source of the reference `docs/observables.md`, and other
 //! keys are refused.
 
-pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
-
-/// Declares keys in short, as the macro of models does. Constants go before a key: `use AXIS;`.
-macro_rules! keys {
-    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*$(then $last:ident;)?) => {
-        &[$($($shared,)* $crate::keys::key($name, $value, $need, $about, $example),)* $($last)?]
-    };
-}
-pub(crate) use keys;
+use super::options::AXES;
+pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key, keys, names};
 
 /// A table without keys, of which a file has one.
-pub const PLAIN: Table = Table { path: "", title: "", array: false, about: "", forms: ("", &[]), keys: &[] };
+pub const PLAIN: Table = Table::new("", "", &[]);
 
 /// The keys of `[observe]` for every observable, and the keys that each observable has in addition.
 pub const COMMON: &[Key] = keys! {
-    "every": ValueKind::Words("whole number from 1"), Need::Default("10"),
+    "every": ValueKind::Whole(1, u64::MAX), Need::Default("10"),
         "Steps between samples: those whose number is a multiple of it."
         => "5";
-    "stages": ValueKind::Words("array of names of stages"), Need::Default("the last stage"),
+    "stages": ValueKind::Names, Need::Default("the last stage"),
         "In which stages to sample. Each has its own result."
         => "[\"produce\"]";
-    "skip": ValueKind::Words("whole number from 0"), Need::Default("0"),
+    "skip": ValueKind::Count, Need::Default("0"),
         "Steps at the beginning of a stage that are not sampled."
         => "20";
 };
 
 pub(super) const AXIS: Key = key(
     "axis",
-    ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"),
+    ValueKind::Choice(|| names(&AXES)),
     Need::Default("the normal of the initial slab, or else the last direction"),
     "The direction of the profile, normal to the faces of the box there.",
     "\"x\"",
@@ -37,7 +30,7 @@ pub(super) const AXIS: Key = key(
 
 pub(super) const BINS: Key = key(
     "bins",
-    ValueKind::Words("whole number from 1 to 10000"),
+    ValueKind::Whole(1, 10_000),
     Need::Default("as many as make them 0.1 wide, or a little less"),
     "Bins along the axis.",
     "50",
@@ -45,7 +38,7 @@ pub(super) const BINS: Key = key(
 
 pub(super) const RECENTRE: Key = key(
     "recentre",
-    ValueKind::Words("true, false, or the name of a species"),
+    ValueKind::FlagOrSpecies,
     Need::Default(
         "true if the scene starts from a slab normal to the axis, the species of the first layer if layers of several liquids fill the box, else false",
     ),

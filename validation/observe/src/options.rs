@@ -1,9 +1,14 @@
 //! The keys of one observable in a scene, and the facts on which their values depend.
 
+use psidpd_core::document::keys::{Key, ValueKind};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+
+/// The names of the directions.
+pub const AXES: [(&str, usize); 3] = [("x", 0), ("y", 1), ("z", 2)];
 
 /// The names of the faces of a box: axis, and whether the face is the upper one.
 pub const FACES: [(&str, (usize, bool)); 6] = [
@@ -65,6 +70,8 @@ pub struct Drive {
 pub struct Options<'a> {
     pub section: Option<Section<'a>>,
     pub value: Value<'a>,
+    /// The keys of the observable.
+    pub keys: &'static [Key],
     pub place: &'a Place<'a>,
 }
 
@@ -79,43 +86,81 @@ impl<'a> Options<'a> {
         self.section.as_ref()?.get(key)
     }
 
+    /// Reads an optional key; `None` if the observable lacks it.
+    fn read<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Option<T>, FileError> {
+        self.get(key).map(|value| read(&value)).transpose()
+    }
+
     pub fn positive(&self, key: &str) -> Result<Option<f64>, FileError> {
-        self.get(key).map(|value| value.positive()).transpose()
+        self.read(key, Value::positive)
     }
 
-    pub fn number(&self, key: &str, low: f64, high: f64) -> Result<Option<f64>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        value.within(value.number()?, low, high).map(Some)
+    /// A key in the table of the observable.
+    fn key(&self, key: &str) -> &'static Key {
+        let known = self.keys.iter().find(|known| known.name == key);
+        known.unwrap_or_else(|| unreachable!("the table has no {key}"))
     }
 
-    pub fn count(&self, key: &str, low: u64, high: u64) -> Result<Option<usize>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        Ok(Some(value.within(value.count()?, low, high)? as usize))
+    /// The value of a key that is left out, which the table states as a number.
+    fn default<T: FromStr>(&self, key: &str) -> T {
+        let text = self.key(key).default();
+        text.parse().unwrap_or_else(|_| unreachable!("{key} is {text} if left out, no number"))
     }
 
-    pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        let items = value.array()?;
-        let [a, b] = items.as_slice() else {
-            return Err(value.error("expected two whole numbers"));
-        };
-        let read = |item: &Value| Ok(item.within(item.count()?, low, high)? as usize);
-        Ok(Some([read(a)?, read(b)?]))
+    /// The range of a key that is one or two whole numbers.
+    fn range(&self, key: &str) -> [u64; 2] {
+        match self.key(key).value {
+            ValueKind::Whole(low, high) | ValueKind::Wholes(low, high) => [low, high],
+            other => unreachable!("{key} is no whole number but {other:?}"),
+        }
+    }
+
+    /// Reads a number up to `most`, in the range that the table gives.
+    pub fn number_up_to(&self, key: &str, most: f64) -> Result<Option<f64>, FileError> {
+        let ValueKind::Within(low, high) = self.key(key).value else { unreachable!("{key} has no range") };
+        self.read(key, |value| value.within(value.number()?, low, high.min(most)))
+    }
+
+    /// Reads a number, with the range and the default that the table gives.
+    pub fn number(&self, key: &str) -> Result<f64, FileError> {
+        Ok(self.number_up_to(key, f64::INFINITY)?.unwrap_or_else(|| self.default(key)))
+    }
+
+    /// Reads a whole number in the range that the table gives.
+    pub fn given_count(&self, key: &str) -> Result<Option<usize>, FileError> {
+        let [low, high] = self.range(key);
+        self.read(key, |value| Ok(value.whole(low, high)? as usize))
+    }
+
+    /// Reads a whole number, with the range and the default that the table gives.
+    pub fn count(&self, key: &str) -> Result<usize, FileError> {
+        Ok(self.given_count(key)?.unwrap_or_else(|| self.default(key)))
+    }
+
+    /// Reads two whole numbers in the range that the table gives.
+    pub fn counts(&self, key: &str) -> Result<Option<[usize; 2]>, FileError> {
+        let [low, high] = self.range(key);
+        let count = |item: &Value| Ok(item.whole(low, high)? as usize);
+        self.read(key, |value| match &value.array()?[..] {
+            [a, b] => Ok([count(a)?, count(b)?]),
+            _ => Err(value.error("expected two whole numbers")),
+        })
     }
 
     pub fn flag(&self, key: &str) -> Result<Option<bool>, FileError> {
-        self.get(key).map(|value| value.boolean()).transpose()
+        self.read(key, Value::boolean)
     }
 
     pub fn axis(&self, key: &str) -> Result<Option<usize>, FileError> {
-        let names = [("x", 0), ("y", 1), ("z", 2)];
-        let names = &names[..self.place.fluid.dimensions];
-        self.get(key).map(|value| value.one_of("axis", names)).transpose()
+        self.read(key, |value| value.one_of("axis", &AXES[..self.place.fluid.dimensions]))
     }
 
     pub fn species(&self, key: &str) -> Result<Option<usize>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        value.string()?.among("species", self.place.fluid.species.iter().zip(0..)).map(Some)
+        self.read(key, |value| value.string()?.among("species", self.place.fluid.species.iter().zip(0..)))
     }
 
     /// The index of a species of the model, for keys whose value may be something other than a name.
@@ -124,7 +169,7 @@ impl<'a> Options<'a> {
     }
 
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
-        self.get(key).map(|value| value.one_of("choice", choices)).transpose()
+        self.read(key, |value| value.one_of("choice", choices))
     }
 
     /// An error about a key, or about the observable if the key is not set.
@@ -144,15 +189,18 @@ impl<'a> Options<'a> {
     }
 
     /// The key `bins`; if left out, as many bins as make them `width` wide, or a little less.
-    pub fn bins(&self, length: f64, width: f64, fewest: usize) -> Result<usize, FileError> {
-        let given = self.count("bins", fewest as u64, 10_000)?;
-        Ok(given.unwrap_or(((length / width).ceil() as usize).clamp(fewest, 10_000)))
+    pub fn bins(&self, length: f64, width: f64) -> Result<usize, FileError> {
+        Ok(self.given_count("bins")?.unwrap_or_else(|| self.bins_as_wide(length, width)))
+    }
+
+    fn bins_as_wide(&self, length: f64, width: f64) -> usize {
+        let [fewest, most] = self.range("bins");
+        ((length / width).ceil() as usize).clamp(fewest as usize, most as usize)
     }
 
     /// The key `bins` of a plane; if left out, as many bins as make them 0.25 wide, or a little less.
-    pub fn bins_of_plane(&self, lengths: [f64; 2], fewest: usize) -> Result<[usize; 2], FileError> {
-        let given = self.counts("bins", fewest as u64, 2000)?;
-        Ok(given.unwrap_or(lengths.map(|l| ((l / 0.25).ceil() as usize).clamp(fewest, 2000))))
+    pub fn bins_of_plane(&self, lengths: [f64; 2]) -> Result<[usize; 2], FileError> {
+        Ok(self.counts("bins")?.unwrap_or_else(|| lengths.map(|length| self.bins_as_wide(length, 0.25))))
     }
 
     /// Refuses a tilted box, with an error about a key.

@@ -3,7 +3,7 @@
 use super::keys::{COMMON, Key, Table};
 use super::meter::{AnyMeter, KINDS};
 use super::options::{Options, Place};
-use psidpd_core::document::{FileError, Section};
+use psidpd_core::document::{FileError, Section, Value};
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Observe {
@@ -49,7 +49,8 @@ pub fn read(root: &Section, place: &Place) -> Result<Observe, FileError> {
     let mut observe = Observe::default();
     for kind in KINDS {
         let Some(value) = section.get(kind.table.path) else { continue };
-        let options = Options { section: value.as_section(), value: value.clone(), place };
+        let options =
+            Options { section: value.as_section(), value: value.clone(), keys: kind.table.keys, place };
         if let Some(section) = &options.section {
             section.only([names(COMMON), names(kind.table.keys)].concat())?;
         }
@@ -92,15 +93,8 @@ struct Common {
 impl Common {
     fn read(section: &Section, place: &Place, mut common: Common) -> Result<Common, FileError> {
         debug_assert_eq!(COMMON.len(), 3);
-        if let Some(value) = section.get("every") {
-            common.every = value.count()?;
-            if common.every == 0 {
-                return Err(value.error("must be at least 1"));
-            }
-        }
-        if let Some(value) = section.get("skip") {
-            common.skip = value.count()?;
-        }
+        common.every = section.read("every", |value| value.whole(1, u64::MAX))?.unwrap_or(common.every);
+        common.skip = section.read("skip", Value::count)?.unwrap_or(common.skip);
         if let Some(value) = section.get("stages") {
             common.stages.clear();
             for item in value.array()? {

@@ -112,17 +112,28 @@ pub enum ValueKind {
     Formula,
     Correction,
     Excess,
+    Pressure,
     Slopes,
-    Words(&'static str),
+    Measured,
+    /// From the first to the second; without an end if that is `u64::MAX`.
+    Whole(u64, u64),
+    /// Two of [`ValueKind::Whole`].
+    Wholes(u64, u64),
+    /// From the first to the second, which may be infinite.
+    Within(f64, f64),
+    HalfBox,
+    Name(&'static str),
+    FlagOrSpecies,
 }
 
 impl ValueKind {
     /// Describes the type in words.
     pub fn describe(&self) -> String {
-        let list = |choices: &fn() -> Vec<&'static str>| {
+        let list = |choices: fn() -> Vec<&'static str>| {
             choices().iter().map(|c| format!("`\"{c}\"`")).collect::<Vec<_>>().join(", ")
         };
-        let words = match self {
+        let short = |x: f64| if x < 1e-4 && x > 0.0 { format!("{x:e}") } else { x.to_string() };
+        let words = match *self {
             ValueKind::Text => "string",
             ValueKind::File => "path of a file, relative to the folder of this one",
             ValueKind::TableFile => "path of a file in the folder of this one or below",
@@ -141,6 +152,15 @@ impl ValueKind {
             ValueKind::EachOf(choices) => {
                 return format!("{}, or an array of one for each direction", list(choices));
             }
+            ValueKind::Whole(low, u64::MAX) => return format!("whole number from {low}"),
+            ValueKind::Whole(low, high) => return format!("whole number from {low} to {high}"),
+            ValueKind::Wholes(low, high) => {
+                return format!("array of two whole numbers from {low} to {high}");
+            }
+            ValueKind::Within(low, f64::INFINITY) => return format!("number from {}", short(low)),
+            ValueKind::Within(low, high) => return format!("number from {} to {}", short(low), short(high)),
+            ValueKind::HalfBox => "number above 0, at most half the box",
+            ValueKind::Name(of) => return format!("name of {of}"),
             ValueKind::Temperature => "number above 0, or an array of two, `[from, to]`",
             ValueKind::Species => "array of names (letters, digits, underscores)",
             ValueKind::Between => "array of two species",
@@ -154,8 +174,10 @@ impl ValueKind {
             ValueKind::Excess => {
                 "string with a formula, `{ table = \"FILE\" }`, `{ pressure = \"FORMULA\" }` or `{ slopes = { … } }`"
             }
+            ValueKind::Pressure => "string with a formula, or `{ table = \"FILE\" }`",
+            ValueKind::Measured => "array of a number and its error, which is above 0",
             ValueKind::Slopes => "table of formulas by the variables of densities",
-            ValueKind::Words(words) => words,
+            ValueKind::FlagOrSpecies => "true, false, or the name of a species",
         };
         words.to_owned()
     }
@@ -170,6 +192,11 @@ impl Table {
     /// A table that a file may have several times, without forms.
     pub const fn array(path: &'static str, about: &'static str, keys: &'static [Key]) -> Table {
         Table { array: true, ..Table::new(path, about, keys) }
+    }
+
+    /// The table with a title of its own.
+    pub const fn titled(self, title: &'static str) -> Table {
+        Table { title, ..self }
     }
 
     /// The keys that a table of this form has; all keys if `form` is `None`.
@@ -196,6 +223,16 @@ impl Table {
         }
         text
     }
+}
+
+/// The names in a list of choices.
+pub fn names<T>(choices: &[(&'static str, T)]) -> Vec<&'static str> {
+    choices.iter().map(|(name, _)| *name).collect()
+}
+
+/// Whether the name of a key, or a part of the path of a table, stands for any name: those in capitals do.
+pub fn is_any_name(name: &str) -> bool {
+    name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase())
 }
 
 /// An error at `key`, for a file of another kind than the one expected.
@@ -230,7 +267,6 @@ fn refuse_strangers<'a>(
     more: &[&'static str],
     form: impl Fn(&Section<'a>, &Table) -> Option<&'a str>,
 ) -> Result<(), FileError> {
-    let is_chosen = |name: &str| name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase());
     for table in tables {
         for section in sections(root, table.path) {
             let mut known: Vec<&str> = table.keys_of(form(&section, table)).map(|k| k.name).collect();
@@ -239,7 +275,7 @@ fn refuse_strangers<'a>(
                 known.retain(|name| !name.is_empty());
                 known.extend(more);
             }
-            if !known.iter().any(|name| is_chosen(name)) {
+            if !known.iter().any(|name| is_any_name(name)) {
                 section.only(known)?;
             }
         }
@@ -256,17 +292,18 @@ fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
         let elements = value.as_array().unwrap_or_else(|| vec![value]);
         elements.iter().filter_map(Value::as_section).flat_map(|s| sections(&s, rest)).collect()
     };
-    if first.chars().all(|c| c.is_ascii_uppercase()) {
+    if is_any_name(first) {
         return root.entries().into_iter().flat_map(|(_, value)| inner(value)).collect();
     }
     root.get(first).map_or_else(Vec::new, inner)
 }
 
-/// Declares keys in short: `"name": VALUE, NEED, "meaning" => "example";`.
+/// Declares keys in short: `"name": VALUE, NEED, "meaning" => "example";`. Constants go before a key, `use AXIS;`, or after the
+/// last, `then AXIS;`.
 #[macro_export]
 macro_rules! keys {
-    ($($name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {
-        &[$($crate::document::keys::key($name, $value, $need, $about, $example)),*]
+    ($($(use $shared:ident;)* $name:literal: $value:expr, $need:expr, $about:expr => $example:expr;)* $(then $last:ident;)?) => {
+        &[$($($shared,)* $crate::document::keys::key($name, $value, $need, $about, $example),)* $($last)?]
     };
 }
 

@@ -89,6 +89,15 @@ impl<'a> Section<'a> {
         self.get(key).ok_or_else(|| self.place_of(key, &self.place.span).error(FileErrorKind::Missing))
     }
 
+    /// Reads an optional key; `None` if the section lacks it.
+    pub fn read<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Option<T>, FileError> {
+        self.get(key).map(|value| read(&value)).transpose()
+    }
+
     /// Every key with its value, in the order of the file: for tables whose keys are names.
     pub fn entries(&self) -> Vec<(Located<String>, Value<'a>)> {
         let located = |entry: &'a Entry| {
@@ -177,6 +186,14 @@ impl<'a> Value<'a> {
             }
             Content::Float(x) => Err(self.error(not_an_integer(x))),
             _ => Err(self.wrong("an integer")),
+        }
+    }
+
+    /// Reads a whole number from `low` to `high`; `u64::MAX` is no end.
+    pub fn whole(&self, low: u64, high: u64) -> Result<u64, FileError> {
+        match self.count()? {
+            number if number < low && high == u64::MAX => Err(self.error(format!("must be at least {low}"))),
+            number => self.within(number, low, high),
         }
     }
 

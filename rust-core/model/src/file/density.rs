@@ -53,28 +53,20 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
     let choices: Vec<(&str, KernelKind)> = KernelKind::ALL.iter().map(|k| (k.name(), *k)).collect();
     let kernel = table.require("kernel")?.one_of("kernel", &choices)?;
     let force_kernel =
-        table.get("force_kernel").map_or(Ok(kernel), |value| value.one_of("kernel", &choices))?;
+        table.read("force_kernel", |value| value.one_of("kernel", &choices))?.unwrap_or(kernel);
     let range = Number::require(table, "range")?;
-    let includes_self = table.get("self").map_or(Ok(false), |value| value.boolean())?;
-    let correction = match table.get("correction") {
-        Some(value) => read_correction(&value, species)?,
-        None => vec![Vec::new(); species.len() * species.len()],
-    };
-    let bounds = table.get("bounds").map(|value| {
+    let includes_self = table.read("self", Value::boolean)?.unwrap_or(false);
+    let correction = table.read("correction", |value| read_correction(value, species))?;
+    let correction = correction.unwrap_or_else(|| vec![Vec::new(); species.len() * species.len()]);
+    let bounds = table.read("bounds", |value| {
         let [low, high] = &value.array()?[..] else { return Err(value.error("expected [lowest, highest]")) };
         Ok([Number::read(low)?, Number::read(high)?])
-    });
-    let bounds = bounds.transpose()?;
-    let below = match table.get("below") {
-        Some(value) => {
-            let choices = [("linear", Continuation::Linear), ("constant", Continuation::Constant)];
-            if bounds.is_none() {
-                return Err(value.error("has no meaning without bounds"));
-            }
-            value.one_of("continuation", &choices)?
-        }
-        None => Continuation::default(),
-    };
+    })?;
+    let below = table.read("below", |value| match bounds {
+        Some(_) => value.one_of("continuation", &Continuation::NAMED),
+        None => Err(value.error("has no meaning without bounds")),
+    })?;
+    let below = below.unwrap_or_default();
     let name = name.value;
     Ok(DensityEntry { name, kernel, force_kernel, range, includes_self, correction, bounds, below })
 }

@@ -46,7 +46,7 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
     let mut entries: Vec<ThermostatEntry> = Vec::new();
     for item in value.array()? {
         let table = item.section()?;
-        let between = table.get("between").map(|value| read_between(&value, species)).transpose()?;
+        let between = table.read("between", |value| read_between(value, species))?;
         let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
         if entries.iter().any(|e| e.between.map(sorted) == between.map(sorted)) {
             return Err(table.error("this pair of species has a thermostat already"));
@@ -55,7 +55,7 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
             between,
             gamma: Number::require(&table, "gamma")?,
             range: Number::require(&table, "range")?,
-            exponent: table.get("exponent").map(|value| Number::read(&value)).transpose()?,
+            exponent: table.read("exponent", Number::read)?,
         });
     }
     Ok(entries)

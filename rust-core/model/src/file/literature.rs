@@ -1,6 +1,6 @@
 //! Published values of the fluid, for comparison with measured ones.
 
-use crate::document::{FileError, Section};
+use crate::document::{FileError, Section, Value};
 
 /// The quantities that the file may state.
 pub const QUANTITIES: [&str; 5] = ["pressure", "liquid", "vapour", "tension", "width"];
@@ -23,7 +23,7 @@ pub fn read(root: &Section) -> Result<Vec<Published>, FileError> {
     for item in list.array()? {
         let table = item.section()?;
         let kt = table.require("kT")?.positive()?;
-        let density = table.get("density").map(|value| value.positive()).transpose()?;
+        let density = table.read("density", Value::positive)?;
         let mut values = Vec::new();
         for name in QUANTITIES {
             let Some(value) = table.get(name) else { continue };

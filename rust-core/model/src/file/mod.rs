@@ -13,7 +13,7 @@ mod wall;
 use super::fluid::Fluid;
 use super::wall::Wall;
 use crate::document::keys::{of_another_kind, read_known};
-use crate::document::{Document, FileError, Section, Source};
+use crate::document::{Document, FileError, Section, Source, Value};
 use density::DensityEntry;
 use excess::ExcessEntry;
 use interaction::{PairTable, ThermostatEntry};
@@ -81,7 +81,7 @@ impl Model {
     fn of(document: &Document) -> Result<Model, FileError> {
         let root = document.root();
         let title = root.require("title")?.string()?.value;
-        let reference = root.get("reference").map(|v| v.string()).transpose()?.map(|l| l.value);
+        let reference = root.read("reference", Value::string)?.map(|text| text.value);
         let dimensions = read_dimensions(&root)?;
         let units = units::read(&root)?;
         let literature = literature::read(&root)?;

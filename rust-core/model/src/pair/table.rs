@@ -44,7 +44,7 @@ impl FormEntry for TableEntry {
         Ok(TableEntry {
             spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
             file: file.place.clone(),
-            range: table.get("range").map(|value| Number::read(&value)).transpose()?,
+            range: table.read("range", Number::read)?,
         })
     }
 

@@ -32,7 +32,7 @@ impl Arrangement {
     /// Reads the arrangement; random by default.
     pub(super) fn read(section: &Section, dimensions: usize) -> Result<Arrangement, FileError> {
         let names: &[(&str, Lattice)] = if dimensions == 2 { &FLAT_LATTICES } else { &LATTICES };
-        let lattice = section.get("lattice").map(|v| v.one_of("lattice", names)).transpose()?;
+        let lattice = section.read("lattice", |value| value.one_of("lattice", names))?;
         match (lattice, section.get("min_distance")) {
             (None, None) => Ok(Arrangement::Random { min_distance: 0.0 }),
             (None, Some(value)) => Ok(Arrangement::Random { min_distance: value.positive()? }),

@@ -12,7 +12,7 @@ fn read_one(section: &Section, model: &Model, initial: &Initial) -> Result<BodyF
     let dimensions = model.dimensions();
     let value = section.require("acceleration")?;
     let acceleration = vector(&value, dimensions)?;
-    let reversed_along = section.get("reversed_along").map(|v| axis(&v, dimensions)).transpose()?;
+    let reversed_along = section.read("reversed_along", |value| axis(value, dimensions))?;
     if reversed_along.is_some_and(|k| acceleration[k] != 0.0) {
         return Err(value.error("must not be along the direction in which it is reversed"));
     }

@@ -80,19 +80,22 @@ impl Initial {
     }
 }
 
+/// Kinds that fill a region, kinds that read a file, and all.
+pub const FILLED: &[&str] = KINDS.split_at(5).0;
+pub const SAVED: &[&str] = KINDS.split_at(5).1;
 pub const KINDS: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder", "data", "checkpoint"];
 
 /// Reads the initial state, and the box, which is given by `box` or by the initial file.
 pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, PeriodicBox), FileError> {
     let dimensions = model.dimensions();
-    let section = root.get("initial").map(|value| value.section()).transpose()?;
+    let section = root.read("initial", Value::section)?;
     let Some(section) = section else { return read_without(root, model) };
     let key = section.require("kind")?;
     let kind = key.string()?.value;
     if let Some(other) = root.get("part") {
         return Err(other.error("there is an [initial] too: give one of them"));
     }
-    if ["data", "checkpoint"].contains(&kind.as_str()) {
+    if SAVED.contains(&kind.as_str()) {
         if let Some(value) = root.get("density") {
             return Err(value.error("the initial file gives the particles: remove the density"));
         }

@@ -14,12 +14,7 @@ pub use run::{BODY_FORCE, OUTPUT, STAGE, WALL};
 pub use scene::{BOX, MASSES, TOP};
 
 pub use psidpd_core::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
-use psidpd_core::document::keys::{form_key, key};
+use psidpd_core::document::keys::{form_key, key, names};
 
 /// All tables in the order of the documentation, except those of `[observe]`.
 pub const TABLES: &[Table] = &[TOP, BOX, MASSES, INITIAL, PART, WALL, BODY_FORCE, STAGE, OUTPUT];
-
-/// The names in a list of pairs.
-fn names<T>(all: &[(&'static str, T)]) -> Vec<&'static str> {
-    all.iter().map(|(name, _)| *name).collect()
-}

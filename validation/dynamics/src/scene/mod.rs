@@ -128,12 +128,12 @@ impl Scene {
 
     fn of(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
         let root = document.root();
-        let title = root.get("title").map(|value| value.string()).transpose()?;
+        let title = root.read("title", Value::string)?;
         let (model_path, model) = read_model(&root.require("model")?, base, of_model)?;
         let kt = root.require("kT")?.positive()?;
-        let seed = root.get("seed").map_or(Ok(1), |value| value.count())?;
-        let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
-        let device = root.get("device").map_or(Ok(Device::Cpu), |value| read_device(&value))?;
+        let seed = root.read("seed", Value::count)?.unwrap_or(1);
+        let precision = root.read("precision", |value| value.one_of("precision", &Precision::ALL))?;
+        let device = root.read("device", read_device)?.unwrap_or(Device::Cpu);
         let (initial, domain) = initial::read(&root, &model, base)?;
         let mass = masses::read(&root, model.species(), &initial)?;
         let model = wall::read(&root, model, (&initial, &domain), (kt, &mass))?;
@@ -150,7 +150,7 @@ impl Scene {
             model_path,
             kt,
             seed,
-            precision: precision.transpose()?,
+            precision,
             device,
             mass,
             frozen: initial.frozen(),

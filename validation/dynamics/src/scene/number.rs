@@ -1,6 +1,7 @@
 //! Vectors and names of directions.
 
 use super::{FileError, Value};
+pub use psidpd_observe::options::AXES;
 
 /// Reads one number for each dimension; in two dimensions the third is 0.
 pub fn vector(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {
@@ -9,8 +10,6 @@ pub fn vector(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {
         _ => value.numbers("three numbers"),
     }
 }
-
-pub const AXES: [(&str, usize); 3] = [("x", 0), ("y", 1), ("z", 2)];
 
 pub fn axis(value: &Value, dimensions: usize) -> Result<usize, FileError> {
     value.one_of("axis", &AXES[..dimensions])

@@ -1,6 +1,6 @@
 //! `[output]`: the files that a run writes.
 
-use super::{FileError, Section};
+use super::{FileError, Section, Value};
 
 /// Steps between rows, frames and pictures; 0 writes none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,24 +36,16 @@ pub fn every(interval: u64, step: u64) -> bool {
 }
 
 pub fn read(root: &Section) -> Result<Output, FileError> {
-    let mut output = Output::default();
-    let Some(value) = root.get("output") else { return Ok(output) };
-    let section = value.section()?;
-    let intervals = [
-        ("thermo", &mut output.thermo),
-        ("dump", &mut output.dump),
-        ("xyz", &mut output.xyz),
-        ("gsd", &mut output.gsd),
-        ("vtk", &mut output.vtk),
-        ("snapshot", &mut output.snapshot),
-    ];
-    for (key, interval) in intervals {
-        if let Some(value) = section.get(key) {
-            *interval = value.count()?;
-        }
-    }
-    if let Some(value) = section.get("checkpoint") {
-        output.checkpoint = Some(value.count()?);
-    }
-    Ok(output)
+    let default = Output::default();
+    let Some(section) = root.read("output", Value::section)? else { return Ok(default) };
+    let steps = |key: &str, left_out: u64| Ok(section.read(key, Value::count)?.unwrap_or(left_out));
+    Ok(Output {
+        thermo: steps("thermo", default.thermo)?,
+        dump: steps("dump", default.dump)?,
+        xyz: steps("xyz", default.xyz)?,
+        gsd: steps("gsd", default.gsd)?,
+        vtk: steps("vtk", default.vtk)?,
+        snapshot: steps("snapshot", default.snapshot)?,
+        checkpoint: section.read("checkpoint", Value::count)?,
+    })
 }

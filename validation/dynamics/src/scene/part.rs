@@ -37,7 +37,7 @@ pub struct Common<'a> {
 impl<'a> Common<'a> {
     /// Collects the shared data of the scene `root`.
     pub fn of(root: &Section, model: &'a Model, domain: &'a PeriodicBox) -> Result<Common<'a>, FileError> {
-        let density = root.get("density").map(|value| value.positive()).transpose()?;
+        let density = root.read("density", Value::positive)?;
         let dimensions = model.dimensions();
         let rounds = rounds(root, dimensions, domain)?;
         Ok(Common { model, shapes: Shapes { dimensions, domain, rounds }, density })
@@ -51,7 +51,7 @@ impl<'a> Common<'a> {
             composition: Composition::read(section, self.model.species())?,
             arrangement: Arrangement::read(section, dimensions)?,
             velocities: Velocities::read(section)?,
-            velocity: section.get("velocity").map_or(Ok([0.0; 3]), |v| vector(&v, dimensions))?,
+            velocity: section.read("velocity", |v| vector(v, dimensions))?.unwrap_or([0.0; 3]),
             frozen: false,
             normal: self.shapes.normal(&shape),
             name,
@@ -101,11 +101,9 @@ impl<'a> Common<'a> {
     }
 
     fn part(&self, section: &Section, index: usize, shape: Shape) -> Result<Part, FileError> {
-        let name = match section.get("name") {
-            Some(value) => value.string()?.value,
-            None => format!("part {}", index + 1),
-        };
-        let frozen = section.get("frozen").map_or(Ok(false), |v| v.boolean())?;
+        let name = section.read("name", Value::string)?;
+        let name = name.map_or_else(|| format!("part {}", index + 1), |name| name.value);
+        let frozen = section.read("frozen", Value::boolean)?.unwrap_or(false);
         let moves = ["velocity", "velocities"].iter().find_map(|key| section.get(key));
         if let Some(value) = moves.filter(|_| frozen) {
             return Err(value.error("the part is frozen, and does not move"));

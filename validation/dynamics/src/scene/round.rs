@@ -1,7 +1,7 @@
 //! The surfaces of round walls: cylinders and spheres.
 
 use super::number::{axis, vector};
-use super::{FileError, PeriodicBox, Section};
+use super::{FileError, PeriodicBox, Section, Value};
 use psidpd_core::model::wall::Round;
 
 /// Round surfaces, by whether they have an axis.
@@ -16,7 +16,7 @@ const OF_ROUND: [&str; 4] = ["radius", "center", "axis", "fluid"];
 /// The round surfaces of a scene's walls.
 pub fn rounds(root: &Section, dimensions: usize, domain: &PeriodicBox) -> Result<Vec<Round>, FileError> {
     let mut all = Vec::new();
-    for item in root.get("wall").map_or(Ok(Vec::new()), |value| value.array())? {
+    for item in root.read("wall", Value::array)?.unwrap_or_default() {
         all.extend(read_round(&item.section()?, dimensions, domain)?);
     }
     Ok(all)

@@ -46,7 +46,7 @@ pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
         name: String::new(),
         level: None,
         steps: 0,
-        dt: root.get("dt").map_or(Ok(DEFAULT_DT), |value| value.positive())?,
+        dt: root.read("dt", Value::positive)?.unwrap_or(DEFAULT_DT),
         integrator: read_integrator(root, Integrator::default())?,
         kt,
         thermostat: true,
@@ -127,14 +127,13 @@ fn read_steps(value: &Value) -> Result<u64, FileError> {
 
 /// Reads the stages of one table: a ramp makes one stage for each level.
 fn read_one(section: &Section, default: &Stage) -> Result<Vec<Stage>, FileError> {
-    let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean());
     let stage = Stage {
         name: section.require("name")?.string()?.value,
         steps: read_steps(&section.require("steps")?)?,
         integrator: read_integrator(section, default.integrator)?,
-        dt: section.get("dt").map_or(Ok(default.dt), |value| value.positive())?,
-        thermostat: flag("thermostat")?,
-        body_forces: flag("body_forces")?,
+        dt: section.read("dt", Value::positive)?.unwrap_or(default.dt),
+        thermostat: section.read("thermostat", Value::boolean)?.unwrap_or(true),
+        body_forces: section.read("body_forces", Value::boolean)?.unwrap_or(true),
         ..default.clone()
     };
     if !stage.integrator.has_time() {
@@ -179,7 +178,7 @@ fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError>
     let most = MOST_LEVELS.min(steps);
     let levels = match levels {
         None => DEFAULT_LEVELS.min(steps),
-        Some(value) => value.within(value.count()?, 1, most)?,
+        Some(value) => value.whole(1, most)?,
     };
     let level = |k: u64| Stage {
         level: Some([k, levels]),
@@ -193,10 +192,8 @@ fn read_levels(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError>
 
 /// Reads the integrator of a stage or of the scene; `default` if the file gives none.
 fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator, FileError> {
-    let mut integrator = match section.get("integrator") {
-        Some(value) => value.one_of("integrator", &Integrator::NAMED)?,
-        None => default,
-    };
+    let named = section.read("integrator", |value| value.one_of("integrator", &Integrator::NAMED))?;
+    let mut integrator = named.unwrap_or(default);
     let kind = integrator;
     let own = |key: &str, has: fn(&mut Integrator) -> bool| match section.get(key) {
         Some(value) if !has(&mut { kind }) => Err(has_none(&value, kind.name(), key, has)),

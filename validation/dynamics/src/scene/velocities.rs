@@ -13,19 +13,21 @@ pub enum Velocities {
 }
 
 impl Velocities {
-    const NAMES: [(&str, Option<Velocities>); 3] =
+    pub(super) const OF_PARTS: [(&str, Velocities); 2] =
+        [("thermal", Velocities::Thermal), ("zero", Velocities::Zero)];
+    pub(super) const OF_FILES: [(&str, Option<Velocities>); 3] =
         [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
 
     /// Reads the velocities of a filled region.
     pub(super) fn read(section: &Section) -> Result<Velocities, FileError> {
-        let Some(value) = section.get("velocities") else { return Ok(Velocities::default()) };
-        Ok(value.one_of("velocities", &Self::NAMES[..2])?.unwrap_or_default())
+        let named = section.read("velocities", |value| value.one_of("velocities", &Self::OF_PARTS))?;
+        Ok(named.unwrap_or_default())
     }
 
     /// Reads the velocities of a start from a file: `None` keeps those of the file, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
-        let Some(value) = initial.get("velocities") else { return Ok((!keep).then(Velocities::default)) };
-        value.one_of("velocities", &Self::NAMES)
+        let named = initial.read("velocities", |value| value.one_of("velocities", &Self::OF_FILES))?;
+        Ok(named.unwrap_or_else(|| (!keep).then(Velocities::default)))
     }
 
     /// Draws velocities of particles of the masses `mass`.

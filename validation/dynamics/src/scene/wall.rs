@@ -76,8 +76,8 @@ fn read_one(
 ) -> Result<Vec<Wall>, FileError> {
     section.require("kind")?.one_of("kind", KINDS)?;
     let dimensions = model.dimensions();
-    let species = match section.get("species") {
-        Some(value) => value.string()?.among("species", model.species().iter().zip(0..))?,
+    let species = match section.read("species", Value::string)? {
+        Some(name) => name.among("species", model.species().iter().zip(0..))?,
         None if model.species().len() == 1 => 0,
         None => {
             return Err(
@@ -85,25 +85,23 @@ fn read_one(
             );
         }
     };
-    let number = |key: &str| section.get(key).map(|value| value.positive()).transpose();
-    let matter = number("density")?.unwrap_or(density);
+    let matter = section.read("density", Value::positive)?.unwrap_or(density);
     if !(matter > 0.0 && matter.is_finite()) {
         return Err(section.error("the density of the wall's matter is missing, `density`"));
     }
-    let drag = section.get("drag").map(|value| not_negative(&value)).transpose()?;
-    let drag = [drag, number("drag_range")?];
+    let drag = [section.read("drag", not_negative)?, section.read("drag_range", Value::positive)?];
     if let Some(value) = section.get("viscosity")
         && drag[0].is_some()
     {
         return Err(value.error("the drag is given too, and the viscosity determines it: give one of them"));
     }
-    let local_densities = match number("local_density")? {
+    let local_densities = match section.read("local_density", Value::positive)? {
         Some(n) => vec![n; model.at(kt)?.densities.len()],
         None => {
             model.at(kt).ok().and_then(|fluid| local_densities_of_matter(&fluid, matter)).unwrap_or_default()
         }
     };
-    let strength = section.get("strength").map(|value| not_negative(&value)).transpose()?.unwrap_or(1.0);
+    let strength = section.read("strength", not_negative)?.unwrap_or(1.0);
     let velocity = section.get("velocity");
     let moves = velocity.as_ref().map(|value| vector(value, dimensions)).transpose()?;
     let of = |surface: Surface, velocity: [f64; 3]| Wall {

@@ -48,7 +48,7 @@ impl Across {
         let axis =
             axis.or(options.place.slab.map(|slab| slab.axis)).unwrap_or(options.place.fluid.dimensions - 1);
         let across = Across::at(options, axis);
-        Ok(Across { bins: options.bins(across.height, 0.1, 1)?, ..across })
+        Ok(Across { bins: options.bins(across.height, 0.1)?, ..across })
     }
 
     /// One bin over the whole direction.

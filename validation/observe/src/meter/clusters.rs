@@ -21,10 +21,10 @@ impl Meter for Clusters {
                 samples when there are more than 511.",
         keys: keys! {
             use DISTANCE;
-            "species": ValueKind::Words("name of a species"), Need::Default("all"),
+            "species": ValueKind::Name("a species"), Need::Default("all"),
                 "Which particles take part."
                 => "\"A\"";
-            "smallest": ValueKind::Words("whole number from 1"), Need::Default("1"),
+            "smallest": ValueKind::Whole(1, u64::MAX), Need::Default("1"),
                 "Particles in the smallest cluster that counts."
                 => "10";
         },
@@ -37,7 +37,7 @@ impl Meter for Clusters {
         Ok(Clusters {
             distance: Distance::read(options)?,
             species: options.species("species")?,
-            smallest: options.count("smallest", 1, 1 << 40)?.unwrap_or(1),
+            smallest: options.count("smallest")?,
             dimensions: options.place.fluid.dimensions,
             series: Series::new(4),
         })

@@ -194,21 +194,21 @@ impl Meter for ContactAngle {
                 weight is small, Δρ g R² ≪ γ; where it is not, `angle` and `contour` differ. Layers of liquid next to the wall are left out of the fit (`above`). Jackknife errors; the \
                 choice of the surface is not in them: dθ = dz/(R sin θ).",
         keys: keys! {
-            "wall": ValueKind::Words("`\"xlo\"`, `\"xhi\"`, `\"ylo\"`, `\"yhi\"`, `\"zlo\"` or `\"zhi\"`"), Need::Default("the low end of the last direction"),
+            "wall": ValueKind::Choice(|| names(&FACES)), Need::Default("the low end of the last direction"),
                 "The end of the box where the wall is: below a drop that sits, above one that hangs."
                 => "\"zhi\"";
             use ALONG;
-            "surface": ValueKind::Words("number from 0"), Need::Default("where the frozen particles of the wall's half of the box end; without these the end of the box"),
+            "surface": ValueKind::Within(0.0, f64::INFINITY), Need::Default("where the frozen particles of the wall's half of the box end; without these the end of the box"),
                 "Height of the wall's surface above the end of the box."
                 => "1.0";
-            "above": ValueKind::Words("number from 0"), Need::Default("the longest range of a conservative interaction"),
+            "above": ValueKind::Within(0.0, f64::INFINITY), Need::Default("the longest range of a conservative interaction"),
                 "Height above the surface from which the contour is fitted."
                 => "0.5";
             use DISTANCE;
-            "bins": ValueKind::Words("array of two whole numbers from 4 to 2000"), Need::Default("as many as make them 0.25 wide, or a little less"),
+            "bins": ValueKind::Wholes(4, 2000), Need::Default("as many as make them 0.25 wide, or a little less"),
                 "Bins outwards, up to half the box, and away from the wall."
                 => "[20, 40]";
-            "isodensity": ValueKind::Words("positive number"), Need::Default("half the density of the liquid"),
+            "isodensity": ValueKind::Positive, Need::Default("half the density of the liquid"),
                 "The density on the contour."
                 => "3.0";
         },
@@ -237,7 +237,7 @@ impl Meter for ContactAngle {
             .map(|k| 0.5 * lengths[k])
             .fold(f64::INFINITY, f64::min);
         let upwards = lengths[wall.0];
-        let bins = options.bins_of_plane([outwards, upwards], 4)?;
+        let bins = options.bins_of_plane([outwards, upwards])?;
         let low = domain.origin()[wall.0];
         Ok(ContactAngle {
             wall,
@@ -248,9 +248,9 @@ impl Meter for ContactAngle {
             width: [outwards / bins[0] as f64, upwards / bins[1] as f64],
             depth: along.map_or(1.0, |k| lengths[k]),
             ends: [low, low + upwards],
-            given: options.number("surface", 0.0, upwards)?,
+            given: options.number_up_to("surface", upwards)?,
             found: None,
-            above: options.number("above", 0.0, upwards)?.unwrap_or(fluid.conservative_range()),
+            above: options.number_up_to("above", upwards)?.unwrap_or(fluid.conservative_range()),
             isodensity: options.positive("isodensity")?,
             series: Series::with_rows(bins[0] * bins[1], ROWS),
         })

@@ -23,10 +23,10 @@ impl Meter for DensityField {
                 middles of the cells, the later of the two directions running fastest. The box must have right \
                 angles.",
         keys: keys! {
-            "axis": ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"), Need::Default("y; none in two dimensions"),
+            "axis": ValueKind::Choice(|| names(&AXES)), Need::Default("y; none in two dimensions"),
                 "The direction that is averaged over."
                 => "\"x\"";
-            "bins": ValueKind::Words("array of two whole numbers from 1 to 2000"), Need::Default("as many as make them 0.25 wide, or a little less"),
+            "bins": ValueKind::Wholes(1, 2000), Need::Default("as many as make them 0.25 wide, or a little less"),
                 "Cells along the other two directions, in their order."
                 => "[10, 20]";
         },
@@ -49,7 +49,7 @@ impl Meter for DensityField {
             1 => [0, 2],
             _ => [0, 1],
         };
-        let bins = options.bins_of_plane(axes.map(|k| lengths[k]), 1)?;
+        let bins = options.bins_of_plane(axes.map(|k| lengths[k]))?;
         let kinds = if fluid.species.len() > 1 { fluid.species.len() } else { 1 };
         Ok(DensityField {
             axes,

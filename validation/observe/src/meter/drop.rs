@@ -145,10 +145,10 @@ impl Meter for Drop {
                 time.",
         keys: keys! {
             use DISTANCE;
-            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("half the box"),
+            "range": ValueKind::HalfBox, Need::Default("half the box"),
                 "Radius of the largest shell."
                 => "2.0";
-            "bins": ValueKind::Words("whole number from 12 to 10000"), Need::Default("as many as make them 0.1 thick, or a little less"),
+            "bins": ValueKind::Whole(12, 10_000), Need::Default("as many as make them 0.1 thick, or a little less"),
                 "How many shells."
                 => "30";
         },
@@ -160,7 +160,7 @@ impl Meter for Drop {
 
     fn read(options: &Options) -> Result<Drop, FileError> {
         let range = options.within_half_box("range")?.unwrap_or(options.half_box());
-        let bins = options.bins(range, 0.1, 12)?;
+        let bins = options.bins(range, 0.1)?;
         Ok(Drop {
             distance: Distance::read(options)?,
             range,

@@ -105,7 +105,7 @@ impl Linked {
 
 pub(super) const DISTANCE: Key = key(
     "distance",
-    ValueKind::Words("positive number, at most half the box"),
+    ValueKind::HalfBox,
     Need::Default(
         "chosen at the first sample: (2/ρ)^(1/3), in two dimensions (2.5/ρ)^(1/2), with the density ρ in the densest tenth; at most the longest range of a conservative interaction",
     ),

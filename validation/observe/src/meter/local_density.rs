@@ -52,13 +52,13 @@ impl Meter for LocalDensity {
                 ⟨n⟩/ρ = [w g] (Trofimov et al., J. Chem. Phys. 117, 9383 (2002)), the two differ by the width of the \
                 shells; −[r w′ g]/d multiplies ψ′ in the virial, and all are 1 if g = 1.",
         keys: keys! {
-            "density": ValueKind::Words("name of a density of the model"), Need::Default("the first"),
+            "density": ValueKind::Name("a density of the model"), Need::Default("the first"),
                 "Which density."
                 => "\"n\"";
-            "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("200"),
+            "bins": ValueKind::Whole(1, 10_000), Need::Default("200"),
                 "Bins of the histogram."
                 => "50";
-            "range": ValueKind::Words("positive number"), Need::Default("twice the largest n of the first sample"),
+            "range": ValueKind::Positive, Need::Default("twice the largest n of the first sample"),
                 "Where the histogram ends; it begins at 0."
                 => "20.0";
         },
@@ -75,7 +75,7 @@ impl Meter for LocalDensity {
             return Err(options.error("", "the model has no density"));
         }
         let density = options.choice("density", &names)?.unwrap_or(0);
-        let bins = options.count("bins", 1, 10_000)?.unwrap_or(200);
+        let bins = options.count("bins")?;
         let kinds = fluid.species.len();
         Ok(LocalDensity {
             name: fluid.densities[density].name.clone(),

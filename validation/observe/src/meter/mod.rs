@@ -32,9 +32,9 @@ mod waves;
 // Every observable uses these.
 use super::flux::Recorded;
 use super::frame::Frame;
-use super::keys::{AXIS, BINS, Need, PLAIN, Table, ValueKind, keys};
+use super::keys::{AXIS, BINS, Need, PLAIN, Table, ValueKind, keys, names};
 use super::observation::{Kind, Observation};
-use super::options::Options;
+use super::options::{AXES, Options};
 use super::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{PeriodicBox, Want};

@@ -110,13 +110,13 @@ impl Meter for Msd {
                 origins, correlated as they overlap. Memory and checkpoints hold one set of positions for each \
                 origin under way, `length/spacing` of them.",
         keys: keys! {
-            "length": ValueKind::Words("whole number from 2 to 100000"), Need::Default("100"),
+            "length": ValueKind::Whole(2, 100_000), Need::Default("100"),
                 "The longest time, in samples."
                 => "50";
-            "spacing": ValueKind::Words("whole number from 1 to 100000"), Need::Default("a tenth of `length`"),
+            "spacing": ValueKind::Whole(1, 100_000), Need::Default("a tenth of `length`"),
                 "Samples between origins."
                 => "5";
-            "remove_drift": ValueKind::Words("true or false"), Need::Default("false"),
+            "remove_drift": ValueKind::Flag, Need::Default("false"),
                 "Whether displacements are those from the centre of mass of all particles."
                 => "true";
         },
@@ -128,13 +128,13 @@ impl Meter for Msd {
 
     fn read(options: &Options) -> Result<Msd, FileError> {
         let fluid = options.place.fluid;
-        let length = options.count("length", 2, 100_000)?.unwrap_or(100);
+        let length = options.count("length")?;
         let kinds = fluid.species.len();
         Ok(Msd {
             species: fluid.species.clone(),
             dimensions: fluid.dimensions,
             length,
-            spacing: options.count("spacing", 1, 100_000)?.unwrap_or(length.div_ceil(10)),
+            spacing: options.given_count("spacing")?.unwrap_or(length.div_ceil(10)),
             remove_drift: options.flag("remove_drift")?.unwrap_or(false),
             clock: Clock::default(),
             origins: Vec::new(),

@@ -94,6 +94,9 @@ impl Pendant {
     }
 }
 
+/// The ends of the axis, and whether each is the low one.
+const APICES: [(&str, bool); 2] = [("low", true), ("high", false)];
+
 const ALONG: Key = Key {
     about: "The vertical, along an edge of the box at right angles to the others.",
     need: Need::Default("the last direction"),
@@ -114,20 +117,20 @@ impl Meter for Pendant {
                 errors.",
         keys: keys! {
             use ALONG;
-            "apex": ValueKind::Words("`\"low\"` or `\"high\"`"), Need::Default("`\"low\"`"),
+            "apex": ValueKind::Choice(|| names(&APICES)), Need::Default("`\"low\"`"),
                 "At which end of the axis the drop ends; it hangs from the other."
                 => "\"high\"";
             use DISTANCE;
-            "bins": ValueKind::Words("array of two whole numbers from 4 to 2000"), Need::Default("as many as make them 0.25 wide, or a little less"),
+            "bins": ValueKind::Wholes(4, 2000), Need::Default("as many as make them 0.25 wide, or a little less"),
                 "Bins outwards, up to half the box, and along the axis."
                 => "[20, 40]";
-            "isodensity": ValueKind::Words("positive number"), Need::Default("half the density of the liquid"),
+            "isodensity": ValueKind::Positive, Need::Default("half the density of the liquid"),
                 "The density of the surface."
                 => "3.0";
-            "part": ValueKind::Words("number from 0.1 to 1"), Need::Default("0.8"),
+            "part": ValueKind::Within(0.1, 1.0), Need::Default("0.8"),
                 "The part of the height of the surface, from the apex, that is fitted."
                 => "0.7";
-            "weight": ValueKind::Words("positive number"), Need::Default("none"),
+            "weight": ValueKind::Positive, Need::Default("none"),
                 "The force g m on a particle along the axis."
                 => "0.02";
         },
@@ -143,8 +146,8 @@ impl Meter for Pendant {
         let lengths = domain.lengths();
         let outwards = (0..d).filter(|k| *k != axis).map(|k| 0.5 * lengths[k]).fold(f64::INFINITY, f64::min);
         let along = lengths[axis];
-        let bins = options.bins_of_plane([outwards, along], 4)?;
-        let hangs_down = options.choice("apex", &[("low", true), ("high", false)])?.unwrap_or(true);
+        let bins = options.bins_of_plane([outwards, along])?;
+        let hangs_down = options.choice("apex", &APICES)?.unwrap_or(true);
         Ok(Pendant {
             axis,
             hangs_down,
@@ -154,7 +157,7 @@ impl Meter for Pendant {
             width: [outwards / bins[0] as f64, along / bins[1] as f64],
             origin: domain.origin()[axis],
             isodensity: options.positive("isodensity")?,
-            part: options.number("part", 0.1, 1.0)?.unwrap_or(0.8),
+            part: options.number("part")?,
             weight: options.positive("weight")?,
             series: Series::with_rows(bins[0] * bins[1], ROWS),
         })

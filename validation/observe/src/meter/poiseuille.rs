@@ -59,13 +59,13 @@ impl Meter for Poiseuille {
                 steady or not Newtonian. `poiseuille_profile`: `velocity` and `fit`. Jackknife errors. Skip the time \
                 ρD²/(π²η), several times over, in which the flow sets in.",
         keys: keys! {
-            "axis": ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"), Need::Default("the direction in which the body force of the scene is reversed"),
+            "axis": ValueKind::Choice(|| names(&AXES)), Need::Default("the direction in which the body force of the scene is reversed"),
                 "The direction across the flow."
                 => "\"z\"";
-            "flow": ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"), Need::Default("the direction of the body force of the scene"),
+            "flow": ValueKind::Choice(|| names(&AXES)), Need::Default("the direction of the body force of the scene"),
                 "The direction of the flow."
                 => "\"x\"";
-            "acceleration": ValueKind::Words("positive number"), Need::Default("that of the body force of the scene"),
+            "acceleration": ValueKind::Positive, Need::Default("that of the body force of the scene"),
                 "Force over mass in the lower half of the box."
                 => "0.05";
             then BINS;

@@ -30,10 +30,10 @@ impl Meter for Rdf {
                 gas. `g` of all particles, and `g_A_B` of each two of several species. `rdf_peak` is the highest point \
                 of `g`, by a parabola: its `height`, and the distance that it is `at`.",
         keys: keys! {
-            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("twice the range of the model, or half the box"),
+            "range": ValueKind::HalfBox, Need::Default("twice the range of the model, or half the box"),
                 "Up to which distance."
                 => "2.0";
-            "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("as many as make them 0.02 wide, or a little less"),
+            "bins": ValueKind::Whole(1, 10_000), Need::Default("as many as make them 0.02 wide, or a little less"),
                 "How many shells."
                 => "40";
         },
@@ -45,7 +45,7 @@ impl Meter for Rdf {
         let half = options.half_box();
         let preset = if fluid.cutoff() > 0.0 { half.min(2.0 * fluid.cutoff()) } else { half };
         let range = options.within_half_box("range")?.unwrap_or(preset);
-        let bins = options.bins(range, 0.02, 1)?;
+        let bins = options.bins(range, 0.02)?;
         let pairs = SpeciesPairs::new(&fluid.species);
         let series = Series::new(bins * pairs.len());
         Ok(Rdf { range, bins, dimensions: fluid.dimensions, pairs, series })

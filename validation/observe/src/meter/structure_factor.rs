@@ -39,13 +39,13 @@ impl Meter for StructureFactor {
                 choice of them, one of each ±k. The box must be periodic. `structure_factor_peak` is the highest point of \
                 `s`, by a parabola: its `height`, and the |k| that it is `at`.",
         keys: keys! {
-            "range": ValueKind::Words("positive number"), Need::Default("20, or less in a large box"),
+            "range": ValueKind::Positive, Need::Default("20, or less in a large box"),
                 "The largest |k|."
                 => "9.0";
-            "bins": ValueKind::Words("whole number from 1 to 1000"), Need::Default("as many as make shells as wide as the shortest wave vector is long, at most 100"),
+            "bins": ValueKind::Whole(1, 1000), Need::Default("as many as make shells as wide as the shortest wave vector is long, at most 100"),
                 "Shells up to the largest |k|."
                 => "10";
-            "vectors": ValueKind::Words("whole number from 1 to 10000"), Need::Default("24"),
+            "vectors": ValueKind::Whole(1, 10_000), Need::Default("24"),
                 "The most wave vectors in a shell."
                 => "6";
         },
@@ -74,9 +74,9 @@ impl Meter for StructureFactor {
                 format!("is less than {shortest}, the length of the shortest wave vector of the box");
             return Err(options.error("range", message));
         }
-        let bins = options.count("bins", 1, 1000)?;
+        let bins = options.given_count("bins")?;
         let bins = bins.unwrap_or(((range / shortest).floor() as usize).clamp(1, 100));
-        let most = options.count("vectors", 1, 10_000)?.unwrap_or(24);
+        let most = options.count("vectors")?;
         let top: [i32; 3] =
             std::array::from_fn(|k| if k < d { (range * lengths[k] / TAU).floor() as i32 } else { 0 });
         let mut shells: Vec<Vec<(f64, [i32; 3])>> = vec![Vec::new(); bins];

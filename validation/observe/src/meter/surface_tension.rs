@@ -54,10 +54,10 @@ impl Meter for SurfaceTension {
                 routes agree in equilibrium, to the error of the time step. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
         keys: keys! {
             use AXIS;
-            "interfaces": ValueKind::Words("whole number from 1 to 1000"), Need::Default("2"),
+            "interfaces": ValueKind::Whole(1, 1000), Need::Default("2"),
                 "How many interfaces are normal to the axis."
                 => "1";
-            "perturbation": ValueKind::Words("number from 1e-7 to 0.1"), Need::Default("0.0001"),
+            "perturbation": ValueKind::Within(1e-7, 0.1), Need::Default("0.0001"),
                 "ε, the relative change of the area."
                 => "5e-4";
         },
@@ -79,8 +79,8 @@ impl Meter for SurfaceTension {
         Ok(SurfaceTension {
             across: Across::at(options, axis),
             dimensions: place.fluid.dimensions,
-            interfaces: options.count("interfaces", 1, 1000)?.unwrap_or(2) as f64,
-            perturbation: options.number("perturbation", 1e-7, 0.1)?.unwrap_or(1e-4),
+            interfaces: options.count("interfaces")? as f64,
+            perturbation: options.number("perturbation")?,
             kt: 0.0,
             series: Series::new(4),
         })

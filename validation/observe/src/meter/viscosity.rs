@@ -74,7 +74,7 @@ impl Meter for Viscosity {
                 decay of C: look at the curve `stress_correlation`, with C in `correlation` and η(t) in `viscosity`. \
                 For a fluid at rest in a periodic box, without interfaces.",
         keys: keys! {
-            "length": ValueKind::Words("whole number from 2 to 100000"), Need::Default("400"),
+            "length": ValueKind::Whole(2, 100_000), Need::Default("400"),
                 "The longest time, in steps. A checkpoint holds 128 times as many numbers."
                 => "100";
         },
@@ -92,7 +92,7 @@ impl Meter for Viscosity {
         let place = options.place;
         let dimensions = place.fluid.dimensions;
         options.require_periodic()?;
-        let length = options.count("length", 2, 100_000)?.unwrap_or(400);
+        let length = options.count("length")?;
         Ok(Viscosity::new(dimensions, length, place.domain.volume(dimensions)))
     }
 

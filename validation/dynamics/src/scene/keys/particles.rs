@@ -3,18 +3,15 @@
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, form_key, key, names};
 use crate::scene::arrangement::{FLAT_LATTICES, LATTICES};
-use crate::scene::initial::KINDS;
+use crate::scene::initial::{FILLED, KINDS, SAVED};
 use crate::scene::number::AXES;
 use crate::scene::shape::{FACES, SHAPES};
+use crate::scene::velocities::Velocities;
 
 fn lattices() -> Vec<&'static str> {
     [names(&LATTICES), names(&FLAT_LATTICES)].concat()
 }
 
-/// Kinds of `[initial]` that fill a region.
-const FILLED: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder"];
-/// Kinds of `[initial]` that read a file.
-const SAVED: &[&str] = &["data", "checkpoint"];
 const ROUND: &[&str] = &["sphere", "cylinder"];
 
 pub const INITIAL: Table = Table {
@@ -51,7 +48,7 @@ pub const INITIAL: Table = Table {
             "The particles that never move, by the ids of the file. Ids of a scene with parts count from 1, \
              part by part.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nfrozen_ids = [1, 2]"),
-        key("velocities", Choice(|| vec!["thermal", "zero", "keep"]), OPTIONAL,
+        key("velocities", Choice(|| names(&Velocities::OF_FILES)), OPTIONAL,
             "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: particles at rest. \
              `keep`, for a file only: the velocities of the file. If left out, a checkpoint keeps its own \
              velocities, and everything else is thermal.",
@@ -111,7 +108,7 @@ pub const PART: Table = Table {
         of(CENTER, ROUND,
             "[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 2.0\ncenter = [3.0, 3.0, 5.0]\ndensity = 3.0"),
         of(LENGTH, &["cylinder"], "[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
-        form_key(&[], "velocities", Choice(|| vec!["thermal", "zero"]), OPTIONAL,
+        form_key(&[], "velocities", Choice(|| names(&Velocities::OF_PARTS)), OPTIONAL,
             "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: particles at rest. \
              Thermal if left out.",
             "[[part]]\nshape = \"box\"\ndensity = 3.0\nvelocities = \"zero\""),

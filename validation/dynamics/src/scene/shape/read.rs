@@ -111,9 +111,8 @@ impl Shapes<'_> {
     fn read_block(&self, section: &Section) -> Result<Shape, FileError> {
         let [mut low, mut high] = self.whole().bounds(self.dimensions);
         for (name, corner) in [("low", &mut low), ("high", &mut high)] {
-            if let Some(value) = section.get(name) {
-                corner[..self.dimensions]
-                    .copy_from_slice(&vector(&value, self.dimensions)?[..self.dimensions]);
+            if let Some(given) = section.read(name, |value| vector(value, self.dimensions))? {
+                corner[..self.dimensions].copy_from_slice(&given[..self.dimensions]);
             }
         }
         if (0..self.dimensions).any(|k| low[k] >= high[k]) {
@@ -126,10 +125,7 @@ impl Shapes<'_> {
         let axis = self.read_axis(section)?;
         let thickness = self.read_thickness(section, axis)?;
         let [mut low, mut high] = self.whole().bounds(self.dimensions);
-        let middle = match section.get("at") {
-            Some(value) => value.number()?,
-            None => 0.5 * (low[axis] + high[axis]),
-        };
+        let middle = section.read("at", Value::number)?.unwrap_or(0.5 * (low[axis] + high[axis]));
         (low[axis], high[axis]) = (middle - 0.5 * thickness, middle + 0.5 * thickness);
         Ok(Shape::Block { low, high })
     }
@@ -147,16 +143,14 @@ impl Shapes<'_> {
 
     fn read_cylinder(&self, section: &Section) -> Result<Shape, FileError> {
         let axis = self.read_axis(section)?;
-        let length = match section.get("length") {
-            Some(value) => value.positive()?,
-            None => self.domain.lengths()[axis],
-        };
+        let length = section.read("length", Value::positive)?.unwrap_or(self.domain.lengths()[axis]);
         let radius = section.require("radius")?.positive()?;
         Ok(Shape::Cylinder { axis, center: self.read_center(section)?, radius, length })
     }
 
     fn read_axis(&self, section: &Section) -> Result<usize, FileError> {
-        section.get("axis").map_or(Ok(self.dimensions - 1), |value| axis(&value, self.dimensions))
+        let axis = section.read("axis", |value| axis(value, self.dimensions))?;
+        Ok(axis.unwrap_or(self.dimensions - 1))
     }
 
     fn read_thickness(&self, section: &Section, axis: usize) -> Result<f64, FileError> {
@@ -170,12 +164,8 @@ impl Shapes<'_> {
     }
 
     fn read_center(&self, section: &Section) -> Result<[f64; 3], FileError> {
-        match section.get("center") {
-            Some(value) => vector(&value, self.dimensions),
-            None => {
-                let [low, high] = self.whole().bounds(self.dimensions);
-                Ok(std::array::from_fn(|k| 0.5 * (low[k] + high[k])))
-            }
-        }
+        let [low, high] = self.whole().bounds(self.dimensions);
+        let center = section.read("center", |value| vector(value, self.dimensions))?;
+        Ok(center.unwrap_or_else(|| std::array::from_fn(|k| 0.5 * (low[k] + high[k]))))
     }
 }
