@@ -1,7 +1,7 @@
 //! Experiments: runs that are compared with another code, a paper, theory or each other.
 //!
 //! An experiment has a fluid ([`fluids`], or a model file), a start ([`start`], or that of a scene), a code ([`code`], with its
-//! precision, threads and ranks) and steps. It gives observations: those of a scene ([`bulk`]), of dumps and tables of LAMMPS
+//! precision, threads and ranks) and steps. It gives observations: those of a scene ([`run`]), of dumps and tables of LAMMPS
 //! ([`lammps`]), or the times of a loop. A verdict holds them to a bound ([`Check`](psidpd_report::Check)) or to a published value
 //! ([`papers::Compared`]). A family of experiments has its own list of cases and its own page.
 
@@ -24,6 +24,7 @@ pub mod mixture;
 mod models;
 pub mod papers;
 pub mod pareto;
+pub mod run;
 mod seek;
 mod slabs;
 pub mod start;

@@ -1,10 +1,10 @@
 //! Boxes with slabs and films that are run to measure tensions, and ridges. Lengths are in ranges of the forces, times in thermal units
 //! r √(m/kT).
 
-use crate::bulk::Observed;
+use crate::run::Observed;
 use crate::seek::rounded;
 use crate::steps::FIRST;
-use crate::{ExperimentError, Trouble, bulk, steps};
+use crate::{ExperimentError, Trouble, run, steps};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
@@ -139,7 +139,7 @@ pub fn run(runs: &[Run], folder: &Path) -> Result<Vec<Observed>, Trouble> {
         let text = run.setting.text(&model.display().to_string(), &run.units, run.seed) + OUTPUT;
         Ok(Scene::parse(&run.setting.title, &text, Path::new(""))?)
     };
-    Ok(bulk::side_by_side(runs.iter().map(scene).collect::<Result<_, _>>()?, folder)?)
+    Ok(run::side_by_side(runs.iter().map(scene).collect::<Result<_, _>>()?, folder)?)
 }
 
 /// The seeds of the runs of a result, none of which a search or another round has.

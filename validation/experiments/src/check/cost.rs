@@ -48,7 +48,7 @@ pub(super) fn by_trial(
             threads: NonZeroUsize::MIN,
         };
         let densities = scene.densities();
-        let bulk = Bulk { model: &scene.model, kt: scene.kt, densities: &densities, observe: "", sampling };
+        let bulk = Bulk { model: &scene.model, kt: scene.kt, densities: &densities, edits: &[], sampling };
         let mut small = bulk.scene(&scene.model_path)?;
         small.precision = scene.precision;
         trial(&small)? / SAMPLE as f64 * particles as f64

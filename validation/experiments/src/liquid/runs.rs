@@ -3,7 +3,7 @@
 use super::fluid::{Drag, Strengths, USUAL, text};
 use super::instrument::{Care, Equilibrium, Flow, Instrument};
 use super::sheet::Liquid;
-use crate::bulk::{self, Observed};
+use crate::run::{self, Observed};
 use crate::steps::{self, ADVISED, FIRST};
 use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
@@ -120,7 +120,7 @@ impl Runs<'_> {
 
     /// Runs scenes side by side; the last is the longest.
     fn run(&self, settings: &[Setting], care: Care) -> Result<Vec<Observed>, Trouble> {
-        let all = bulk::side_by_side(self.scenes(settings, care)?, self.folder)?;
+        let all = run::side_by_side(self.scenes(settings, care)?, self.folder)?;
         match all.iter().flat_map(|o| &o.0).find(|o| o.note.contains("are a crystal")) {
             Some(crystal) => Err(Trouble::Frozen(crystal.note.clone())),
             None => Ok(all),

@@ -2,7 +2,7 @@
 
 use super::merge::{self, Liquid};
 use super::{Instrument, Layers, Slab, Sought};
-use crate::bulk::Observed;
+use crate::run::Observed;
 use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, mean, nearest, part, seeds_of_result, slab};
 use crate::{ExperimentError, Trouble, slabs};
 use psidpd_core::model::Model;

@@ -3,7 +3,7 @@
 use super::scene::{HEIGHT, wall};
 use super::search::attracts;
 use super::{Film, Instrument, Slab, Sought, conditions};
-use crate::bulk::Observed;
+use crate::run::Observed;
 use crate::slabs::{FILM, Run, Setting, Units, mean, nearest, seeds_of_result};
 use crate::{ExperimentError, Trouble, slabs};
 use psidpd_observe::Measured;
