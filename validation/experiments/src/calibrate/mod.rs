@@ -24,7 +24,7 @@ pub use search::{Batch, DUMMY_SLOPE, Failed, Goal, Round, Trial, Wish, search};
 pub use text::with_correction;
 
 use crate::ExperimentError;
-use crate::bulk::{Bulk, Sampling};
+use crate::run::bulk::{Bulk, Sampling};
 use crate::run::{self, Observed};
 use psidpd_core::model::{Model, Polynomial};
 use psidpd_core::theory::MeanField;

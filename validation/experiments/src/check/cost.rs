@@ -1,6 +1,6 @@
 //! What a scene will take on this machine, from a short trial of it.
 
-use crate::bulk::{Bulk, Sampling};
+use crate::run::bulk::{Bulk, Sampling};
 use psidpd_dynamics::run::{Begin, RunError, Runner, bytes};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::temporary_folder;

@@ -1,7 +1,7 @@
 use crate::ExperimentError;
-use crate::bulk::{Bulk, Sampling};
 use crate::machine::{BUILD, VERSION};
 use crate::papers::case::{Reproduction, curve};
+use crate::run::bulk::{Bulk, Sampling};
 use crate::run::{self, Observed};
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;

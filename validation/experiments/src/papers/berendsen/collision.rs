@@ -78,7 +78,6 @@ pub fn size(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     let changes = [
         &format!("box={edges:?}"),
         "dt=0.02",
-        "equilibrate=0",
         "steps=20",
         "initial.density=10.0",
         "initial.species=D",

@@ -1,10 +1,10 @@
 //! Sections 11.2 and 11.3: standard DPD, its pressure and compressibility; Lowe's thermostat beside drag and noise.
 
 use crate::ExperimentError;
-use crate::models::STANDARD;
 use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid};
 use crate::run::Observed;
+use crate::shipped::STANDARD;
 
 /// a r_c⁴ of the model.
 const A: f64 = 25.0;

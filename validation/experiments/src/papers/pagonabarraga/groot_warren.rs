@@ -2,10 +2,10 @@
 
 use super::QUADRATIC;
 use crate::ExperimentError;
-use crate::models::{LINEAR, STANDARD};
 use crate::papers::case::{Reproduction, bare, curve, line, points};
 use crate::papers::context::{Context, Fluid, mean_field, with_parameters};
 use crate::run::Observed;
+use crate::shipped::{LINEAR, STANDARD};
 use psidpd_observe::Measured;
 use std::f64::consts::PI;
 

@@ -3,10 +3,10 @@
 use super::{DEMIXING, fluid};
 use crate::ExperimentError;
 use crate::calibrate::Point;
-use crate::models::HUGGINS;
 use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
 use crate::papers::context::{Context, Fluid, mean_field, with_parameters};
 use crate::run::Observed;
+use crate::shipped::HUGGINS;
 use psidpd_observe::Measured;
 
 pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {

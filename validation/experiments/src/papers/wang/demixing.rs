@@ -2,9 +2,9 @@
 
 use super::{STRONG, WEAK};
 use crate::ExperimentError;
-use crate::models::SPLINE;
 use crate::papers::case::{Reproduction, bare, curve};
 use crate::papers::context::{Context, edited};
+use crate::shipped::SPLINE;
 use psidpd_core::model::Model;
 use psidpd_core::theory::thermodynamic_limit;
 use psidpd_observe::Measured;

@@ -3,9 +3,9 @@
 use super::ALPHA;
 use crate::ExperimentError;
 use crate::fluids::{A, SET5, SET6};
-use crate::models::STANDARD;
 use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid, edited, with_parameters};
+use crate::shipped::STANDARD;
 use psidpd_observe::Measured;
 
 /// Set 6 with other A, B r_d⁴ and r_d.

@@ -2,9 +2,11 @@
 
 use super::merge::{self, Liquid};
 use super::{Instrument, Layers, Slab, Sought};
+use crate::model::slabs::{
+    self, ALONG, FILM, Run, SETTLE, Setting, Units, mean, nearest, part, seeds_of_result, slab,
+};
 use crate::run::Observed;
-use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, mean, nearest, part, seeds_of_result, slab};
-use crate::{ExperimentError, Trouble, slabs};
+use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
 use psidpd_formats::files::{Existing, write_bytes};
 use psidpd_observe::Measured;

@@ -3,8 +3,8 @@
 
 use super::Found;
 use super::ridge::ridge;
-use crate::seek::rounded;
-use crate::slabs::{ALONG, FILM, SETTLE, Setting, Units, part, shown, slab};
+use crate::model::seek::rounded;
+use crate::model::slabs::{ALONG, FILM, SETTLE, Setting, Units, part, shown, slab};
 use std::fmt::Write;
 
 /// The height of the box of a film, in which the vapour has at least as much as the film.

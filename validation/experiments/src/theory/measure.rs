@@ -1,6 +1,6 @@
 //! A fluid measured in short runs, to be put beside its theory.
 
-use crate::bulk::{Bulk, Sampling};
+use crate::run::bulk::{Bulk, Sampling};
 use crate::run::{self, SLAB, set};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, run_scene};

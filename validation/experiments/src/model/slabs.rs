@@ -1,10 +1,10 @@
 //! Boxes with slabs and films that are run to measure tensions, and ridges. Lengths are in ranges of the forces, times in thermal units
 //! r √(m/kT).
 
+use crate::model::seek::rounded;
+use crate::model::steps::{self, FIRST};
 use crate::run::Observed;
-use crate::seek::rounded;
-use crate::steps::FIRST;
-use crate::{ExperimentError, Trouble, run, steps};
+use crate::{ExperimentError, Trouble, run};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;

@@ -3,8 +3,8 @@
 use super::fluid::{Drag, Strengths, USUAL, text};
 use super::instrument::{Care, Equilibrium, Flow, Instrument};
 use super::sheet::Liquid;
+use crate::model::steps::{self, ADVISED, FIRST};
 use crate::run::{self, Observed};
-use crate::steps::{self, ADVISED, FIRST};
 use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::RunError;

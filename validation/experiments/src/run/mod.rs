@@ -1,5 +1,7 @@
 //! A run: a scene in a folder, and what it observed.
 
+pub mod bulk;
+
 use crate::jobs;
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{Begin, RunError, Runner, Start, run_scene};
