@@ -41,8 +41,8 @@ impl<'a> Runs<'a> {
 
     /// Runs settings of the liquid side by side, each from its seed.
     fn run(&self, settings: Vec<(Setting, u64)>) -> Result<Vec<Observed>, Trouble> {
-        let of =
-            |(setting, seed)| Run { setting, model: self.sought.model_file.clone(), units: self.units, seed };
+        let (model, kt) = (&self.sought.model_file, self.sought.kt);
+        let of = |(setting, seed)| Run { setting, model: model.clone(), kt, seed };
         slabs::run(&settings.into_iter().map(of).collect::<Vec<_>>(), self.folder)
     }
 

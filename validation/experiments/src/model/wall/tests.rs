@@ -235,7 +235,7 @@ fn scenes_have_the_wall() {
     std::fs::write(folder.path().join("m.toml"), long).unwrap();
     let units = Units { kt: 0.7, range: 2.0, density: 0.75, dt: 0.1 };
     let parsed = |setting: &Setting| {
-        let text = setting.text("m.toml", &units, 5);
+        let text = setting.text("m.toml", units.kt, 5);
         Scene::parse("s.toml", &text, folder.path()).unwrap_or_else(|error| panic!("{error:?}\n{text}"))
     };
     for strength in [0.8, 1.234] {
