@@ -84,7 +84,7 @@ pub enum ExperimentError {
     )]
     OtherGrid { path: PathBuf, row: String },
     #[error(transparent)]
-    Liquid(#[from] crate::liquid::LiquidError),
+    Liquid(#[from] crate::model::liquid::LiquidError),
     #[error("{given} densities for {species} species")]
     Densities { given: usize, species: usize },
 }

@@ -2,7 +2,7 @@
 
 use crate::ExperimentError;
 use crate::lammps::style::PairStyle;
-use crate::models;
+use crate::shipped;
 use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab};
 
 /// A fluid with everything the codes need to be told.
@@ -28,7 +28,7 @@ pub const SIZES: [usize; 3] = [6_050, 48_400, 387_200];
 pub const MDPD: Subject = Subject {
     name: "mdpd",
     title: "MDPD: Warren's set 6",
-    text: models::SET6,
+    text: shipped::SET6,
     species: &["F"],
     density: MDPD_DENSITY,
     dt: 0.01,
@@ -37,7 +37,7 @@ pub const MDPD: Subject = Subject {
 pub const DPD: Subject = Subject {
     name: "dpd",
     title: "DPD: the standard soft fluid",
-    text: models::STANDARD,
+    text: shipped::STANDARD,
     species: &["W"],
     density: 3.0,
     dt: 0.04,
@@ -109,7 +109,7 @@ pub const SET5: WarrenSet = WarrenSet {
     fluid: Subject {
         name: "set 5",
         title: "MDPD: Warren's set 5",
-        text: models::SET5,
+        text: shipped::SET5,
         density: 5.08,
         ..MDPD
     },

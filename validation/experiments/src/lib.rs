@@ -1,12 +1,12 @@
 //! Experiments: runs that are compared with another code, a paper, theory or each other.
 //!
 //! An experiment has a fluid ([`fluids`], or a model file), a start ([`start`], or that of a scene), a code ([`code`], with its
-//! precision, threads and ranks) and steps. It gives observations: those of a scene ([`bulk`]), of dumps and tables of LAMMPS
+//! precision, threads and ranks) and steps. It gives observations: those of a scene ([`run`]), of dumps and tables of LAMMPS
 //! ([`lammps`]), or the times of a loop. A verdict holds them to a bound ([`Check`](psidpd_report::Check)) or to a published value
-//! ([`papers::Compared`]). A family of experiments has its own list of cases and its own page.
+//! ([`papers::Compared`]). A family of experiments has its own list of cases and its own page, in the module of its verb:
+//! `psidpd validate` is [`crosscheck`], `psidpd reproduce` is [`papers`], and the others have their names.
 
 pub mod bench;
-pub mod bulk;
 pub mod calibrate;
 pub mod check;
 pub mod code;
@@ -17,20 +17,15 @@ pub mod fluids;
 pub mod hardcases;
 mod jobs;
 pub mod lammps;
-pub mod liquid;
 mod machine;
-pub mod measure;
-pub mod mixture;
-mod models;
+pub mod model;
 pub mod papers;
 pub mod pareto;
-mod seek;
-mod slabs;
+pub mod run;
+mod shipped;
 pub mod start;
-mod steps;
 pub mod sweep;
-pub mod theory_page;
-pub mod wall;
+pub mod theory;
 
 pub use error::{ExperimentError, Trouble};
 

@@ -2,6 +2,7 @@
 
 use crate::ExperimentError;
 use crate::fluids::Subject;
+use crate::machine::VERSION;
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Precision, Settings, Want};
 use psidpd_core::model::Model;
@@ -107,8 +108,7 @@ const STEPS: u64 = 300;
 /// A full cube of the fluid in equilibrium: made once, then from `folder`.
 pub fn kept(subject: &Subject, size: usize, folder: &Path) -> Result<Start, ExperimentError> {
     work_folder(folder)?;
-    // The state depends on model, seed and length of the run.
-    let key = crc32fast::hash(format!("{} {SEED} {STEPS}", subject.text).as_bytes());
+    let key = crc32fast::hash(format!("{subject:?} {SEED} {STEPS} {VERSION}").as_bytes());
     let file = |end: &str| folder.join(format!("{}-{size}-{key:08x}.{end}", subject.name));
     let (kept, data, data_mdpd) = (file("state"), file("data"), file("mdpd.data"));
     let found = read_inside(&kept).ok().and_then(|bytes| postcard::from_bytes::<State>(&bytes).ok());
@@ -137,6 +137,16 @@ mod tests {
         let again = kept(&DPD, 400, folder.path()).unwrap();
         assert_eq!(made.state, again.state);
         assert_eq!(made.state.len(), DPD.particles(400));
+        // Another fluid of this name has a state of its own, and half of one counts for nothing.
+        let denser = Subject { density: 4.0, ..DPD };
+        assert_eq!(kept(&denser, 400, folder.path()).unwrap().state.len(), denser.particles(400));
+        let half = |path: &Path| {
+            let bytes = std::fs::read(path).unwrap();
+            std::fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+        };
+        let states = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+        states.filter(|path| path.extension().is_some_and(|end| end == "state")).for_each(|path| half(&path));
+        assert_eq!(kept(&DPD, 400, folder.path()).unwrap().state, made.state);
         assert!(matches!(kept(&DPD, 20, folder.path()), Err(ExperimentError::TooSmall(20))));
     }
 }

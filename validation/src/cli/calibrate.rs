@@ -1,7 +1,7 @@
 use super::run::{at_least, between, threads_at_once};
 use super::*;
-use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::calibrate::{Options, calibrate, shown, spaced};
+use psidpd_experiments::run::bulk::Sampling;
 
 /// Find the corrected density with which a model has its target pressure.
 ///

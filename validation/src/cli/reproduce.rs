@@ -40,16 +40,10 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     let size = if arguments.full { Size::Full } else { Size::Quick };
     let mut results = Vec::new();
     let mut good = true;
-    let made = std::rc::Rc::default();
     for case in &chosen {
         say!("{}: {}", case.id, case.what);
         let folder = arguments.out.join(if arguments.full { "full" } else { "quick" }).join(&case.id);
-        let context = Context {
-            size,
-            folder: folder.clone(),
-            threads: arguments.threads,
-            made: std::rc::Rc::clone(&made),
-        };
+        let context = Context { size, folder: folder.clone(), threads: arguments.threads };
         let begun = std::time::Instant::now();
         let result = match case.run(&context) {
             Ok(outcome) => {

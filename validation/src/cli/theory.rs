@@ -3,8 +3,8 @@ use super::run::at_least;
 use super::*;
 use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point};
 use psidpd_dynamics::prediction::{Prediction, predict, published};
-use psidpd_experiments::measure::{self, Effort};
-use psidpd_experiments::theory_page::{self, Scope};
+use psidpd_experiments::theory::measure::{self, Effort};
+use psidpd_experiments::theory::page::{self, Scope};
 use psidpd_report::Headline;
 use psidpd_report::quantity::{decimal, number, with_error};
 use serde_json::Value;
@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         defined &= good;
     }
     if let Some(path) = &arguments.report {
-        let page = theory_page::page(&model, &scope)?.render();
+        let page = page::page(&model, &scope)?.render();
         write_bytes(path, told.existing, page.as_bytes())?;
         say!("report: {}", path.display());
     }

@@ -24,10 +24,12 @@ pub use search::{Batch, DUMMY_SLOPE, Failed, Goal, Round, Trial, Wish, search};
 pub use text::with_correction;
 
 use crate::ExperimentError;
-use crate::bulk::{Bulk, Observed, Sampling};
+use crate::run::bulk::{Bulk, Sampling};
+use crate::run::{self, Observed};
 use psidpd_core::model::{Model, Polynomial};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
+use psidpd_dynamics::scene::Edit;
 use psidpd_formats::files::temporary_folder;
 use psidpd_observe::Measured;
 use serde::Serialize;
@@ -104,7 +106,9 @@ pub fn calibrate(
     told: &mut dyn FnMut(&str),
 ) -> Result<Calibration, ExperimentError> {
     let folder = temporary_folder()?;
-    calibrate_by(&|bulk| bulk.run(path, &folder.path().join("run")), path, options, command, told)
+    let measure =
+        |bulk: &Bulk| run::anew(&bulk.scene(path)?, &folder.path().join("run"), options.sampling.threads);
+    calibrate_by(&measure, path, options, command, told)
 }
 
 /// Calibrates a model, with the fluid measured by `run`.
@@ -263,11 +267,12 @@ impl<'a> Bench<'a> {
     fn measure(&self, trial: Trial, told: &mut dyn FnMut(&str)) -> Result<Batch, ExperimentError> {
         let mut batch = Batch::default();
         let Options { kt, sampling, .. } = *self.options;
-        let observe = format!("local_density = {{ density = \"{}\", bins = 1000 }}", self.density);
+        let local = format!("{{ density = \"{}\", bins = 1000 }}", self.density);
+        let edits = &[Edit::new("observe.local_density", local)];
         for (k, total) in self.options.densities.iter().enumerate() {
             let rho = self.per_species(*total);
             let model = self.model(&trial, &rho)?;
-            let bulk = Bulk { model: &model, kt, densities: &rho, observe: &observe, sampling };
+            let bulk = Bulk { model: &model, kt, densities: &rho, edits, sampling };
             match (self.run)(&bulk) {
                 Ok(observed) => {
                     batch.points.push(Point::of(&observed, self.species, &rho));

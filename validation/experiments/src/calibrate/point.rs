@@ -1,4 +1,4 @@
-use crate::bulk::Observed;
+use crate::run::Observed;
 use psidpd_core::model::Polynomial;
 use psidpd_observe::Measured;
 

@@ -2,7 +2,7 @@ mod known_fluids;
 
 use super::search::HIGHEST_DEGREE;
 use super::*;
-use crate::bulk::Observed;
+use crate::run::Observed;
 use psidpd_observe::{Kind, Measured, Observation, Series};
 use std::convert::Infallible;
 

@@ -1,6 +1,6 @@
 //! What a scene will take on this machine, from a short trial of it.
 
-use crate::bulk::{Bulk, Sampling};
+use crate::run::bulk::{Bulk, Sampling};
 use psidpd_dynamics::run::{Begin, RunError, Runner, bytes};
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::temporary_folder;
@@ -48,7 +48,7 @@ pub(super) fn by_trial(
             threads: NonZeroUsize::MIN,
         };
         let densities = scene.densities();
-        let bulk = Bulk { model: &scene.model, kt: scene.kt, densities: &densities, observe: "", sampling };
+        let bulk = Bulk { model: &scene.model, kt: scene.kt, densities: &densities, edits: &[], sampling };
         let mut small = bulk.scene(&scene.model_path)?;
         small.precision = scene.precision;
         trial(&small)? / SAMPLE as f64 * particles as f64

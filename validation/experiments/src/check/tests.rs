@@ -50,7 +50,7 @@ fn warnings_at_other_densities_are_told_once() {
 #[test]
 fn a_scene_costs_what_its_steps_do() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), crate::models::STANDARD).unwrap();
+    std::fs::write(folder.path().join("m.toml"), crate::shipped::STANDARD).unwrap();
     let of = |edge: f64| {
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = {edge}\ndensity = 3.0\nequilibrate = 7\nsteps = 13\ndt = 0.02\n\

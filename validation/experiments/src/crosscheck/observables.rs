@@ -7,7 +7,7 @@ use crate::files;
 use crate::fluids::DPD_PAIR;
 use crate::lammps::deck::Deck;
 use crate::lammps::frames;
-use crate::models;
+use crate::shipped;
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::files::{Existing, work_folder, write_bytes};
@@ -67,7 +67,7 @@ pub fn run(context: &Context) -> Result<Part, ExperimentError> {
 
 fn scene(folder: &Path) -> Result<Scene, ExperimentError> {
     let model = folder.join("model.toml");
-    write_bytes(&model, Existing::Keep, models::STANDARD.as_bytes())?;
+    write_bytes(&model, Existing::Keep, shipped::STANDARD.as_bytes())?;
     let text = format!(
         "title = \"distances and displacements\"\nmodel = \"model.toml\"\nkT = 1.0\nseed = {SEED}\nbox = [5.0, 6.0, 7.0]\n\
          density = 3.0\ndt = {DT}\nsteps = {steps}\n[observe]\nevery = {EVERY}\n\

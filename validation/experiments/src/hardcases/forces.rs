@@ -1,7 +1,7 @@
 //! Forces of configurations in which digits are lost, against the reference.
 
 use super::case::{Case, Inputs, Must, data};
-use crate::models::{SET6, STANDARD};
+use crate::shipped::{SET6, STANDARD};
 
 pub fn cases() -> Vec<Case> {
     let scene = "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"zero\"\n";

@@ -15,7 +15,7 @@ use crate::ExperimentError;
 use crate::code::Host;
 use crate::jobs;
 use crate::lammps::host::PluginHost;
-use crate::models::SET6;
+use crate::shipped::SET6;
 use case::{Case, Inputs, Must, cube};
 use psidpd_core::engine::Precision;
 use psidpd_dynamics::integrator::Integrator;

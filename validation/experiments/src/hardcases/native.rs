@@ -2,7 +2,7 @@
 
 use super::case::{Case, Found, Inputs, Must};
 use crate::ExperimentError;
-use crate::bulk::Observed;
+use crate::run::Observed;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_core::truth;

@@ -2,7 +2,7 @@
 
 use super::case::Must::RightOrSaid;
 use super::case::{Case, Inputs, cube};
-use crate::models::{LINEAR, SET6, VAN_DER_WAALS};
+use crate::shipped::{LINEAR, SET6, VAN_DER_WAALS};
 
 pub fn cases() -> Vec<Case> {
     let case = Case::new;

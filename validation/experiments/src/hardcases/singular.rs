@@ -2,7 +2,7 @@
 
 use super::case::Must::{Counted, RightOrSaid, Stops};
 use super::case::{Case, Inputs, cube};
-use crate::models::{HUGGINS, VAN_DER_WAALS};
+use crate::shipped::{HUGGINS, VAN_DER_WAALS};
 
 /// A fluid with a logarithm of its density and a quotient; `bounds` as in a model file.
 fn logarithm(bounds: &str) -> String {

@@ -2,7 +2,7 @@
 
 use super::case::Must::{Refused, Right, RightOrSaid};
 use super::case::{Case, Inputs, cube, data};
-use crate::models::{SET6, STANDARD};
+use crate::shipped::{SET6, STANDARD};
 
 pub fn cases() -> Vec<Case> {
     let set6 = |scene: &str| Inputs::new(SET6, 1.0, scene, 0.005, [200, 400]);

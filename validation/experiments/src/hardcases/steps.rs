@@ -1,7 +1,7 @@
 //! Steps that are long for the forces, the drag or the masses.
 
 use super::case::{Case, Inputs, Must, cube};
-use crate::models::{SET6, SPLINE};
+use crate::shipped::{SET6, SPLINE};
 
 /// A gas that has a thermostat alone.
 const IDEAL: &str = "title = \"ideal gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";

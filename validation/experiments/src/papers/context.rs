@@ -1,24 +1,22 @@
 use crate::ExperimentError;
-use crate::bulk::{self, Bulk, Observed, Sampling};
+use crate::machine::{BUILD, VERSION};
 use crate::papers::case::{Reproduction, curve};
+use crate::run::bulk::{Bulk, Sampling};
+use crate::run::{self, Observed};
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
-use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_observe::Measured;
 use psidpd_report::run::SeriesTable;
-use std::cell::RefCell;
-use std::collections::HashSet;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
-use std::rc::Rc;
+use std::path::PathBuf;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Size {
     /// Half an hour for all cases.
     Quick,
-    /// Boxes and times of the papers. Runs that were interrupted go on.
+    /// Boxes and times of the papers.
     Full,
 }
 
@@ -27,8 +25,6 @@ pub struct Context {
     pub size: Size,
     pub folder: PathBuf,
     pub threads: NonZeroUsize,
-    /// Folders of runs that were made in this call, which figures of the same runs share.
-    pub made: Rc<RefCell<HashSet<PathBuf>>>,
 }
 
 /// A homogeneous fluid of one species that a case measures.
@@ -38,14 +34,14 @@ pub struct Fluid<'a> {
     pub dt: f64,
     /// Edge of the box, at full size.
     pub edge: f64,
-    /// Observables beside temperature and pressure.
-    pub observe: &'a str,
+    /// Other values of keys of its scene, each as KEY=VALUE, with what is observed beside temperature and pressure.
+    pub changes: &'a [&'a str],
 }
 
 impl Fluid<'_> {
     /// A fluid at kT = 1, with the step and the box of most papers.
     pub fn of(model: &str) -> Fluid<'_> {
-        Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" }
+        Fluid { model, kt: 1.0, dt: 0.01, edge: 10.0, changes: &[] }
     }
 }
 
@@ -57,9 +53,10 @@ impl Context {
         }
     }
 
-    fn begin(&self, run: &Path) -> Begin {
-        let fresh = self.made.borrow_mut().insert(run.to_owned());
-        if fresh { self.pick(Begin::Overwrite, Begin::Resume) } else { Begin::Resume }
+    /// Runs a scene, or reads a run of it that is there. At full size that of another build of this version counts.
+    fn run(&self, name: &str, scene: &Scene) -> Result<Observed, ExperimentError> {
+        let program = self.pick(&**BUILD, VERSION);
+        Ok(run::once(scene, &self.folder.join(name), program, self.threads)?)
     }
 
     fn write(&self, name: &str, model: &str) -> Result<PathBuf, ExperimentError> {
@@ -84,9 +81,8 @@ impl Context {
             seed: 1,
             threads: self.threads,
         };
-        let bulk = Bulk { model: &model, kt: fluid.kt, densities, observe: fluid.observe, sampling };
-        let folder = self.folder.join(name);
-        Ok(bulk::run(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads)?)
+        let bulk = Bulk { model: &model, kt: fluid.kt, densities, edits: &edits(fluid.changes)?, sampling };
+        self.run(name, &bulk.scene(&path)?)
     }
 
     /// Pressures of a fluid of one species at several densities, which end the names of the runs.
@@ -100,17 +96,19 @@ impl Context {
         densities.iter().map(at).collect()
     }
 
-    /// Runs a scene with a model; the text may name another.
-    pub fn scene(&self, name: &str, model: &str, scene: &str) -> Result<Observed, ExperimentError> {
+    /// Runs a scene with a model and other values of its keys, each as KEY=VALUE.
+    pub fn scene(
+        &self,
+        name: &str,
+        model: &str,
+        scene: &str,
+        changes: &[&str],
+    ) -> Result<Observed, ExperimentError> {
         let path = self.write(name, model)?;
-        let text = edited(scene, &[format!("model=\"{name}.model.toml\"")])?;
-        let scene =
-            Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
-        let folder = self.folder.join(name);
-        Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads)?)
+        self.run(name, &run::scene(scene, (&Model::open(&path)?, &path), &edits(changes)?)?)
     }
 
-    /// Runs a scene of `scenes/full`, as it is at full size and with `changes`, each as KEY=VALUE, at quick size.
+    /// Runs a scene of `scenes/full`, as it is at full size and with `changes` at quick size.
     pub fn shipped(
         &self,
         name: &str,
@@ -118,7 +116,7 @@ impl Context {
         scene: &str,
         changes: &[&str],
     ) -> Result<Observed, ExperimentError> {
-        self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
+        self.scene(name, model, scene, self.pick(changes, &[]))
     }
 
     /// This context in a folder that several cases share: their runs are made once.
@@ -149,10 +147,13 @@ impl Context {
     }
 }
 
+fn edits(changes: &[&str]) -> Result<Vec<Edit>, ExperimentError> {
+    changes.iter().map(|change| change.parse().map_err(ExperimentError::Conditions)).collect()
+}
+
 /// A scene or model with other values of its keys, as `--set` has them.
-pub fn edited(text: &str, changes: &[impl AsRef<str>]) -> Result<String, ExperimentError> {
-    let edits: Result<Vec<Edit>, String> = changes.iter().map(|change| change.as_ref().parse()).collect();
-    Ok(edit_model(text, &edits.map_err(ExperimentError::Conditions)?)?)
+pub fn edited(text: &str, changes: &[&str]) -> Result<String, ExperimentError> {
+    Ok(edit_model(text, &edits(changes)?)?)
 }
 
 pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
@@ -160,8 +161,8 @@ pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, ExperimentError> {
 }
 
 pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, ExperimentError> {
-    let change = |(name, value): &(&str, f64)| format!("parameters.{name}={value:?}");
-    edited(model, &parameters.iter().map(change).collect::<Vec<String>>())
+    let edit = |(name, value): &(&str, f64)| Edit::new(&format!("parameters.{name}"), format!("{value:?}"));
+    Ok(edit_model(model, &parameters.iter().map(edit).collect::<Vec<Edit>>())?)
 }
 
 #[cfg(test)]
@@ -175,7 +176,7 @@ mod tests {
         let expected = "model = \"m.toml\"\nsteps = 10\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 30\n[output]\nthermo = 0\n";
         assert_eq!(text, expected);
         assert!(edited(scene, &["stage.3.steps=1"]).is_err());
-        assert_eq!(edited(scene, &[] as &[&str]).unwrap(), scene);
+        assert_eq!(edited(scene, &[]).unwrap(), scene);
         // The model of a case replaces that of its scene, and is added where there is none.
         let model = "model = \"n.toml\"\n";
         for (scene, expected) in [(scene, scene.replace("m.toml", "n.toml")), ("", model.to_owned())] {

@@ -71,12 +71,8 @@ mod tests {
     fn failing(id: &str, fault: Option<Fault>) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
         let case = super::cases().into_iter().find(|case| case.id == id).unwrap();
-        let context = Context {
-            size: Size::Quick,
-            folder: folder.path().join(id),
-            threads: NonZeroUsize::MIN,
-            made: Default::default(),
-        };
+        let folder = folder.path().join(id);
+        let context = Context { size: Size::Quick, folder, threads: NonZeroUsize::MIN };
         let outcome = Fault::during(fault, || case.run(&context)).unwrap();
         outcome.values.iter().filter(|value| !value.passes()).map(|value| value.name.clone()).collect()
     }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::models::{SET6, STANDARD};
+use crate::shipped::{SET6, STANDARD};
 use std::path::Path;
 
 /// A scene of a model from the seed 3.

@@ -1,5 +1,5 @@
 use super::*;
-use psidpd_experiments::liquid::{ENTRIES, Entries, Found, Liquid, LiquidError, Row, model};
+use psidpd_experiments::model::liquid::{ENTRIES, Entries, Found, Liquid, LiquidError, Row, model};
 
 #[derive(Debug, clap::Args)]
 pub struct OfLiquid {

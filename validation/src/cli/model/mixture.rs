@@ -1,5 +1,5 @@
 use super::*;
-use psidpd_experiments::mixture::{self, Found, Liquid, Sought, TOLERANCE};
+use psidpd_experiments::model::mixture::{self, Found, Liquid, Sought, TOLERANCE};
 use psidpd_observe::Measured;
 
 #[derive(Debug, clap::Args)]

@@ -1,5 +1,5 @@
 use super::*;
-use psidpd_experiments::wall::{Found, Sought, TOLERANCE, wall};
+use psidpd_experiments::model::wall::{Found, Sought, TOLERANCE, wall};
 use psidpd_observe::Measured;
 
 #[derive(Debug, clap::Args)]

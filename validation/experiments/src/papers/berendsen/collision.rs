@@ -5,22 +5,22 @@ use crate::ExperimentError;
 use crate::machine::peak_kilobytes;
 use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::{Context, edited};
+use crate::run::HOMOGENEOUS;
+use psidpd_formats::files::remove_work;
 
 const SMALL: &str = include_str!("../../../../scenes/drop-collision.toml");
 const FULL: &str = include_str!("../../../../scenes/full/drop-collision.toml");
+const LAYERS: &str = include_str!("../../../../scenes/full/immiscible-layers.toml");
 
 pub fn tension(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let [edge, height] = context.pick([6.0, 12.0], [10.0, 20.0]);
-    let scene = format!(
-        "kT = 1.0\nseed = 1\nbox = [{edge:?}, {edge:?}, {height:?}]\ndensity = 10.0\ndt = 0.01\nequilibrate = {}\nsteps = {}\n\
-         [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = {half:?}\nspecies = \"D\"\n\
-         [[part]]\nshape = \"layer\"\nface = \"zhi\"\nthickness = {half:?}\nspecies = \"M\"\n\
-         [output]\nthermo = 0\n[observe]\nevery = 10\ntemperature = true\ncomposition_profile = {{ recentre = false }}\nsurface_tension = {{ axis = \"z\" }}\n",
-        context.pick(1500, 10_000),
-        context.pick(6000, 100_000),
-        half = 0.5 * height,
-    );
-    let observed = context.scene("layers", IMMISCIBLE, &scene)?;
+    let changes = [
+        "box=[6.0, 6.0, 12.0]",
+        "part.1.thickness=6.0",
+        "part.2.thickness=6.0",
+        "equilibrate=1500",
+        "steps=6000",
+    ];
+    let observed = context.shipped("layers", IMMISCIBLE, LAYERS, &changes)?;
     // Printed without a digit after the point.
     outcome.equal("tension by the stress", observed.scalar("surface_tension", "stress"), [28.0, 0.5]);
     outcome.equal(
@@ -52,7 +52,7 @@ pub fn merge(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
     for weber in [WEBER, 4.0 * WEBER] {
         let v = speed(weber, radius);
         let set = |k: usize, v: f64| format!("part.{k}.velocity=[0.0, 0.0, {v:?}]");
-        let scene = edited(context.pick(SMALL, FULL), &[set(1, v), set(2, -v)])?;
+        let scene = edited(context.pick(SMALL, FULL), &[&set(1, v), &set(2, -v)])?;
         // Drops that touch merge within 2 units of time; these have 20.
         let observed = context.shipped(&format!("collision-{weber}"), IMMISCIBLE, &scene, &["steps=1000"])?;
         let largest = observed.profile("clusters_series", "largest");
@@ -71,14 +71,22 @@ pub fn merge(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
 }
 
 pub fn size(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
-    let smaller = format!("box={:?}", [60.0, 60.0, 104.1667].map(|l| l / 100_f64.cbrt()));
-    // A few steps of the scene, with nothing observed; at quick size one liquid fills a smaller box.
-    let head = FULL.split("[[part]]").next().unwrap_or(FULL).replace("steps   = 5000", "steps = 20");
-    let text = format!(
-        "{head}[initial]\nkind = \"lattice\"\nspecies = \"D\"\n[output]\nthermo = 20\n[observe]\nevery = 10\ntemperature = true\n"
-    );
+    // Nothing is read of what is there: the run is timed.
+    let _ = remove_work(&context.folder.join("size"));
+    // A few steps in the box of the collision; at quick size one that is smaller.
+    let edges = [60.0, 60.0, 104.1667].map(|l: f64| l / context.pick(100_f64.cbrt(), 1.0));
+    let changes = [
+        &format!("box={edges:?}"),
+        "dt=0.02",
+        "steps=20",
+        "initial.density=10.0",
+        "initial.species=D",
+        "output.thermo=20",
+        "observe.every=10",
+        "observe.pressure=false",
+    ];
     let begun = std::time::Instant::now();
-    context.shipped("size", IMMISCIBLE, &text, &[&smaller])?;
+    context.scene("size", IMMISCIBLE, HOMOGENEOUS, &changes)?;
     let seconds = begun.elapsed().as_secs_f64();
     let particles = context.pick(3.75e4, 3.75e6);
     // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.

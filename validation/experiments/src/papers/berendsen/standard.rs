@@ -1,10 +1,10 @@
 //! Sections 11.2 and 11.3: standard DPD, its pressure and compressibility; Lowe's thermostat beside drag and noise.
 
 use crate::ExperimentError;
-use crate::bulk::Observed;
-use crate::models::STANDARD;
 use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid};
+use crate::run::Observed;
+use crate::shipped::STANDARD;
 
 /// a r_c⁴ of the model.
 const A: f64 = 25.0;
@@ -33,14 +33,15 @@ pub fn water(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
 
 /// Runs standard DPD with Lowe's thermostat, or with drag and noise.
 fn run(context: &Context, integrator: &str, dt: f64) -> Result<Observed, ExperimentError> {
-    let scene = format!(
-        "kT = 1.0\nseed = 1\nbox = {:?}\ndensity = 3.0\ndt = {dt:?}\nintegrator = \"{integrator}\"\nequilibrate = {}\nsteps = {}\n\
-         [initial]\nkind = \"lattice\"\n[output]\nthermo = 0\n[observe]\nevery = 10\ntemperature = true\npressure = true\n",
-        context.pick(8.0, 10.0),
-        (5.0 / dt) as u64,
-        (context.pick(40.0, 500.0) / dt) as u64,
-    );
-    context.scene(&format!("{integrator}-{dt}"), STANDARD, &scene)
+    let changes = &[
+        context.pick("box=8.0", "box=10.0"),
+        &format!("integrator={integrator}"),
+        &format!("equilibrate={}", (5.0 / dt) as u64),
+        &format!("steps={}", (context.pick(40.0, 500.0) / dt) as u64),
+        "observe.every=10",
+    ];
+    let fluid = Fluid { dt, changes, ..Fluid::of(STANDARD) };
+    context.bulk(&format!("{integrator}-{dt}"), &fluid, &[3.0])
 }
 
 pub fn lowe_andersen(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {

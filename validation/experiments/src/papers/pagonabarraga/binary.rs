@@ -2,9 +2,9 @@
 
 use super::BINARY;
 use crate::ExperimentError;
-use crate::bulk::Observed;
 use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
-use crate::papers::context::{Context, mean_field};
+use crate::papers::context::{Context, edited, mean_field};
+use crate::run::Observed;
 use psidpd_core::model::Model;
 use psidpd_observe::Measured;
 
@@ -26,7 +26,8 @@ fn run(context: &Context, name: &str, scene: &str) -> Result<Observed, Experimen
 }
 
 fn mixture(context: &Context) -> Result<Observed, ExperimentError> {
-    run(context, RUN, &format!("{SCENE}msd = {{ length = {} }}\n", context.pick(300, 2000)))
+    let msd = context.pick("observe.msd={ length = 300 }", "observe.msd={ length = 2000 }");
+    run(context, RUN, &edited(SCENE, &[msd])?)
 }
 
 /// The fraction of A along y, from the middle of its layer.
@@ -118,7 +119,7 @@ pub fn fig11(context: &Context, outcome: &mut Reproduction) -> Result<(), Experi
     // "Keeps its width within r_c". In a box L wide, waves of an interface in two dimensions add to the square of its
     // width in proportion to L, kT L/(12 γ) to the variance of its place; the paper does not say how wide its box is.
     outcome.at_most("width from 10 to 90 %, in a box 10 wide", layers.width, 1.0);
-    let narrow = SCENE.replace("box     = [10.0, ", "box     = [3.0, ");
+    let narrow = edited(SCENE, &["box=[3.0, 20.0]"])?;
     let narrow = composition(&run(context, "binary-narrow", &narrow)?).width;
     outcome.at_most("in a box 3 wide", narrow, 1.0);
     let without = without_waves([layers.width, narrow]);

@@ -2,10 +2,10 @@
 
 use super::QUADRATIC;
 use crate::ExperimentError;
-use crate::bulk::Observed;
-use crate::models::{LINEAR, STANDARD};
 use crate::papers::case::{Reproduction, bare, curve, line, points};
 use crate::papers::context::{Context, Fluid, mean_field, with_parameters};
+use crate::run::Observed;
+use crate::shipped::{LINEAR, STANDARD};
 use psidpd_observe::Measured;
 use std::f64::consts::PI;
 
@@ -14,9 +14,9 @@ fn groot_warren(
     name: &str,
     model: &str,
     rho: f64,
-    observe: &str,
+    changes: &[&str],
 ) -> Result<Observed, ExperimentError> {
-    let fluid = Fluid { edge: 6.0, observe, ..Fluid::of(model) };
+    let fluid = Fluid { edge: 6.0, changes, ..Fluid::of(model) };
     context.bulk(&format!("{name}-{rho}"), &fluid, &[rho])
 }
 
@@ -26,9 +26,9 @@ pub fn fig3(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
     let pairwise = with_parameters(STANDARD, &[("a", a)])?;
     let [mut quadratic, mut linear, mut pairs] = [Vec::new(), Vec::new(), Vec::new()];
     for rho in [3.0, 8.0, 14.0] {
-        let q = groot_warren(context, "quadratic", QUADRATIC, rho, "")?.pressure();
-        let l = groot_warren(context, "linear", LINEAR, rho, "")?.pressure();
-        let p = groot_warren(context, "pairwise", &pairwise, rho, "")?.pressure();
+        let q = groot_warren(context, "quadratic", QUADRATIC, rho, &[])?.pressure();
+        let l = groot_warren(context, "linear", LINEAR, rho, &[])?.pressure();
+        let p = groot_warren(context, "pairwise", &pairwise, rho, &[])?.pressure();
         outcome.own(format!("quadratic kernel beside the pair force, density {rho}"), q, p);
         let alpha = q.minus(rho).over(a * rho * rho);
         outcome.equal(format!("alpha of the quadratic kernel, density {rho}"), alpha, [0.101, 0.001]);
@@ -58,7 +58,7 @@ fn structure(observed: &Observed) -> (Measured, Vec<(f64, f64)>) {
 }
 
 fn compared(context: &Context, rho: f64, outcome: &mut Reproduction) -> Result<Measured, ExperimentError> {
-    let rdf = "rdf = { range = 1.5, bins = 75 }";
+    let rdf = &["observe.rdf={ range = 1.5, bins = 75 }"];
     let (linear, g) = structure(&groot_warren(context, "linear", LINEAR, rho, rdf)?);
     let (quadratic, h) = structure(&groot_warren(context, "quadratic", QUADRATIC, rho, rdf)?);
     let lines = vec![curve("linear kernel", g), curve("quadratic kernel", h)];
@@ -90,8 +90,8 @@ pub fn minimum(context: &Context, outcome: &mut Reproduction) -> Result<(), Expe
         // "Of order of the interaction range": between half of it and twice.
         outcome.at_least(format!("l_0, {kernel} kernel"), length, 0.5);
         outcome.at_most(format!("l_0, {kernel} kernel, from above"), length, 2.0);
-        let observe = "structure_factor = { range = 15.0 }";
-        let s = groot_warren(context, kernel, model, 3.0, observe)?.profile("structure_factor", "s");
+        let changes = &["observe.structure_factor={ range = 15.0 }"];
+        let s = groot_warren(context, kernel, model, 3.0, changes)?.profile("structure_factor", "s");
         let near = |k: f64| s.iter().min_by(|a, b| (a.0 - k).abs().total_cmp(&(b.0 - k).abs()));
         // A minimum at 2π/l₀ is lower than S at the longest wave.
         if let (Some(first), Some(at)) = (s.first(), near(2.0 * PI / length)) {

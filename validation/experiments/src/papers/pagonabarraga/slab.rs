@@ -2,9 +2,9 @@
 
 use super::SLAB;
 use crate::ExperimentError;
-use crate::bulk::Observed;
 use crate::papers::case::{Reproduction, bare, curve, extreme, points};
-use crate::papers::context::{Context, mean_field};
+use crate::papers::context::{Context, edited, mean_field};
+use crate::run::Observed;
 
 const SCENE: &str = include_str!("../../../../scenes/full/van-der-waals-2d-slab.toml");
 const RUN: &str = "slab";
@@ -12,8 +12,9 @@ const KT: f64 = 0.75;
 
 fn slab(context: &Context) -> Result<(Context, Observed), ExperimentError> {
     let context = context.shared("pagonabarraga-slab");
+    let msd = context.pick("observe.msd={ length = 250 }", "observe.msd={ length = 2000 }");
+    let scene = edited(SCENE, &[msd, "observe.interface_width=true"])?;
     let changes = ["equilibrate=2000", "steps=10000", "output.dump=0", "observe.every=20"];
-    let scene = format!("{SCENE}msd = {{ length = {} }}\ninterface_width = true\n", context.pick(250, 2000));
     let observed = context.shipped(RUN, SLAB, &scene, &changes)?;
     Ok((context, observed))
 }

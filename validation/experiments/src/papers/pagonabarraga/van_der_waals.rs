@@ -1,9 +1,9 @@
 //! Figures 1, 2 and 6: the van der Waals fluid, in mean field and homogeneous.
 
 use crate::ExperimentError;
-use crate::models::VAN_DER_WAALS;
 use crate::papers::case::{Reproduction, curve, line, points};
 use crate::papers::context::{Context, Fluid, mean_field, with_parameters};
+use crate::shipped::VAN_DER_WAALS;
 use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, critical_point};
 

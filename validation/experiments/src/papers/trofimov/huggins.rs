@@ -2,11 +2,11 @@
 
 use super::{DEMIXING, fluid};
 use crate::ExperimentError;
-use crate::bulk::Observed;
 use crate::calibrate::Point;
-use crate::models::HUGGINS;
 use crate::papers::case::{Reproduction, bare, curve, extreme, layers, points};
-use crate::papers::context::{Context, mean_field, with_parameters};
+use crate::papers::context::{Context, Fluid, mean_field, with_parameters};
+use crate::run::Observed;
+use crate::shipped::HUGGINS;
 use psidpd_observe::Measured;
 
 pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
@@ -14,13 +14,12 @@ pub fn table3(context: &Context, outcome: &mut Reproduction) -> Result<(), Exper
     // One digit after the point is printed, and no error.
     outcome.equal("pressure", observed.pressure(), [954.5, 0.05]);
     // With the integrator of the paper, at its step, from all forces and the velocities at the ends of steps.
-    let scene = format!(
-        "kT = 1.0\nseed = 1\nbox = {}\ndensity = 16.0\ndt = 0.01\nintegrator = \"self-consistent\"\nequilibrate = 400\nsteps = {}\n\
-         [initial]\nkind = \"lattice\"\n[output]\nthermo = 0\n[observe]\nevery = 20\npressure = true\n",
-        context.pick("[6.0, 6.0, 6.0]", "[8.0, 8.0, 16.0]"),
-        context.pick(1600, 50_000),
+    let changes: &[&str] = context.pick(
+        &["integrator=self-consistent", "box=6.0"],
+        &["integrator=self-consistent", "box=[8.0, 8.0, 16.0]", "equilibrate=400"],
     );
-    let same = context.scene("self-consistent", HUGGINS, &scene)?.scalar("pressure", "total");
+    let theirs = Fluid { changes, ..fluid(HUGGINS) };
+    let same = context.bulk("self-consistent", &theirs, &[8.0, 8.0])?.scalar("pressure", "total");
     outcome.equal("pressure by the paper's integrator", same, [954.5, 0.05]);
     let names = ["A".to_owned(), "B".to_owned()];
     let point = Point::of(&observed, &names, &[8.0, 8.0]);

@@ -6,8 +6,8 @@ mod pressure;
 
 use super::Paper;
 use super::context::Fluid;
-use crate::bulk::Observed;
 use crate::calibrate::Point;
+use crate::run::Observed;
 use density::{fig4, fig5, fig8};
 use huggins::{fig9, fig10, table3};
 use pressure::{agrees, fig1, fig7, too_low};
@@ -37,7 +37,6 @@ pub const PAPER: Paper = (
     ],
 );
 
-const MEANS: &str = "local_density = true\n";
 const FIT_DENSITIES: [f64; 5] = [2.0, 4.0, 6.0, 8.0, 10.0];
 
 /// The step is half of the paper's, whose integrator is another one: at 0.02 velocity Verlet is 2 % too hot at k = 3.
@@ -48,7 +47,7 @@ fn fluid(model: &str) -> Fluid<'_> {
         LENNARD_JONES => 0.005,
         _ => 0.01,
     };
-    Fluid { dt, observe: MEANS, ..Fluid::of(model) }
+    Fluid { dt, changes: &["observe.local_density=true"], ..Fluid::of(model) }
 }
 
 fn point(observed: &Observed, rho: f64) -> Point {

@@ -2,9 +2,9 @@
 
 use super::{STRONG, WEAK};
 use crate::ExperimentError;
-use crate::models::SPLINE;
 use crate::papers::case::{Reproduction, bare, curve};
-use crate::papers::context::Context;
+use crate::papers::context::{Context, edited};
+use crate::shipped::SPLINE;
 use psidpd_core::model::Model;
 use psidpd_core::theory::thermodynamic_limit;
 use psidpd_observe::Measured;
@@ -47,7 +47,7 @@ pub fn limit(_: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentEr
     // The paper shows a drop at rest for 17.0, which the uniform fluid cannot be: 19.0, printed as well, is meant.
     for first in [17.0, 19.0] {
         // a A = 9.5 · A.
-        let text = SPLINE.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
+        let text = edited(SPLINE, &[&format!("pair.1.A={:?}", first / 9.5)])?;
         let fluid = Model::parse("model.toml", &text)?.at(0.5)?;
         let uniform = thermodynamic_limit(&fluid)?.is_err_and(|collapse| collapse.is_uniform());
         let name = format!("{first} W(0.8) - 9.5 W(1.0): the uniform fluid is bounded");
@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn integrals_are_those_of_the_splines() {
         for first in [17.0, 19.0] {
-            let text = SPLINE.replace("A        = 2.0", &format!("A        = {:?}", first / 9.5));
+            let text = edited(SPLINE, &[&format!("pair.1.A={:?}", first / 9.5)]).unwrap();
             let fluid = Model::parse("model.toml", &text).unwrap().at(0.5).unwrap();
             let found = psidpd_core::theory::MeanField::new(&fluid).unwrap().pair_integrals[0];
             let integral = std::f64::consts::PI / 8.0 * (first * 0.8f64.powi(3) - 9.5);

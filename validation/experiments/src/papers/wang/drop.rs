@@ -1,10 +1,10 @@
 //! Figures 6 to 11: drops in their vapour. (5 is a picture of one; 7 and 9 are taken from other papers.)
 
 use crate::ExperimentError;
-use crate::bulk::Observed;
-use crate::models::SPLINE;
 use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::Context;
+use crate::run::Observed;
+use crate::shipped::SPLINE;
 use psidpd_observe::Measured;
 
 const SCENES: [(usize, &str); 7] = [

@@ -3,7 +3,7 @@
 use super::EOS;
 use crate::ExperimentError;
 use crate::papers::case::{Reproduction, curve, line, points};
-use crate::papers::context::{Context, Fluid};
+use crate::papers::context::{Context, Fluid, edited};
 
 pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {
     let fluid = Fluid { edge: 8.0, ..Fluid::of(EOS) };
@@ -17,7 +17,7 @@ pub fn fig2(context: &Context, outcome: &mut Reproduction) -> Result<(), Experim
         outcome.equal(format!("pressure at density {rho}"), p, fit);
         whole.push((rho, p));
         // Both strengths halved, or kT doubled and p in units of it.
-        let half = EOS.replace("strength = 1.0", "strength = 0.5");
+        let half = edited(EOS, &["pair.1.strength=0.5"])?;
         let half = Fluid { model: &half, ..fluid };
         let p = context.bulk(&format!("half-rho{rho}"), &half, &[rho])?.configurational_pressure();
         outcome.equal(format!("pressure of half the potential at density {rho}"), p, fit);

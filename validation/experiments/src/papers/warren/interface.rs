@@ -1,10 +1,10 @@
 //! Table 2, Figures 3 to 5: the interface between liquid and vapour.
 
 use crate::ExperimentError;
-use crate::bulk::Observed;
 use crate::fluids::{SET5, SET6, WarrenSet};
 use crate::papers::case::{Reproduction, bare, curve, points};
 use crate::papers::context::{Context, Fluid};
+use crate::run::{Observed, SLAB};
 use psidpd_observe::Measured;
 
 const BIN: f64 = 0.05;
@@ -39,18 +39,18 @@ fn width_by_bins(observed: &Observed) -> Measured {
 /// A slab of a set between two surfaces; figures and the table share the runs.
 fn slab(context: &Context, set: &WarrenSet, (kt, rho): (f64, f64)) -> Result<Observed, ExperimentError> {
     let context = context.shared("warren-slab");
-    let [edge, height] = context.pick([7.0, 18.0], [10.0, 30.0]);
-    let scene = format!(
-        "title = \"slab\"\nkT = {kt:?}\nseed = 1\nbox = [{edge:?}, {edge:?}, {height:?}]\ndt = 0.01\nequilibrate = {}\n\
-         steps = {}\n[initial]\nkind = \"slab\"\naxis = \"z\"\nthickness = {:?}\ndensity = {rho:?}\n[output]\n\
-         thermo = 0\n[observe]\nevery = 10\ntemperature = true\ndensity_profile = {{ bins = {} }}\nsurface_tension = \
-         {{ every = 20 }}\ninterface_width = true\n",
-        context.pick(1500, 10_000),
-        context.pick(8000, 100_000),
-        0.5 * height,
-        (height / BIN) as u32,
-    );
-    context.scene(&format!("{}-kT{kt}", set.slug()), set.fluid.text, &scene)
+    let height = context.pick(18.0, 30.0);
+    let changes = [
+        context.pick("box=[7.0, 7.0, 18.0]", "box=[10.0, 10.0, 30.0]"),
+        &format!("kT={kt}"),
+        context.pick("equilibrate=1500", "equilibrate=10000"),
+        context.pick("steps=8000", "steps=100000"),
+        &format!("initial.thickness={}", 0.5 * height),
+        &format!("initial.density={rho}"),
+        &format!("observe.density_profile={{ bins = {} }}", (height / BIN) as u32),
+        "observe.surface_tension={ every = 20 }",
+    ];
+    context.scene(&format!("{}-kT{kt}", set.slug()), set.fluid.text, SLAB, &changes)
 }
 
 pub fn table2(context: &Context, outcome: &mut Reproduction) -> Result<(), ExperimentError> {

@@ -1,10 +1,10 @@
 //! Figure 6 and Table 3: drops that hang from a support.
 
 use crate::ExperimentError;
-use crate::bulk::Observed;
 use crate::fluids::{SET5, SET6, WarrenSet};
 use crate::papers::case::{Reproduction, bare, curve};
 use crate::papers::context::Context;
+use crate::run::Observed;
 
 /// Name, parameter set, scene, and tension from the shape with its error.
 type Drop = (&'static str, WarrenSet, &'static str, [f64; 2]);

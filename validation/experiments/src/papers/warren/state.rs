@@ -3,9 +3,9 @@
 use super::ALPHA;
 use crate::ExperimentError;
 use crate::fluids::{A, SET5, SET6};
-use crate::models::STANDARD;
 use crate::papers::case::{Reproduction, curve, line, points};
-use crate::papers::context::{Context, Fluid, with_parameters};
+use crate::papers::context::{Context, Fluid, edited, with_parameters};
+use crate::shipped::STANDARD;
 use psidpd_observe::Measured;
 
 /// Set 6 with other A, B r_d⁴ and r_d.
@@ -71,21 +71,23 @@ fn by_protocol(context: &Context, rd: f64) -> Result<(Measured, usize, usize), E
     let (mut kept, mut all) = (Vec::new(), 0);
     for a in [0.0, 25.0, 50.0] {
         for many in [1.0, 2.5, 5.0, 10.0] {
-            let model = with([a, many], rd)?.replace("gamma = 18.0", "gamma = 4.5");
+            let model = edited(&with([a, many], rd)?, &["thermostat.1.gamma=4.5"])?;
             for rho in [3.0_f64, 6.0, 9.0] {
-                let scene = format!(
-                    "kT = 1.0\nseed = 1\nbox = {:?}\ndt = 0.05\nintegrator = \"groot-warren\"\nlambda = 0.5\nequilibrate = 100\n\
-                     steps = {}\n[initial]\nkind = \"lattice\"\ndensity = {rho:?}\n[output]\nthermo = 0\n[observe]\nevery = 5\n\
-                     temperature = true\npressure = true\n",
-                    context.pick((500.0 / rho).cbrt().max(3.2), 10.0),
-                    context.pick(400, 4000),
-                );
                 all += 1;
-                let observed =
-                    match context.scene(&format!("protocol-rd{rd}-A{a}-B{many}-{rho}"), &model, &scene) {
-                        Err(ExperimentError::Run(why)) if why.is_stop() => continue,
-                        other => other?,
-                    };
+                let changes = &[
+                    "integrator=groot-warren",
+                    "lambda=0.5",
+                    &format!("box={:?}", context.pick((500.0 / rho).cbrt().max(3.2), 10.0)),
+                    "equilibrate=100",
+                    context.pick("steps=400", "steps=4000"),
+                    "observe.every=5",
+                ];
+                let fluid = Fluid { dt: 0.05, changes, ..Fluid::of(&model) };
+                let name = format!("protocol-rd{rd}-A{a}-B{many}-{rho}");
+                let observed = match context.bulk(&name, &fluid, &[rho]) {
+                    Err(ExperimentError::Run(why)) if why.is_stop() => continue,
+                    other => other?,
+                };
                 if (observed.temperature().value - 1.0).abs() < 0.1 {
                     let p = observed.pressure().value;
                     kept.push((rho * rho, rest(p, rho, ALPHA[0], [a, many]) / many));

@@ -3,9 +3,9 @@
 use super::scene::{HEIGHT, wall};
 use super::search::attracts;
 use super::{Film, Instrument, Slab, Sought, conditions};
-use crate::bulk::Observed;
-use crate::slabs::{FILM, Run, Setting, Units, mean, nearest, seeds_of_result};
-use crate::{ExperimentError, Trouble, slabs};
+use crate::model::slabs::{self, FILM, Run, Setting, Units, mean, nearest, seeds_of_result};
+use crate::run::Observed;
+use crate::{ExperimentError, Trouble};
 use psidpd_observe::Measured;
 use std::path::Path;
 
@@ -41,8 +41,8 @@ impl<'a> Runs<'a> {
 
     /// Runs settings of the liquid side by side, each from its seed.
     fn run(&self, settings: Vec<(Setting, u64)>) -> Result<Vec<Observed>, Trouble> {
-        let of =
-            |(setting, seed)| Run { setting, model: self.sought.model_file.clone(), units: self.units, seed };
+        let (model, kt) = (&self.sought.model_file, self.sought.kt);
+        let of = |(setting, seed)| Run { setting, model: model.clone(), kt, seed };
         slabs::run(&settings.into_iter().map(of).collect::<Vec<_>>(), self.folder)
     }
 
@@ -155,7 +155,7 @@ mod tests {
     /// that of the liquid, so it touches; the tensions are those of the integral on either side of its surface.
     #[test]
     fn films_of_known_stress_are_read() {
-        let model = psidpd_core::model::Model::parse("m.toml", crate::models::SET6).unwrap();
+        let model = psidpd_core::model::Model::parse("m.toml", crate::shipped::SET6).unwrap();
         let sought =
             Sought { model_file: "m.toml".into(), model, kt: 0.7, density: None, angle: 60.0, seed: 1 };
         let units = Units { kt: 0.7, range: 2.0, density: 6.0, dt: 0.1 };

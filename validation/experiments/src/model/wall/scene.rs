@@ -3,8 +3,8 @@
 
 use super::Found;
 use super::ridge::ridge;
-use crate::seek::rounded;
-use crate::slabs::{ALONG, FILM, SETTLE, Setting, Units, part, shown, slab};
+use crate::model::seek::rounded;
+use crate::model::slabs::{ALONG, FILM, SETTLE, Setting, Units, part, shown, slab};
 use std::fmt::Write;
 
 /// The height of the box of a film, in which the vapour has at least as much as the film.
@@ -34,13 +34,11 @@ impl Setting {
     pub fn film(strength: f64, time: f64, units: &Units) -> Setting {
         Setting {
             title: "A film on a wall".into(),
-            edges: [ALONG, ALONG, HEIGHT],
             lines: between_faces(&wall(strength, units, "\"zlo\", \"zhi\"")),
             // A layer that touches the face is pushed off.
             parts: part(&slab(FILM, Some(0.5 * FILM + 0.2), units), units.density),
-            settle: SETTLE,
-            time,
             observe: "every = 5\nstress_profile = { axis = \"z\", bins = 110 }\n".into(),
+            ..units.setting([ALONG, ALONG, HEIGHT], [SETTLE, time])
         }
     }
 
@@ -53,7 +51,6 @@ impl Setting {
         let corner = |x: f64, y: f64, z: f64| [x, y, z].map(|length| shown(length * units.range));
         Setting {
             title: format!("A ridge on a wall, {angle} degrees"),
-            edges: [shape.edges[0], DEPTH, shape.edges[1]],
             lines: between_faces(wall),
             parts: part(
                 &format!(
@@ -63,11 +60,13 @@ impl Setting {
                 ),
                 units.density,
             ),
-            settle: SPREAD,
-            time: RIDGE / angle.to_radians().sin().powi(2).max(0.25),
             observe: format!(
                 "every = 10\ncontact_angle = {{ wall = \"zlo\", axis = \"y\", surface = {surface:?} }}\n"
             ),
+            ..units.setting(
+                [shape.edges[0], DEPTH, shape.edges[1]],
+                [SPREAD, RIDGE / angle.to_radians().sin().powi(2).max(0.25)],
+            )
         }
     }
 }
@@ -91,6 +90,6 @@ impl Found {
         }
         let surface = self.film.map_or(0.0, |film| film.surface);
         let ridge = Setting::ridge(self.wanted, surface, &lines, &self.units);
-        Some(head + &ridge.text(model, &self.units, seed))
+        Some(head + &ridge.text(model, self.units.kt, seed))
     }
 }

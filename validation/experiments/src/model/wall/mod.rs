@@ -12,11 +12,11 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use crate::slabs::{Slab, Units};
+pub use crate::model::slabs::{Slab, Units};
 pub use search::Trial;
 
 use crate::error::value_or_why;
-use crate::seek::rounded;
+use crate::model::seek::rounded;
 use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
 use psidpd_formats::files::temporary_folder;

@@ -3,16 +3,14 @@
 use super::fluid::{Drag, Strengths, USUAL, text};
 use super::instrument::{Care, Equilibrium, Flow, Instrument};
 use super::sheet::Liquid;
-use crate::bulk::{self, Observed};
-use crate::steps::{self, ADVISED, FIRST};
+use crate::model::slabs::{self, Setting};
+use crate::model::steps::{self, ADVISED, FIRST};
+use crate::run::Observed;
 use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
-use psidpd_dynamics::run::RunError;
-use psidpd_dynamics::scene::Scene;
 use psidpd_dynamics::trial::{Composition, Piece};
 use psidpd_formats::files::{Existing, write_bytes};
 use psidpd_observe::Measured;
-use std::fmt::Write;
 use std::path::Path;
 
 /// Times that runs last, in r_c √(m/kT): the homogeneous liquid, the slab, the flow.
@@ -46,37 +44,6 @@ pub struct Runs<'a> {
     pub liquid: &'a Liquid,
     pub folder: &'a Path,
     pub seed: u64,
-}
-
-/// A scene of the liquid without its drag, which the model file has.
-struct Setting<'a> {
-    title: &'a str,
-    edges: [f64; 3],
-    initial: String,
-    /// The acceleration of the force along x, which is reversed in the upper half of z.
-    acceleration: f64,
-    settle: f64,
-    time: f64,
-    dt: f64,
-    observe: &'a str,
-}
-
-impl Setting<'_> {
-    fn text(&self, seed: u64) -> String {
-        let mut text = format!(
-            "title = \"{}\"\nmodel = \"liquid.toml\"\nkT = 1.0\nseed = {seed}\nbox = {:?}\n{}",
-            self.title, self.edges, self.initial
-        );
-        if self.acceleration > 0.0 {
-            let _ = writeln!(
-                text,
-                "[[body_force]]\nacceleration = [{:?}, 0.0, 0.0]\nreversed_along = \"z\"",
-                self.acceleration
-            );
-        }
-        text += &steps::stages([FIRST * self.dt, self.dt], [self.settle, self.time]);
-        text + "[output]\nthermo = 0\ncheckpoint = 0\n[observe]\n" + self.observe
-    }
 }
 
 impl Runs<'_> {
@@ -113,48 +80,50 @@ impl Runs<'_> {
         }
     }
 
-    fn scenes(&self, settings: &[Setting], care: Care) -> Result<Vec<Scene>, RunError> {
-        let parse = |s: &Setting| Ok(Scene::parse(s.title, &s.text(self.seed(care)), self.folder)?);
-        settings.iter().map(parse).collect()
+    fn runs(&self, settings: Vec<Setting>, care: Care) -> Vec<slabs::Run> {
+        let (model, seed) = (self.folder.join("liquid.toml"), self.seed(care));
+        let run = |setting| slabs::Run { setting, model: model.clone(), kt: 1.0, seed };
+        settings.into_iter().map(run).collect()
     }
 
     /// Runs scenes side by side; the last is the longest.
-    fn run(&self, settings: &[Setting], care: Care) -> Result<Vec<Observed>, Trouble> {
-        let all = bulk::side_by_side(self.scenes(settings, care)?, self.folder)?;
+    fn run(&self, settings: Vec<Setting>, care: Care) -> Result<Vec<Observed>, Trouble> {
+        let all = slabs::run(&self.runs(settings, care), self.folder)?;
         match all.iter().flat_map(|o| &o.0).find(|o| o.note.contains("are a crystal")) {
             Some(crystal) => Err(Trouble::Frozen(crystal.note.clone())),
             None => Ok(all),
         }
     }
 
-    fn homogeneous<'a>(&self, share: f64, time: f64, dt: f64, observe: &'a str) -> Setting<'a> {
+    fn homogeneous(&self, share: f64, time: f64, dt: f64, observe: &str) -> Setting {
         let density = share * self.liquid.goals.density;
         Setting {
-            title: "homogeneous liquid",
+            title: "homogeneous liquid".into(),
             edges: [(PARTICLES / density).cbrt(); 3],
-            initial: format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n"),
-            acceleration: 0.0,
-            settle: 8.0,
-            time,
-            dt,
-            observe,
+            parts: lattice(density),
+            steps: [FIRST * dt, dt],
+            times: [8.0, time],
+            observe: observe.into(),
+            ..Setting::default()
         }
     }
 
     /// Two flows of a liquid whose viscosity is about `guess`, and for a result the liquid at rest before them.
-    fn flows(&self, guess: f64, dt: f64, care: Care) -> Vec<Setting<'static>> {
+    fn flows(&self, guess: f64, dt: f64, care: Care) -> Vec<Setting> {
         let density = self.liquid.goals.density;
         // v = ρ a z (D − z)/2η in each half of width D.
         let half = 0.5 * CHANNEL[2];
+        let acceleration = 8.0 * guess * VELOCITY / (density * half * half);
+        let force =
+            format!("[[body_force]]\nacceleration = [{acceleration:?}, 0.0, 0.0]\nreversed_along = \"z\"\n");
         let mut settings = vec![Setting {
-            title: "two flows",
+            title: "two flows".into(),
             edges: CHANNEL,
-            initial: format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n"),
-            acceleration: 8.0 * guess * VELOCITY / (density * half * half),
-            settle: 8.0 + density * half * half / guess,
-            time: longer(care, TIMES[2]),
-            dt,
-            observe: OF_FLOW,
+            lines: force,
+            parts: lattice(density),
+            steps: [FIRST * dt, dt],
+            times: [8.0 + density * half * half / guess, longer(care, TIMES[2])],
+            observe: OF_FLOW.into(),
         }];
         if care != Care::Search {
             settings.insert(0, self.homogeneous(1.0, longer(care, TIMES[2]), dt, OF_MOTION));
@@ -170,10 +139,15 @@ impl Runs<'_> {
         guess: f64,
         dt: f64,
         care: Care,
-    ) -> Vec<Scene> {
+    ) -> Vec<psidpd_dynamics::scene::Scene> {
         self.model(fluid, drag).unwrap();
-        self.scenes(&self.flows(guess, dt, care), care).unwrap()
+        let runs = self.runs(self.flows(guess, dt, care), care);
+        runs.iter().map(|run| run.scene().unwrap()).collect()
     }
+}
+
+fn lattice(density: f64) -> String {
+    format!("[initial]\nkind = \"lattice\"\ndensity = {density:?}\n")
 }
 
 fn longer(care: Care, time: f64) -> f64 {
@@ -221,23 +195,22 @@ impl Instrument for Runs<'_> {
             .map(|share| self.homogeneous(*share, longer(care, TIMES[0]), dt, OF_BULK))
             .collect();
         settings.push(Setting {
-            title: "slab",
+            title: "slab".into(),
             edges: [AREA, AREA, HEIGHT],
-            initial: format!(
+            parts: format!(
                 "[initial]\nkind = \"slab\"\naxis = \"z\"\nthickness = {THICKNESS:?}\ndensity = {density:?}\n"
             ),
-            acceleration: 0.0,
-            settle: 12.0,
-            time: slab_time(care, self.liquid.goals.tension),
-            dt,
-            observe: OF_SLAB,
+            steps: [FIRST * dt, dt],
+            times: [12.0, slab_time(care, self.liquid.goals.tension)],
+            observe: OF_SLAB.into(),
+            ..Setting::default()
         });
-        read(&self.run(&settings, care)?, density)
+        read(&self.run(settings, care)?, density)
     }
 
     fn flow(&mut self, fluid: &Strengths, drag: &Drag, guess: f64, care: Care) -> Result<Flow, Trouble> {
         let dt = self.dt(&self.model(fluid, drag)?)?;
-        let found = self.run(&self.flows(guess, dt, care), care)?;
+        let found = self.run(self.flows(guess, dt, care), care)?;
         let last = &found[found.len() - 1];
         let diffusion = match care {
             Care::Search => Measured::NONE,

@@ -1,6 +1,7 @@
 //! A fluid measured in short runs, to be put beside its theory.
 
-use crate::bulk::{Bulk, Sampling};
+use crate::run::bulk::{Bulk, Sampling};
+use crate::run::{self, SLAB, set};
 use psidpd_core::model::Model;
 use psidpd_dynamics::run::{RunError, run_scene};
 use psidpd_dynamics::scene::Scene;
@@ -28,7 +29,7 @@ pub fn homogeneous(
 ) -> Result<Headline, RunError> {
     let (Effort { steps, dt }, equilibrate, threads) = (effort, effort.steps / 3, NonZeroUsize::MIN);
     let sampling = Sampling { particles: PARTICLES, dt, equilibrate, steps, every: 10, seed: 1, threads };
-    let bulk = Bulk { model, kt, densities, observe: "", sampling };
+    let bulk = Bulk { model, kt, densities, edits: &[], sampling };
     in_a_folder(&bulk.scene(file)?)
 }
 
@@ -38,21 +39,17 @@ pub fn slab(model: &Model, file: &Path, kt: f64, liquid: f64, effort: Effort) ->
     let d = model.dimensions();
     let mut edges = vec![7.0 * range; d];
     edges[d - 1] = 20.0 * range;
-    let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
-    let text = format!(
-        "title = \"slab\"\nmodel = {}\nkT = {kt:?}\nbox = {edges:?}\n[initial]\nkind = \"slab\"\nthickness = {:?}\n\
-         density = {liquid:?}\n[[stage]]\nname = \"equilibrate\"\nsteps = {}\ndt = {dt:?}\n[[stage]]\nname = \"produce\"\n\
-         steps = {}\ndt = {dt:?}\n[output]\nthermo = 10\n[observe]\nevery = 10\ntemperature = true\n\
-         surface_tension = true\ninterface_width = true\n",
-        toml::Value::String(file.display().to_string()),
-        9.0 * range,
-        (effort.steps / 3).max(1),
-        effort.steps,
-        dt = effort.dt
-    );
-    let mut scene = Scene::parse("slab", &text, Path::new(""))?;
-    scene.model = model.clone();
-    in_a_folder(&scene)
+    let edits = [
+        set("kT", kt),
+        set("box", edges),
+        set("dt", effort.dt),
+        set("equilibrate", (effort.steps / 3).max(1)),
+        set("steps", effort.steps),
+        set("initial.thickness", 9.0 * range),
+        set("initial.density", liquid),
+        set("output.thermo", 10),
+    ];
+    in_a_folder(&run::scene(SLAB, (model, file), &edits)?)
 }
 
 fn in_a_folder(scene: &Scene) -> Result<Headline, RunError> {

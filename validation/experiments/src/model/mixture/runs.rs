@@ -2,9 +2,11 @@
 
 use super::merge::{self, Liquid};
 use super::{Instrument, Layers, Slab, Sought};
-use crate::bulk::Observed;
-use crate::slabs::{ALONG, FILM, Run, SETTLE, Setting, Units, mean, nearest, part, seeds_of_result, slab};
-use crate::{ExperimentError, Trouble, slabs};
+use crate::model::slabs::{
+    self, ALONG, FILM, Run, SETTLE, Setting, Units, mean, nearest, part, seeds_of_result, slab,
+};
+use crate::run::Observed;
+use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Model;
 use psidpd_formats::files::{Existing, write_bytes};
 use psidpd_observe::Measured;
@@ -64,23 +66,21 @@ impl<'a> Runs<'a> {
         let slow = self.mass.max(1.0).sqrt();
         let setting = Setting {
             title: "Layers of two liquids".into(),
-            edges: [ALONG, ALONG, HEIGHT],
             lines: format!("\n[masses]\n{} = {:?}\n", b.name, self.mass),
             parts: layer(0) + "\n" + &layer(1),
-            settle: slow * SETTLE,
-            time: slow * time,
             observe: "every = 5\nstress_profile = { axis = \"z\", bins = 130, recentre = false }\n\
                       composition_profile = { axis = \"z\", bins = 65, recentre = false, every = 50 }\n"
                 .into(),
+            ..units.setting([ALONG, ALONG, HEIGHT], [SETTLE, time].map(|time| slow * time))
         };
-        Ok(Run { setting, model, units, seed })
+        Ok(Run { setting, model, kt: self.sought.kt, seed })
     }
 
     fn slabs(&self) -> [Run; 2] {
         let of = |k: usize| Run {
             setting: Setting::slab(&self.units[k]),
             model: self.sought.liquids[k].file.clone(),
-            units: self.units[k],
+            kt: self.sought.kt,
             seed: self.sought.seed,
         };
         [of(0), of(1)]
@@ -181,9 +181,8 @@ mod tests {
         let units = [unit(1.0, 6.0, 0.04), unit(2.0, 0.5, 0.02)];
         let runs = Runs { sought: &sought, folder: folder.path(), units, mass: 4.0 };
         let made = runs.layers((0.6, 9), 100.0, "both.toml").unwrap();
-        assert_eq!((made.seed, made.units.range, made.units.dt), (9, 2.0, 0.02));
-        let text = made.setting.text("both.toml", &made.units, made.seed);
-        let scene = psidpd_dynamics::scene::Scene::parse("s", &text, folder.path()).unwrap();
+        let scene = made.scene().unwrap();
+        assert_eq!((made.seed, scene.stages[2].dt), (9, 0.02));
         assert_eq!(scene.domain.lengths(), [12.0, 12.0, 26.0]);
         assert_eq!((&scene.mass[..], scene.seed, scene.kt), (&[1.0, 4.0][..], 9, 0.7));
         let lasts = |name: &str| {
@@ -205,9 +204,8 @@ mod tests {
             assert!((mean - middle).abs() < 0.3, "{species}: {mean}");
         }
         let [_, slab] = runs.slabs();
-        assert_eq!((slab.units.range, slab.seed, slab.model), (2.0, 7, folder.path().join("oil.toml")));
-        let text = slab.setting.text("oil.toml", &slab.units, slab.seed);
-        let slab = psidpd_dynamics::scene::Scene::parse("s", &text, folder.path()).unwrap();
+        assert_eq!((slab.seed, &slab.model), (7, &folder.path().join("oil.toml")));
+        let slab = slab.scene().unwrap();
         assert_eq!(slab.domain.lengths(), [12.0, 12.0, 24.0]);
         // An oil of ranges 2: a slab 12 thick of its density.
         let count = slab.initial.count() as f64;

@@ -2,7 +2,7 @@
 
 use super::{Film, Instrument, Slab};
 use crate::Trouble;
-use crate::seek::{Goal, Point, seek};
+use crate::model::seek::{Goal, Point, seek};
 use psidpd_core::model::pair::PairForm as _;
 use psidpd_core::model::wall::MatterIntegral;
 use psidpd_core::model::{Fluid, PairTerm};

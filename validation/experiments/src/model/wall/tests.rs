@@ -3,8 +3,8 @@
 use super::runs::{both, split};
 use super::search::{angle, attracts};
 use super::*;
-use crate::models::{SET6, SPLINE, STANDARD};
-use crate::slabs::Setting;
+use crate::model::slabs::Setting;
+use crate::shipped::{SET6, SPLINE, STANDARD};
 use psidpd_dynamics::scene::Scene;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -103,7 +103,10 @@ fn the_wall_is_found_through_noise() {
 fn what_attracts_is_known() {
     let attracts = |text: &str| attracts(&Model::parse("m.toml", text).unwrap().at(1.0).unwrap());
     assert_eq!([SET6, SPLINE].map(attracts), [true; 2]);
-    assert_eq!([STANDARD, include_str!("../../../models/van-der-waals-3d.toml")].map(attracts), [false; 2]);
+    assert_eq!(
+        [STANDARD, include_str!("../../../../models/van-der-waals-3d.toml")].map(attracts),
+        [false; 2]
+    );
 }
 
 /// Both routes must have the angle.
@@ -232,7 +235,7 @@ fn scenes_have_the_wall() {
     std::fs::write(folder.path().join("m.toml"), long).unwrap();
     let units = Units { kt: 0.7, range: 2.0, density: 0.75, dt: 0.1 };
     let parsed = |setting: &Setting| {
-        let text = setting.text("m.toml", &units, 5);
+        let text = setting.text("m.toml", units.kt, 5);
         Scene::parse("s.toml", &text, folder.path()).unwrap_or_else(|error| panic!("{error:?}\n{text}"))
     };
     for strength in [0.8, 1.234] {
@@ -279,6 +282,6 @@ fn only_liquids_beside_their_vapour_have_walls() {
     assert!(weak != SET6);
     let why = refused(&weak);
     assert!(why.contains("--density"), "{why}");
-    let why = refused(include_str!("../../../models/van-der-waals-2d.toml"));
+    let why = refused(include_str!("../../../../models/van-der-waals-2d.toml"));
     assert!(why.contains("three dimensions"), "{why}");
 }

@@ -1,7 +1,7 @@
 //! Merged models against the liquids that they are made of; tensions whose answer is known, in place of runs; layers by hand.
 
 use super::*;
-use crate::models::{SET6, SPLINE};
+use crate::shipped::{SET6, SPLINE};
 use psidpd_core::engine::{Engine, Instructions, Particles, PeriodicBox, Precision, Request, Settings, Want};
 use psidpd_core::model::Model;
 use rand::rngs::StdRng;
@@ -102,11 +102,11 @@ fn each_liquid_keeps_its_own_and_cross_is_between_them() {
 fn what_cannot_be_mixed_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |text: &str| liquid(folder.path(), "m", text).unwrap_err().to_string();
-    let two_densities = include_str!("../../../models/warren2003-set6-two-densities.toml");
+    let two_densities = include_str!("../../../../models/warren2003-set6-two-densities.toml");
     for (text, why) in [
         (two_densities, "no pair potentials"),
-        (include_str!("../../../models/binary-2d.toml"), "one species in three dimensions"),
-        (include_str!("../../../models/power-law-k3-corrected.toml"), "no pair potentials"),
+        (include_str!("../../../../models/binary-2d.toml"), "one species in three dimensions"),
+        (include_str!("../../../../models/power-law-k3-corrected.toml"), "no pair potentials"),
         (&SOFTER.replace("range = 0.75", "range = 0.75\ncorrection = [1.5, 1.0]"), "correction of a density"),
     ] {
         let said = refused(text);

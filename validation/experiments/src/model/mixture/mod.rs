@@ -2,7 +2,7 @@
 //!
 //! Each liquid keeps its model ([`merge`]); free is the strength of the attraction between them, `cross`. A box has a layer of each
 //! liquid one on the other, with vapour above and below so that the pressure is that of the models beside their vapour. The stress between the
-//! middles of both layers is the tension of their interface. `cross` is sought ([`crate::seek`]), and the result is measured by longer
+//! middles of both layers is the tension of their interface. `cross` is sought ([`crate::model::seek`]), and the result is measured by longer
 //! runs from other seeds.
 
 mod merge;
@@ -13,8 +13,8 @@ mod tests;
 pub use merge::Liquid;
 
 use crate::error::value_or_why;
-use crate::seek::{Goal, Point, rounded, seek};
-use crate::slabs::Slab;
+use crate::model::seek::{Goal, Point, rounded, seek};
+use crate::model::slabs::Slab;
 use crate::{ExperimentError, Trouble};
 use psidpd_core::model::Units;
 use psidpd_formats::files::temporary_folder;

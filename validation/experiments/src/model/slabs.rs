@@ -1,10 +1,10 @@
-//! Boxes with slabs and films that are run to measure tensions, and ridges. Lengths are in ranges of the forces, times in thermal units
-//! r √(m/kT).
+//! Boxes that are run to measure a liquid: homogeneous ones, and those with slabs, films and ridges. Lengths are in ranges of the forces,
+//! times in thermal units r √(m/kT).
 
-use crate::bulk::Observed;
-use crate::seek::rounded;
-use crate::steps::FIRST;
-use crate::{ExperimentError, Trouble, bulk, steps};
+use crate::model::seek::rounded;
+use crate::model::steps::{self, FIRST};
+use crate::run::Observed;
+use crate::{ExperimentError, Trouble, run};
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::MeanField;
 use psidpd_dynamics::run::RunError;
@@ -55,6 +55,16 @@ impl Slab {
 }
 
 impl Units {
+    /// A box with edges, and times to settle and to measure.
+    pub fn setting(&self, edges: [f64; 3], times: [f64; 2]) -> Setting {
+        Setting {
+            edges: edges.map(|edge| shown(edge * self.range)),
+            steps: [FIRST * self.dt, self.dt].map(rounded),
+            times: times.map(|time| time * self.range / self.kt.sqrt()),
+            ..Setting::default()
+        }
+    }
+
     /// Takes the density of the liquid from a slab of it.
     pub fn learn(&mut self, slab: &Slab) {
         if slab.density.value > 0.0 {
@@ -63,16 +73,19 @@ impl Units {
     }
 }
 
-/// A box, and where liquid is in it.
+/// A box, and where liquid is in it, in units of the model.
+#[derive(Default)]
 pub struct Setting {
     pub title: String,
     pub edges: [f64; 3],
     /// Lines behind those of the box.
     pub lines: String,
-    /// The `[[part]]`s.
+    /// The `[[part]]`s, or `[initial]`.
     pub parts: String,
-    pub settle: f64,
-    pub time: f64,
+    /// The first time steps and the others.
+    pub steps: [f64; 2],
+    /// What settles, and what is measured.
+    pub times: [f64; 2],
     pub observe: String,
 }
 
@@ -98,48 +111,46 @@ impl Setting {
     pub fn slab(units: &Units) -> Setting {
         Setting {
             title: "A slab".into(),
-            edges: [ALONG, ALONG, 2.0 * FILM + 2.0],
-            lines: String::new(),
             parts: part(&slab(FILM + 1.0, None, units), units.density),
-            settle: SETTLE,
-            time: SLAB,
             observe: "every = 5\nsurface_tension = true\ninterface_width = { every = 25 }\n".into(),
+            ..units.setting([ALONG, ALONG, 2.0 * FILM + 2.0], [SETTLE, SLAB])
         }
     }
 
     /// The scene, with a model of this name and without the section on output.
-    pub fn text(&self, model: &str, units: &Units, seed: u64) -> String {
-        let Units { kt, range, dt, .. } = *units;
-        let edges = self.edges.map(|edge| shown(edge * range));
+    pub fn text(&self, model: &str, kt: f64, seed: u64) -> String {
         let head = format!(
-            "title = \"{}\"\nmodel = {}\nkT    = {kt:?}\nseed  = {seed}\n\n[box]\nlengths  = {edges:?}\n{}\n{}",
+            "title = \"{}\"\nmodel = {}\nkT    = {kt:?}\nseed  = {seed}\n\n[box]\nlengths  = {:?}\n{}\n{}",
             self.title,
             toml::Value::String(model.to_owned()),
+            self.edges,
             self.lines,
             self.parts,
         );
-        let times = [self.settle, self.time].map(|time| time * range / kt.sqrt());
-        let stages = steps::stages([FIRST * dt, dt].map(rounded), times);
+        let stages = steps::stages(self.steps, self.times);
         head + &stages + "\n[observe]\nstages = [\"measure\"]\n" + &self.observe
     }
 }
 
-/// A setting with the file of its model, the units of its liquid, and a seed.
+/// A setting with the file of its model, kT, and a seed.
 pub struct Run {
     pub setting: Setting,
     pub model: PathBuf,
-    pub units: Units,
+    pub kt: f64,
     pub seed: u64,
+}
+
+impl Run {
+    pub fn scene(&self) -> Result<Scene, RunError> {
+        let model = std::path::absolute(&self.model).unwrap_or_else(|_| self.model.clone());
+        let text = self.setting.text(&model.display().to_string(), self.kt, self.seed) + OUTPUT;
+        Ok(Scene::parse(&self.setting.title, &text, Path::new(""))?)
+    }
 }
 
 /// Runs scenes side by side; the last is the longest.
 pub fn run(runs: &[Run], folder: &Path) -> Result<Vec<Observed>, Trouble> {
-    let scene = |run: &Run| -> Result<Scene, RunError> {
-        let model = std::path::absolute(&run.model).unwrap_or_else(|_| run.model.clone());
-        let text = run.setting.text(&model.display().to_string(), &run.units, run.seed) + OUTPUT;
-        Ok(Scene::parse(&run.setting.title, &text, Path::new(""))?)
-    };
-    Ok(bulk::side_by_side(runs.iter().map(scene).collect::<Result<_, _>>()?, folder)?)
+    Ok(run::side_by_side(runs.iter().map(Run::scene).collect::<Result<_, _>>()?, folder)?)
 }
 
 /// The seeds of the runs of a result, none of which a search or another round has.
