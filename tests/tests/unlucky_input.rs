@@ -431,7 +431,7 @@ fn errors_of_every_verb_name_the_file() {
     }
 }
 
-/// 87 million particles take 42 GB, and 89 with the pairs of the thermostat; the shell allows 4.
+/// 87 million particles take 42 GB; the shell allows 4.
 #[test]
 fn more_memory_than_there_is_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -439,9 +439,9 @@ fn more_memory_than_there_is_is_refused() {
     write(here, "m.toml", SOFT);
     write(here, "s.toml", &SCENE.replace("4.0, 4.0, 4.0", "307, 307, 307"));
     for (line, code, need) in [
-        ("run s.toml --out o", 2, "119.9 GB"),
+        ("run s.toml --out o", 2, "41.7 GB"),
         ("export lammps s.toml --out o", 2, "41.7 GB"),
-        ("check s.toml", 1, "119.9 GB"),
+        ("check s.toml", 1, "41.7 GB"),
     ] {
         let mut shell = Command::new("sh");
         shell

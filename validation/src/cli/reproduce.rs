@@ -43,7 +43,8 @@ pub fn run(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
     for case in &chosen {
         say!("{}: {}", case.id, case.what);
         let folder = arguments.out.join(if arguments.full { "full" } else { "quick" }).join(&case.id);
-        let context = Context { size, folder: folder.clone(), threads: arguments.threads };
+        let context =
+            Context { size, folder: folder.clone(), threads: arguments.threads, existing: told.existing };
         let begun = std::time::Instant::now();
         let result = match case.run(&context) {
             Ok(outcome) => {

@@ -7,18 +7,15 @@ use crate::scene::Scene;
 use psidpd_formats::memory::{self, MemoryError, PARTICLE};
 
 /// Bytes per particle of the pairs of a thermostat, listed once, and of an evaluation for a configurational temperature.
-const PAIRS: f64 = 900.0;
-const EVALUATION: f64 = 1300.0;
+const PAIRS: f64 = 600.0;
+const EVALUATION: f64 = 950.0;
 
-/// Bytes per particle where observables list all pairs: `temperature` of 106 000 particles took 1970.
-const OBSERVED: f64 = 2000.0;
+/// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330.
+const OBSERVED: f64 = 1300.0;
 
-/// What runs of fewer particles take besides: bytes per particle, and bytes in all. Two steps of 6 050 to 106 000 particles took 720 to 810
-/// bytes each, of 238 000 580, of 515 000 460.
-const BESIDES: [f64; 2] = [340.0, 29e6];
-
-/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles.
-const APART: f64 = 1500.0;
+/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles. 48 400 to 10⁶ particles
+/// took 800 to 850.
+const APART: f64 = 820.0;
 
 /// A checkpoint is made in memory, and a vector that grows has up to twice the length that it needs: runs at their peak had 2.8 times
 /// the samples of a map, and 3.8 times those of displacements.
@@ -71,8 +68,7 @@ fn bytes_per_particle(scene: &Scene) -> f64 {
         (_, true) => EVALUATION * part,
         _ => 0.0,
     };
-    let [each, all] = BESIDES;
-    PARTICLE + each.min(all / particles as f64) + pairs + evaluated
+    PARTICLE + pairs + evaluated
 }
 
 #[cfg(test)]
@@ -93,14 +89,13 @@ mod tests {
     fn evaluations_of_the_watch_are_counted() {
         let bytes = |edge: f64| bytes_per_particle(&of(edge, ""));
         let share = 20_000.0 / 756_250.0;
-        let besides = 340.0 - 29e6 / 756_250.0;
         let of = |observe: &str| bytes_per_particle(&of(50.0, &format!("[observe]\n{observe} = true\n")));
         assert_eq!(of("density_profile"), bytes(50.0));
         for observe in ["temperature", "stress_profile", "clusters", "msd"] {
             assert!((of(observe) - bytes(50.0) - OBSERVED + share * EVALUATION).abs() < 1e-9, "{observe}");
         }
         let once = (1.0 - share) * (EVALUATION + PAIRS);
-        assert!((bytes(4.0) - bytes(50.0) - once - besides).abs() < 1e-9);
+        assert!((bytes(4.0) - bytes(50.0) - once).abs() < 1e-9);
     }
 
     /// Rows of 8 bytes for each cell: 64 of a map, or as many as there are samples; 500 origins of 387 particles.

@@ -5,6 +5,7 @@ use crate::run::bulk::{Bulk, Sampling};
 use crate::run::{self, Observed};
 use psidpd_core::model::Model;
 use psidpd_core::theory::MeanField;
+use psidpd_dynamics::run::Begin;
 use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use psidpd_formats::files::{Existing, work_folder, write_bytes};
 use psidpd_observe::Measured;
@@ -25,6 +26,8 @@ pub struct Context {
     pub size: Size,
     pub folder: PathBuf,
     pub threads: NonZeroUsize,
+    /// What becomes of runs of full size that are there and were made from something else: those of quick size are replaced.
+    pub existing: Existing,
 }
 
 /// A homogeneous fluid of one species that a case measures.
@@ -56,7 +59,11 @@ impl Context {
     /// Runs a scene, or reads a run of it that is there. At full size that of another build of this version counts.
     fn run(&self, name: &str, scene: &Scene) -> Result<Observed, ExperimentError> {
         let program = self.pick(&**BUILD, VERSION);
-        Ok(run::once(scene, &self.folder.join(name), program, self.threads)?)
+        let instead = match (self.size, self.existing) {
+            (Size::Full, Existing::Keep) => Begin::New,
+            _ => Begin::Overwrite,
+        };
+        Ok(run::once(scene, (&self.folder.join(name), instead), program, self.threads)?)
     }
 
     fn write(&self, name: &str, model: &str) -> Result<PathBuf, ExperimentError> {

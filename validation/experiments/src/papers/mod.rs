@@ -65,6 +65,7 @@ pub fn cases() -> Vec<Case> {
 mod tests {
     use super::{Context, Size};
     use psidpd_core::engine::Fault;
+    use psidpd_formats::files::Existing;
     use std::num::NonZeroUsize;
 
     /// The values that disagree in a case at its small size, with forces of which a term is 5 % too strong.
@@ -72,7 +73,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let case = super::cases().into_iter().find(|case| case.id == id).unwrap();
         let folder = folder.path().join(id);
-        let context = Context { size: Size::Quick, folder, threads: NonZeroUsize::MIN };
+        let context = Context { size: Size::Quick, folder, threads: NonZeroUsize::MIN, existing: Existing::Keep };
         let outcome = Fault::during(fault, || case.run(&context)).unwrap();
         outcome.values.iter().filter(|value| !value.passes()).map(|value| value.name.clone()).collect()
     }

@@ -53,11 +53,11 @@ fn finish(
     Observed::read(folder)
 }
 
-/// Reads what a scene observed in `folder` if `program` has run it there; goes on if that was interrupted; and runs it anew if the
-/// folder has a run of another scene, model or program, or one that has been changed.
+/// Reads what a scene observed in `folder` if `program` has run it there; goes on if that was interrupted; and begins it as `instead` says
+/// if the folder has a run of another scene, model or program, or one that has been changed.
 pub fn once(
     scene: &Scene,
-    folder: &Path,
+    (folder, instead): (&Path, Begin),
     program: &str,
     threads: NonZeroUsize,
 ) -> Result<Observed, RunError> {
@@ -73,7 +73,7 @@ pub fn once(
     let runner = match earlier {
         Some(runner) => runner,
         None => {
-            let runner = Runner::begin(scene, folder, Begin::Overwrite)?;
+            let runner = Runner::begin(scene, folder, instead)?;
             replace_inside(&mark, format!("{program}\n").as_bytes(), false)?;
             runner
         }
@@ -171,7 +171,7 @@ mod tests {
         // What a run writes and `once` does not read.
         let end = folder.join("final.data");
         std::fs::remove_file(&end).unwrap();
-        let observed = once(scene, folder, program, THREADS).unwrap();
+        let observed = once(scene, (folder, Begin::Overwrite), program, THREADS).unwrap();
         let alone = tempfile::tempdir().unwrap();
         assert_eq!(observed.0, anew(scene, alone.path(), THREADS).unwrap().0);
         assert_eq!(sessions(folder), [0]);
@@ -183,8 +183,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path();
         let first = fluid(SOFT, &[]);
-        once(&first, out, "psidpd 1", THREADS).unwrap();
+        once(&first, (out, Begin::New), "psidpd 1", THREADS).unwrap();
         let again = |scene: &Scene, program| is_made_again(scene, out, program);
+        // Nothing is replaced without leave.
+        let refused = once(&first, (out, Begin::New), "psidpd 2", THREADS).unwrap_err();
+        assert!(matches!(refused, RunError::Finished { .. }), "{refused}");
         assert!(!again(&first, "psidpd 1"));
         // A character of the program, the scene or the model, and back; a title is no input.
         assert!(again(&first, "psidpd 2") && !again(&first, "psidpd 2"));
@@ -227,7 +230,7 @@ mod tests {
             drop(runner);
             std::fs::write(out.join(MADE_BY), "psidpd 1\n").unwrap();
             let scene = fluid(SOFT, &["output.thermo=1", &format!("seed={seed}")]);
-            let observed = once(&scene, &out, program, THREADS).unwrap();
+            let observed = once(&scene, (&out, Begin::Overwrite), program, THREADS).unwrap();
             assert_eq!(observed.0 == whole.0, seed == 1);
             assert_eq!(sessions(&out), begins, "{program} {seed}");
         }
