@@ -59,6 +59,7 @@ impl Image {
 
     /// Encodes as [`Image::to_png`] in a small part of the time, in a larger file.
     pub fn to_png_fast(&self) -> Result<Vec<u8>, png::EncodingError> {
+        // Of all filters this one makes the smallest files; the choice of one for each row makes them no smaller, and takes twice the time.
         Image::encode(std::slice::from_ref(self), 1, png::Compression::Fast, png::Filter::Paeth)
     }
 
@@ -74,7 +75,7 @@ impl Image {
     /// Encodes an animated PNG file that repeats forever, with `per_second` frames in a second; one image gives a plain
     /// PNG. Programs that support only plain PNG show the first image.
     pub fn to_apng(images: &[Image], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
-        // The highest level takes three times as long, for files smaller by 0 to 5 %.
+        // The highest level takes three times as long, for files smaller by 0 to 5 %; a choice of filters makes them larger by 1 to 15 %.
         Image::encode(images, per_second, png::Compression::Balanced, png::Filter::Sub)
     }
 
