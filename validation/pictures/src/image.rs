@@ -59,7 +59,8 @@ impl Image {
 
     /// Encodes as [`Image::to_png`] in a small part of the time, in a larger file.
     pub fn to_png_fast(&self) -> Result<Vec<u8>, png::EncodingError> {
-        Image::encode(std::slice::from_ref(self), 1, png::Compression::Fast)
+        // Of all filters this one makes the smallest files; the choice of one for each row makes them no smaller, and takes twice the time.
+        Image::encode(std::slice::from_ref(self), 1, png::Compression::Fast, png::Filter::Paeth)
     }
 
     /// The first image of an animation, whose images must have one size.
@@ -74,14 +75,15 @@ impl Image {
     /// Encodes an animated PNG file that repeats forever, with `per_second` frames in a second; one image gives a plain
     /// PNG. Programs that support only plain PNG show the first image.
     pub fn to_apng(images: &[Image], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
-        // The highest level takes three times as long, for files smaller by 0 to 5 %.
-        Image::encode(images, per_second, png::Compression::Balanced)
+        // The highest level takes three times as long, for files smaller by 0 to 5 %; a choice of filters makes them larger by 1 to 15 %.
+        Image::encode(images, per_second, png::Compression::Balanced, png::Filter::Sub)
     }
 
     fn encode(
         images: &[Image],
         per_second: u16,
         compression: png::Compression,
+        filter: png::Filter,
     ) -> Result<Vec<u8>, png::EncodingError> {
         let wrong = |what| std::io::Error::new(std::io::ErrorKind::InvalidInput, what);
         let first = Image::first_of(images).map_err(wrong)?;
@@ -90,6 +92,7 @@ impl Image {
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(compression);
+        encoder.set_filter(filter);
         if images.len() > 1 {
             encoder.set_animated(images.len() as u32, 0)?;
             encoder.set_frame_delay(1, per_second.max(1))?;

@@ -1,5 +1,5 @@
 use super::Image;
-use super::balls::Balls;
+use super::balls::{Ball, FINER, Point, draw};
 use super::colour::{Rgb, mix, of_species};
 use super::projection::{Projection, View};
 use psidpd_formats::Frame;
@@ -28,10 +28,7 @@ impl ParticleOptions {
     }
 }
 
-/// Pixels are computed at this many times the resolution, and averaged.
-const FINER: usize = 2;
 const WHITE: Rgb = [255; 3];
-const EDGE: Rgb = [0x70, 0x70, 0x70];
 
 /// Draws particles as shaded balls, nearer ones before farther ones, with the edges of the box. The middle of
 /// the foremost ball has exactly the colour of its species; farther balls fade.
@@ -46,11 +43,10 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
     // Along an axis the picture ends with the box. In the oblique view particles at corners extend beyond the box.
     let margin = if view == View::Oblique { radius } else { 0.0 };
     let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size, margin);
-    let [width, height] = projection.size.map(|s| s * FINER);
     let fine = FINER as f64;
     // A particle smaller than a pixel would flicker as it moves.
     let pixels = (radius * projection.scale * fine).max(0.75 * fine);
-    let mut balls = Balls::new([width, height], pixels, pixels / fine / projection.scale);
+    let mut shown = Vec::with_capacity(frame.len());
     let fades = frame.dimensions == 3 && options.slice.is_none();
     for (x, colour) in frame.x.iter().zip(colours) {
         let toward = projection.toward(*x) - projection.middle();
@@ -60,51 +56,45 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
         }
         let ([across, down], near) = projection.place(*x);
         let colour = if fades { mix(*colour, WHITE, 0.45 * (1.0 - near).clamp(0.0, 1.0)) } else { *colour };
-        balls.add([across * fine, down * fine], toward, colour);
+        let at = [across, down].map(|c| (c * fine) as f32);
+        shown.push(Ball { at, toward: toward as f32, colour });
     }
-    let mut canvas = Canvas { image: balls.shaded(), depth: balls.depth };
-    canvas.edges(frame, &projection);
-    (canvas.image.reduced(FINER), projection)
+    let reach = pixels / fine / projection.scale;
+    let image = draw(projection.size, pixels as f32, reach as f32, shown, &edges(frame, &projection));
+    (image, projection)
 }
 
-struct Canvas {
-    image: Image,
-    /// The position of the surface in each pixel along the line of sight, from the middle of the box; larger is nearer to the viewer.
-    depth: Vec<f32>,
-}
-
-impl Canvas {
-    /// Draws the edges of the box, hidden behind particles.
-    fn edges(&mut self, frame: &Frame, projection: &Projection) {
-        let fine = FINER as f64;
-        for c in 0..1usize << frame.dimensions {
-            for k in (0..frame.dimensions).filter(|k| (c >> k) & 1 == 0) {
-                let end = |c: usize| frame.domain.point([0, 1, 2].map(|k| ((c >> k) & 1) as f64));
-                let (a, b) = (end(c), end(c | 1 << k));
-                let ([ax, ay], [bx, by]) = (projection.place(a).0, projection.place(b).0);
-                let steps = (2.0 * fine * (ax - bx).hypot(ay - by)).ceil().max(1.0) as usize;
-                for s in 0..=steps {
-                    let t = s as f64 / steps as f64;
-                    let point: [f64; 3] = std::array::from_fn(|k| a[k] + t * (b[k] - a[k]));
-                    let [x, y] = projection.place(point).0.map(|c| c * fine);
-                    let toward = (projection.toward(point) - projection.middle()) as f32;
-                    // The line is two fine pixels wide, so it is one pixel wide in the reduced image.
-                    for (dx, dy) in [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (-1.0, -1.0)] {
-                        let x = (x + dx).clamp(0.0, (self.image.width - 1) as f64) as usize;
-                        let y = (y + dy).clamp(0.0, (self.image.height - 1) as f64) as usize;
-                        if toward > self.depth[y * self.image.width + x] {
-                            self.image.blend(x, y, EDGE, 0.5);
-                        }
-                    }
+/// The edges of the box.
+fn edges(frame: &Frame, projection: &Projection) -> Vec<Point> {
+    let fine = FINER as f64;
+    let mut points = Vec::new();
+    for c in 0..1usize << frame.dimensions {
+        for k in (0..frame.dimensions).filter(|k| (c >> k) & 1 == 0) {
+            let end = |c: usize| frame.domain.point([0, 1, 2].map(|k| ((c >> k) & 1) as f64));
+            let (a, b) = (end(c), end(c | 1 << k));
+            let ([ax, ay], [bx, by]) = (projection.place(a).0, projection.place(b).0);
+            let steps = (2.0 * fine * (ax - bx).hypot(ay - by)).ceil().max(1.0) as usize;
+            for s in 0..=steps {
+                let t = s as f64 / steps as f64;
+                let point: [f64; 3] = std::array::from_fn(|k| a[k] + t * (b[k] - a[k]));
+                let [x, y] = projection.place(point).0.map(|c| c * fine);
+                let toward = (projection.toward(point) - projection.middle()) as f32;
+                // The line is two fine pixels wide, so it is one pixel wide in the picture.
+                for (dx, dy) in [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (-1.0, -1.0)] {
+                    let most = projection.size.map(|n| (n * FINER - 1) as f64);
+                    let at = [(x + dx).clamp(0.0, most[0]) as usize, (y + dy).clamp(0.0, most[1]) as usize];
+                    points.push(Point { at, toward });
                 }
             }
         }
     }
+    points
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::balls::GREY;
     use psidpd_core::engine::PeriodicBox;
 
     fn frame<'a>(
@@ -147,7 +137,7 @@ mod tests {
         assert_eq!(at(&image, [across + 1.1 * radius, down]), WHITE);
         assert_ne!(at(&image, [across + 0.5 * radius, down]), WHITE);
         assert_eq!((image.width, image.height), (640, 640));
-        assert!(distance(image.get(320, 0).unwrap(), EDGE) < 100, "{:?}", image.get(320, 0));
+        assert!(distance(image.get(320, 0).unwrap(), GREY) < 100, "{:?}", image.get(320, 0));
     }
 
     #[test]
