@@ -73,7 +73,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let case = super::cases().into_iter().find(|case| case.id == id).unwrap();
         let folder = folder.path().join(id);
-        let context = Context { size: Size::Quick, folder, threads: NonZeroUsize::MIN, existing: Existing::Keep };
+        let context =
+            Context { size: Size::Quick, folder, threads: NonZeroUsize::MIN, existing: Existing::Keep };
         let outcome = Fault::during(fault, || case.run(&context)).unwrap();
         outcome.values.iter().filter(|value| !value.passes()).map(|value| value.name.clone()).collect()
     }
