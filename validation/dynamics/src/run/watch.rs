@@ -156,10 +156,14 @@ impl Watch {
         looks: bool,
     ) -> Result<(), RunError> {
         let due = looks && looks_at_forces(stage, done);
+        // Monte Carlo draws velocities at kT, so their temperature reveals no error.
+        let has_time = stage.integrator.has_time();
+        if !has_time && !due {
+            return Ok(());
+        }
         let piece = piece(simulation, done);
-        if !stage.integrator.has_time() {
-            // Monte Carlo draws velocities at kT, so their temperature reveals no error.
-            self.configurational.extend(due.then(|| configurational(simulation, piece.as_ref())).flatten());
+        if !has_time {
+            self.configurational.extend(configurational(simulation, piece.as_ref()));
             return Ok(());
         }
         let Some(warmth) = simulation.warmth(stage.dt, piece.as_ref())? else { return Ok(()) };
