@@ -9,6 +9,7 @@ use crate::trial::{Composition, Piece, percent, two_digits};
 use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
+use psidpd_observe::piece::Piece as Part;
 use serde::Serialize;
 use std::fmt;
 
@@ -60,7 +61,7 @@ impl Advice {
         }
         let piece = piece(simulation, 1);
         let drag = simulation.warmth(stage.dt, piece.as_ref()).ok()??.rate;
-        let range = simulation.model().at(simulation.kt()).ok()?.cutoff();
+        let range = simulation.engine().plan().cutoff();
         let crossing = crossing(simulation.kt(), &simulation.state().mass, range);
         let rates = Rates { frequency: frequency(simulation, piece.as_ref())?, drag, crossing };
         let errors = stage.integrator.properties().accuracy.errors(stage.dt, rates);
@@ -136,7 +137,7 @@ fn densest(simulation: &Simulation) -> Vec<f64> {
 }
 
 /// The root mean square frequency of the particles of a piece, or of all; `None` if the forces have no Laplacian.
-fn frequency(simulation: &Simulation, piece: Option<&psidpd_observe::piece::Piece>) -> Option<f64> {
+fn frequency(simulation: &Simulation, piece: Option<&Part>) -> Option<f64> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
     if configurational::missing(&fluid, &simulation.state().domain).is_some() {
         return None;

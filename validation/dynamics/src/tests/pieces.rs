@@ -11,6 +11,7 @@ use psidpd_observe::configurational::{mean_square_frequency, sums, sums_of_block
 use psidpd_observe::frame::{Frame, View};
 use psidpd_observe::piece::Piece;
 
+const MIXTURE: &str = include_str!("../../../models/huggins.toml");
 const PLANE: &str = include_str!("../../../models/van-der-waals-2d.toml");
 
 /// Particles at random, of two masses where there are two species.
@@ -100,7 +101,7 @@ fn weights_fall_by_their_gradient() {
 }
 
 /// Temperature and rate of the thermostat in a piece are those of all pairs, weighted alike: in both precisions of the engine, in a tilted
-/// box, in the plane, and where many particles never move.
+/// box, in the plane, of a mixture of two masses, and where many particles never move.
 #[test]
 fn the_thermostat_sees_a_piece_as_the_whole() {
     for (model, space, density, precision) in [
@@ -108,8 +109,13 @@ fn the_thermostat_sees_a_piece_as_the_whole() {
         (SET6, "lengths = [11.0, 12.0, 13.0] # tilted", 3.0, Precision::Double),
         (SET6, "lengths = [5.0, 6.0, 40.0]", 3.0, Precision::Mixed),
         (PLANE, "lengths = [16.0, 18.0]", 20.0, Precision::Double),
+        (MIXTURE, "lengths = [12.0, 12.0, 12.0]", 4.0, Precision::Mixed),
     ] {
         let (mut simulation, _) = crowd(model, space, density);
+        if model == MIXTURE {
+            let state = State { mass: vec![0.5, 3.0], ..simulation.state().clone() };
+            simulation = Simulation::new(simulation.model(), 0.7, state, 5).unwrap();
+        }
         if space.ends_with("tilted") {
             let (domain, x) = tilted(&simulation);
             let state = State { domain, x, ..simulation.state().clone() };

@@ -176,6 +176,25 @@ pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String
 mod tests {
     use super::*;
 
+    /// Hours of another scene are not replaced without leave; a minute of one is.
+    #[test]
+    fn runs_of_full_size_are_replaced_with_leave_alone() {
+        let of = |size, existing, seed: u64| {
+            let folder = tempfile::tempdir().unwrap();
+            let context =
+                Context { size, folder: folder.path().into(), threads: NonZeroUsize::MIN, existing };
+            let run = |seed: u64| {
+                let changes =
+                    ["box=4.0", "initial.density=3.0", "equilibrate=1", "steps=40", &format!("seed={seed}")];
+                context.scene("run", crate::shipped::STANDARD, run::HOMOGENEOUS, &changes)
+            };
+            run(1).unwrap();
+            run(seed).is_ok()
+        };
+        assert!(of(Size::Full, Existing::Keep, 1) && !of(Size::Full, Existing::Keep, 2));
+        assert!(of(Size::Full, Existing::Replace, 2) && of(Size::Quick, Existing::Keep, 2));
+    }
+
     #[test]
     fn a_scene_is_changed_where_the_path_leads_and_nowhere_else() {
         let scene = "model = \"m.toml\"\nsteps = 1\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 3\n[output]\nthermo = 4\n";
