@@ -10,8 +10,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 /// Size of a large page in bytes.
 const PAGE: usize = 2 << 20;
 
-/// The allocator of the system, except that arrays of a large page or more begin at one, and ask for all that they fill. What is left at
-/// their end stays in small pages: of arrays of each plane, some megabytes long, it is a third.
+/// The allocator of the system, except that arrays of a large page or more are mapped by themselves: they begin at a large page, and ask for
+/// all that they fill. What is left at their end stays in small pages: of arrays of each plane, some megabytes long, it is a third. Their memory goes
+/// back to the system when they are released; the system's allocator would keep that of lists that grew, a sixth of all.
 pub struct LargePages;
 
 /// The layout of an array that fills large pages; `None` for other arrays.
@@ -22,30 +23,90 @@ fn in_pages(layout: Layout) -> Option<Layout> {
     Layout::from_size_align(layout.size(), layout.align().max(PAGE)).ok()
 }
 
-// SAFETY: all memory is the system allocator's, which gets the same layout at allocation and release:
-// it is a function of the caller's layout alone.
+#[cfg(target_os = "linux")]
+mod mapped {
+    use super::{Layout, PAGE};
+    use rustix::mm::{Advice, MapFlags, ProtFlags, madvise, mmap_anonymous, munmap};
+    use std::ptr::null_mut;
+
+    /// Size of a small page in bytes, or a multiple of it.
+    const SMALL: usize = 1 << 16;
+
+    /// Maps zeros for an array that fills large pages.
+    ///
+    /// # Safety
+    /// The size of the layout is not zero.
+    pub unsafe fn alloc(layout: Layout) -> *mut u8 {
+        let size = layout.size().next_multiple_of(SMALL);
+        let Some(all) = size.checked_add(layout.align()) else { return null_mut() };
+        // SAFETY: the new mapping overlaps nothing.
+        let mapped =
+            unsafe { mmap_anonymous(null_mut(), all, ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE) };
+        let Ok(mapped) = mapped else { return null_mut() };
+        let before = mapped.cast::<u8>().align_offset(layout.align());
+        let behind = all - before - size;
+        // SAFETY: both ends are parts of the mapping that nothing uses, and whole pages; the advice does not change what memory contains.
+        unsafe {
+            let first = mapped.cast::<u8>().add(before);
+            if before > 0 {
+                let _ = munmap(mapped, before);
+            }
+            if behind > 0 {
+                let _ = munmap(first.add(size).cast(), behind);
+            }
+            // Without large pages the program is slower, but correct.
+            let _ = madvise(first.cast(), layout.size() / PAGE * PAGE, Advice::LinuxHugepage);
+            first
+        }
+    }
+
+    /// # Safety
+    /// The memory is that of [`alloc`] for this layout.
+    pub unsafe fn dealloc(memory: *mut u8, layout: Layout) {
+        // SAFETY: the caller promises a whole mapping.
+        let _ = unsafe { munmap(memory.cast(), layout.size().next_multiple_of(SMALL)) };
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod mapped {
+    use super::{GlobalAlloc, Layout, System};
+
+    /// # Safety
+    /// The size of the layout is not zero.
+    pub unsafe fn alloc(layout: Layout) -> *mut u8 {
+        // SAFETY: the caller promises a size above zero.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    /// # Safety
+    /// The memory is that of [`alloc`] for this layout.
+    pub unsafe fn dealloc(memory: *mut u8, layout: Layout) {
+        // SAFETY: the memory is the system allocator's, with this layout.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+// SAFETY: memory is released as it was allocated: how is a function of the caller's layout alone.
 unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let Some(pages) = in_pages(layout) else {
-            // SAFETY: the caller promises a layout of more than zero bytes, as the system's allocator requires.
-            return unsafe { System.alloc(layout) };
-        };
-        // SAFETY: a large layout has more than zero bytes.
-        let memory = unsafe { System.alloc(pages) };
-        #[cfg(target_os = "linux")]
-        if !memory.is_null() {
-            use rustix::mm::{Advice, madvise};
-            // Without large pages the program is slower, but correct.
-            // SAFETY: the advice does not change the contents of memory.
-            let _ = unsafe { madvise(memory.cast(), pages.size() / PAGE * PAGE, Advice::LinuxHugepage) };
-        }
-        memory
+        // SAFETY: the caller promises a layout of more than zero bytes.
+        unsafe { in_pages(layout).map_or_else(|| System.alloc(layout), |pages| mapped::alloc(pages)) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as above; mapped memory is zero.
+        unsafe { in_pages(layout).map_or_else(|| System.alloc_zeroed(layout), |pages| mapped::alloc(pages)) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller promises the layout given to `alloc`, so that this is the layout
-        // given to the system's allocator.
-        unsafe { System.dealloc(memory, in_pages(layout).unwrap_or(layout)) }
+        // SAFETY: the caller promises the layout given to `alloc`, so that this is how the memory was allocated.
+        unsafe {
+            match in_pages(layout) {
+                None => System.dealloc(memory, layout),
+                Some(pages) => mapped::dealloc(memory, pages),
+            }
+        }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {

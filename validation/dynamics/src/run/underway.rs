@@ -257,6 +257,7 @@ impl Runner<'_> {
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state()?;
         self.output.iter_mut().try_for_each(|output| output.frames().wait())?;
+        self.course.ended()?.release_pairs();
         self.write_good("final.data")?;
         write_observations(&self.folder.path, &self.observers.finish())?;
         let summary = self.summary()?;

@@ -297,6 +297,11 @@ impl Simulation {
         done
     }
 
+    /// Gives back the memory of the thermostat's pairs, which the next step would find anew.
+    pub(in crate::run) fn release_pairs(&mut self) {
+        self.thermostat.follow(&self.forces);
+    }
+
     /// Iterations of the thermostat since the start of this session.
     pub fn effort(&self) -> Effort {
         #[cfg(feature = "gpu")]
