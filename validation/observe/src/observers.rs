@@ -135,8 +135,16 @@ impl Observers {
 
     /// The whole state as bytes, for a checkpoint.
     pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.write_to(&mut bytes);
+        bytes
+    }
+
+    /// Replaces bytes by those of [`Observers::to_bytes`], in their memory.
+    pub fn write_to(&self, bytes: &mut Vec<u8>) {
+        bytes.clear();
         // Postcard can write every part of the state; tests write and read every observable.
-        postcard::to_allocvec(self).unwrap_or_default()
+        *bytes = postcard::to_extend(self, std::mem::take(bytes)).unwrap_or_default();
     }
 
     /// Reads the output of [`Observers::to_bytes`]. `self` must request the same observables and have no samples.

@@ -1,4 +1,4 @@
-//! Looks at the configurational temperature of a run, and the pieces of many particles that the watch takes its temperatures of.
+//! Looks at the configurational temperature of a run, of a piece of many particles.
 //!
 //! Each piece is around another particle, so that time and memory of a look are bounded whatever the number of particles.
 
@@ -67,9 +67,12 @@ impl Configurational {
     }
 }
 
-/// Whether a configurational temperature is due.
+/// Whether a configurational temperature is due: in the last two thirds of a stage, which tell whether it is off.
 pub(super) fn looks_at_forces(stage: &Stage, done: u64) -> bool {
-    stage.steps >= WORTH_A_LOOK && stage.level.is_none() && done.is_multiple_of(interval_of_looks(stage))
+    stage.steps >= WORTH_A_LOOK
+        && stage.level.is_none()
+        && done.is_multiple_of(interval_of_looks(stage))
+        && 3 * done > stage.steps
 }
 
 /// The number of steps between configurational temperatures; odd, for steps with and without a thermostat.
@@ -99,16 +102,23 @@ pub(super) fn estimate_configurational(samples: &[Configurational], kt: f64) -> 
     (error.is_finite() && error > 0.0).then_some(found)
 }
 
-/// The sums for a configurational temperature, of a piece or of all particles. `None` if the model has none, or if the blocks are too few for
-/// an error.
-pub(super) fn configurational(simulation: &Simulation, piece: Option<&Piece>) -> Option<Configurational> {
-    let fluid = simulation.model().at(simulation.kt()).ok()?;
-    let missing = configurational::missing(&fluid, &simulation.state().domain).is_some();
+/// The sums for a configurational temperature, of a piece or of all particles, by an evaluator that earlier looks at the same fluid
+/// have left. `None` if the model has none, or if the blocks are too few for an error.
+pub(super) fn configurational(
+    simulation: &Simulation,
+    piece: Option<&Piece>,
+    left: &mut Option<Evaluator>,
+) -> Option<Configurational> {
+    let evaluator = match left.take() {
+        Some(evaluator) => evaluator,
+        None => Evaluator::new(simulation.model().at(simulation.kt()).ok()?).ok()?,
+    };
+    let evaluator = &*left.insert(evaluator);
+    let missing = configurational::missing(&evaluator.fluid, &simulation.state().domain).is_some();
     if simulation.has_body_forces() || missing {
         return None;
     }
-    let evaluator = Evaluator::new(fluid).ok()?;
-    let frame = Frame::of_piece(simulation.view(0.0), piece, &evaluator);
+    let frame = Frame::of_piece(simulation.view(0.0), piece, evaluator);
     let blocks = configurational::sums_of_blocks(&frame);
     let sums = Configurational::of(&blocks);
     (sums.b > 0.0 && blocks.len() > 1).then_some(sums)
@@ -116,10 +126,14 @@ pub(super) fn configurational(simulation: &Simulation, piece: Option<&Piece>) ->
 
 /// A piece of many particles around one that `number` chooses; `None` if there are few.
 pub(super) fn piece(simulation: &Simulation, number: u64) -> Option<Piece> {
-    // A multiple of the golden ratio visits all places evenly.
-    let middle = (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % simulation.len().max(1);
     let range = simulation.engine().plan().cutoff().max(f64::MIN_POSITIVE);
-    Piece::of(simulation.view(0.0).whole(), range, FEW, middle)
+    Piece::of(simulation.view(0.0).whole(), range, FEW, place(number, simulation.len()))
+}
+
+/// One of so many particles that `number` chooses.
+pub(super) fn place(number: u64, particles: usize) -> usize {
+    // A multiple of the golden ratio visits all places evenly.
+    (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % particles.max(1)
 }
 
 #[cfg(test)]

@@ -160,7 +160,7 @@ impl Runner<'_> {
         }
         let deviations = match self.position.done == stage.steps {
             true => {
-                let mut found = self.watch.deviations(stage);
+                let mut found = std::mem::take(&mut self.watch).deviations(stage);
                 let known = found.iter().any(|d| d.thermometer == Thermometer::Configurational);
                 found.extend(self.measured_deviation(stage).filter(|_| !known));
                 found
@@ -205,7 +205,7 @@ impl Runner<'_> {
         good.held = simulation.held();
         good.max_move = simulation.max_move();
         good.out_of_bounds = simulation.out_of_bounds();
-        good.observers = self.observers.to_bytes();
+        self.observers.write_to(&mut good.observers);
         self.output.iter_mut().for_each(Output::note);
         Ok(())
     }

@@ -1,18 +1,20 @@
 //! Watches the temperature of a run: warns if it deviates from its target, and stops a run that stays far too hot.
 //!
-//! The temperature is that of the relative velocities which drag and noise act on, so the motion of a drop or
-//! a flow does not count. Each stage has a number of samples, a long stage one every [`INTERVAL`] steps, at a
-//! hundredth of the cost of the steps; sampling changes no step. The configurational temperature, which is
-//! most sensitive to errors of the forces, is sampled sixty times in a stage of a thousand steps or more, at
-//! most at a twentieth of the cost of the steps; not where an observable measures it with more configurations. Of many particles both are
-//! those of a piece.
+//! Kinetic temperatures are those of the motion within cells, so the motion of a drop or a flow does not count, and no pairs are
+//! searched: of all velocities, as users read it, and of the relative ones along pairs, which drag and noise act on. Each stage has a
+//! number of samples, a long stage one every [`INTERVAL`] steps; sampling changes no step. The configurational temperature, which is
+//! most sensitive to errors of the forces, is sampled up to forty times in the last two thirds of a stage of a thousand steps or
+//! more; not where an observable measures it with more configurations. Of many particles it is that of a piece.
 //!
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
 
-use super::looks::{Configurational, configurational, estimate_configurational, looks_at_forces, piece};
+use super::looks::{
+    Configurational, configurational, estimate_configurational, looks_at_forces, piece, place,
+};
 use super::{RunError, Simulation};
 use crate::scene::Stage;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::{Estimate, Measured, difference};
 use std::fmt;
 
@@ -39,6 +41,8 @@ const ALARM: f64 = 1e-3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
     Kinetic,
+    /// The relative velocities along pairs.
+    Pairs,
     Configurational,
 }
 
@@ -67,19 +71,25 @@ impl fmt::Display for Deviation {
             );
         };
         let (what, cause) = match thermometer {
-            Thermometer::Kinetic => ("kinetic", "the thermostat's and the forces' error at this step"),
-            Thermometer::Configurational => ("configurational", "the forces' error at this step"),
+            Thermometer::Kinetic => {
+                ("kinetic temperature", "the thermostat's and the forces' error at this step")
+            }
+            Thermometer::Pairs => (
+                "kinetic temperature of relative velocities along pairs",
+                "the thermostat's and the forces' error at this step",
+            ),
+            Thermometer::Configurational => ("configurational temperature", "the forces' error at this step"),
         };
         if *falls {
             return write!(
                 f,
-                "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT and still falls: the start has not \
+                "stage \"{stage}\": the {what} is {mean:.3} +- {error:.3} kT and still falls: the start has not \
                  settled; give the stage more steps"
             );
         }
         write!(
             f,
-            "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
+            "stage \"{stage}\": the {what} is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
              dt, or an integrator that allows it (docs/integrators.md)"
         )
     }
@@ -105,7 +115,11 @@ impl Deviation {
 pub(super) struct Watch {
     /// The kinetic temperature of each sample, in units of kT.
     kinetic: Vec<f64>,
+    /// That of the relative velocities along pairs.
+    pairs: Vec<f64>,
     configurational: Vec<Configurational>,
+    /// Of the present stage, with arrays of pairs for the next look.
+    evaluator: Option<Evaluator>,
     hot: Option<Hot>,
 }
 
@@ -155,26 +169,35 @@ impl Watch {
         done: u64,
         looks: bool,
     ) -> Result<(), RunError> {
-        let due = looks && looks_at_forces(stage, done);
         // Monte Carlo draws velocities at kT, so their temperature reveals no error.
         let has_time = stage.integrator.has_time();
-        if !has_time && !due {
+        if has_time && !simulation.has_pair_thermostat() {
             return Ok(());
         }
-        let piece = piece(simulation, done);
-        if !has_time {
-            self.configurational.extend(configurational(simulation, piece.as_ref()));
-            return Ok(());
+        if looks && looks_at_forces(stage, done) {
+            let piece = piece(simulation, done);
+            self.configurational.extend(configurational(simulation, piece.as_ref(), &mut self.evaluator));
+            // Looks at a piece are rare among the steps of so many particles, so their memory is not kept.
+            self.evaluator.take_if(|_| piece.is_some());
         }
-        let Some(warmth) = simulation.warmth(stage.dt, piece.as_ref())? else { return Ok(()) };
-        let ratio = warmth.kt / stage.kt;
-        self.kinetic.push(ratio);
-        if due && let Some(sums) = configurational(simulation, piece.as_ref()) {
-            self.configurational.push(sums);
+        let first = place(done, simulation.len());
+        let Some(found) = simulation.temperatures_in_cells(first).filter(|_| has_time) else { return Ok(()) };
+        let kt = found.all;
+        self.kinetic.push(kt / stage.kt);
+        if found.pairs.is_finite() {
+            self.pairs.push(found.pairs / stage.kt);
         }
         // A body force or a wall may drive a flow that is hot by itself.
         let driven = stage.body_forces && simulation.has_body_forces() || simulation.has_moving_walls();
-        if ratio <= FAR_OFF || driven {
+        if kt <= FAR_OFF * stage.kt || driven {
+            self.hot = None;
+            return Ok(());
+        }
+        // The relative velocities of pairs, which drag and noise act on, are also free of steep flow.
+        let piece = piece(simulation, done);
+        let Some(warmth) = simulation.warmth(stage.dt, piece.as_ref())? else { return Ok(()) };
+        let ratio = warmth.kt / stage.kt;
+        if ratio <= FAR_OFF {
             self.hot = None;
             return Ok(());
         }
@@ -192,18 +215,19 @@ impl Watch {
         Ok(())
     }
 
-    pub fn deviations(&self, stage: &Stage) -> Vec<Deviation> {
+    /// The deviations that a stage ends with. The watch goes with its memory.
+    pub fn deviations(self, stage: &Stage) -> Vec<Deviation> {
         if stage.level.is_some() {
             // A level of a ramp is not in equilibrium.
             return Vec::new();
         }
         let kinetic = &self.kinetic[self.kinetic.len() / 3..];
-        let configurational = &self.configurational[self.configurational.len() / 3..];
         let cools = falls(kinetic);
         let dt = stage.integrator.has_time().then_some(stage.dt);
         let found = [
             (Thermometer::Kinetic, estimate(kinetic), cools),
-            (Thermometer::Configurational, estimate_configurational(configurational, stage.kt), false),
+            (Thermometer::Pairs, estimate(&self.pairs[self.pairs.len() / 3..]), false),
+            (Thermometer::Configurational, estimate_configurational(&self.configurational, stage.kt), false),
         ];
         let deviation = |(thermometer, found, falls): (Thermometer, Option<Estimate>, bool)| {
             // A falling temperature scatters by its trend; it counts as too high if every sample was too high.
@@ -211,7 +235,10 @@ impl Watch {
                 found.filter(|found| is_off(found) || falls && is_above(kinetic))?;
             Some(Deviation { stage: stage.name.clone(), thermometer, mean, error, falls, dt })
         };
-        found.into_iter().filter_map(deviation).collect()
+        let mut found: Vec<_> = found.into_iter().filter_map(deviation).collect();
+        // If the kinetic temperature is off, so is that of pairs.
+        found.dedup_by_key(|found| found.thermometer == Thermometer::Configurational);
+        found
     }
 }
 
@@ -526,6 +553,13 @@ mod tests {
         assert_eq!(kinetic(scattered(1.01)).deviations(&usual), []);
         assert_eq!(kinetic((0..30).map(|_| 3.0).chain(scattered(1.0))).deviations(&usual), []);
         assert_eq!(kinetic([9.0, 1.5]).deviations(&usual), []);
+        // Pairs alone may be off; where all velocities are, nothing is said of them.
+        for (mean, thermometer) in [(1.0, Thermometer::Pairs), (0.95, Thermometer::Kinetic)] {
+            let watch = Watch { pairs: scattered(0.95).collect(), ..kinetic(scattered(mean)) };
+            let found = watch.deviations(&usual);
+            let [one] = &found[..] else { panic!("{found:?}") };
+            assert!(one.thermometer == thermometer && (one.mean - 0.95).abs() < 1e-12, "{one:?}");
+        }
     }
 
     /// A tenth of kT = 2 is off, 1 % is not, and a temperature without error says nothing.
@@ -560,12 +594,13 @@ mod tests {
             let of = stage(steps, integrator);
             (1..=steps).find(|done| looks_at_forces(&of, *done))
         };
-        // Every 250 evaluations of forces, or sixty times, or every 1000 steps; odd.
-        for (steps, expected) in [(999, None), (1000, Some(251)), (30_000, Some(501)), (300_000, Some(1001))]
+        // Every 250 evaluations of forces, or sixty times, or every 1000 steps; odd; from a third of the stage on.
+        for (steps, expected) in
+            [(999, None), (1000, Some(502)), (30_000, Some(10_020)), (300_000, Some(100_100))]
         {
             assert_eq!(looks(steps, "velocity-verlet"), expected);
         }
-        assert_eq!((looks(1000, "two-stage"), looks(30_000, "two-stage")), (Some(125), Some(501)));
+        assert_eq!((looks(1000, "two-stage"), looks(30_000, "two-stage")), (Some(375), Some(10_020)));
         let level = Stage { level: Some([1, 3]), ..stage(30_000, Integrator::VelocityVerlet) };
         assert!(!(1..=30_000).any(|done| looks_at_forces(&level, done)));
     }

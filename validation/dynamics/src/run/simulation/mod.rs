@@ -4,6 +4,7 @@
 //! the `forces` between them, the `thermostat` where it is not part of these forces, and the `motion`. An
 //! integrator composes a step of the operators in `motion` and `thermostat`.
 
+mod cells;
 mod course;
 mod device;
 mod displaced;

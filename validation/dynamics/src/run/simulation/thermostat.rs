@@ -158,6 +158,11 @@ impl Simulation {
         Ok(())
     }
 
+    /// Whether drag and noise act.
+    pub fn has_pair_thermostat(&self) -> bool {
+        self.thermostat.on && self.thermostat.pairs.is_some()
+    }
+
     /// Sets whether steps before the thermostat acts again ask for its virial, which then is that of its mean force since it last
     /// acted. Trajectories do not depend on it.
     pub fn hold_impulses(&mut self, on: bool) {
