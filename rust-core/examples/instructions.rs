@@ -36,7 +36,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat|listed|ranked [PARTICLES [THREADS]]]"
+                "{fault}\nusage: instructions mdpd|dpd|formula|colloid|two-sizes mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [FACES|thermostat|listed|ranked [PARTICLES [THREADS]]]"
             );
             ExitCode::FAILURE
         }
@@ -83,6 +83,15 @@ fn run(arguments: &[String]) -> Result<(), String> {
         return Ok(());
     }
     let force = match faces(rest.first())? {
+        0 if subject.rare > 0 => {
+            let mut engine = Engine::new(&fluid, settings).map_err(|e| e.to_string())?;
+            let mut cloud = Cloud::new(subject, &fluid, count);
+            for _ in 0..evaluations {
+                cloud.drift();
+                cloud.evaluate_by(&mut engine);
+            }
+            cloud.force
+        }
         0 => {
             let mut cloud = Cloud::new(subject, &fluid, count);
             for _ in 0..evaluations {

@@ -60,13 +60,16 @@ fn compiler() -> String {
 fn instructions_per_particle_and_step_stay_what_they_were() {
     let program = engine().instructions;
     let mut counts = BTreeMap::new();
-    for fluid in ["mdpd", "dpd", "formula"] {
+    for fluid in ["mdpd", "dpd", "formula", "colloid", "two-sizes"] {
+        // Ranks have the sweep of all ranges.
+        let mixture = ["colloid", "two-sizes"].contains(&fluid);
         for precision in ["mixed", "double"] {
             for instructions in ["portable", "avx2"] {
                 // The additional cost of ghosts hardly depends on the instruction set. The thermostat apart from the
                 // forces is counted on its own, and together with the forces at the same positions, without drag and noise: also
                 // on a rank with ghosts.
                 let more = match instructions {
+                    _ if mixture => &[None][..],
                     "avx2" => &[None, Some("6"), Some("thermostat"), Some("listed"), Some("ranked")][..],
                     _ => &[None],
                 };

@@ -35,12 +35,12 @@ const CORE: &[&[&str]] = &[
     // Particles at cylinders and spheres of matter.
     &["engine::wall_room", "engine::round_flight"],
     &["engine::reflection"],
-    // Pair potentials of rare species with long ranges.
-    &["engine::long_pairs"],
     // The fast engine: one traversal of all cells, without a neighbour list.
     &["engine::sweep::terms", "engine::sweep::times"],
     &["engine::sweep::workspace"],
     &["engine::sweep"],
+    // Pair potentials of rare species with long ranges, beside a sweep.
+    &["engine::long_pairs"],
     // The move of a single particle.
     &["engine::local_energy"],
     // Sums over a list of pairs.

@@ -1,8 +1,8 @@
 //! Fluids and particles that micro-benchmarks and instruction counts share.
 
 use psidpd_core::engine::{
-    Around, Images, Instructions, Particles, PeriodicBox, Precision, Request, Settings, Step, Sweep, Want,
-    noise,
+    Around, Engine, Images, Instructions, Particles, PeriodicBox, Precision, Request, Settings, Step, Sweep,
+    Want, noise,
 };
 use psidpd_core::model::{Fluid, Model};
 
@@ -14,7 +14,28 @@ pub struct Subject {
     pub density: f64,
     /// Time step.
     pub dt: f64,
+    /// Of so many particles one is of the second species; with 0 species alternate.
+    pub rare: usize,
 }
+
+/// Mixtures of particle sizes, whose forces are those of an [`Engine`](psidpd_core::engine::Engine): the sweep leaves long ranges of rare
+/// species to it.
+pub static MIXTURES: [Subject; 2] = [
+    Subject {
+        name: "colloid",
+        text: include_str!("../../../validation/experiments/src/bench/colloid.toml"),
+        density: 3.0,
+        dt: 0.01,
+        rare: 100,
+    },
+    Subject {
+        name: "two-sizes",
+        text: include_str!("../../../validation/experiments/src/bench/two-sizes.toml"),
+        density: 3.0,
+        dt: 0.01,
+        rare: 10,
+    },
+];
 
 /// Warren's many-body fluid, standard DPD, and a fluid with two species and two densities as formulas.
 pub static SUBJECTS: [Subject; 3] = [
@@ -23,18 +44,21 @@ pub static SUBJECTS: [Subject; 3] = [
         text: include_str!("../../../validation/models/warren2003-set6.toml"),
         density: 6.05,
         dt: 0.01,
+        rare: 0,
     },
     Subject {
         name: "dpd",
         text: include_str!("../../../validation/models/standard-dpd.toml"),
         density: 3.0,
         dt: 0.04,
+        rare: 0,
     },
     Subject {
         name: "formula",
         text: include_str!("../../../validation/experiments/src/bench/two-species.toml"),
         density: 6.05,
         dt: 0.01,
+        rare: 0,
     },
 ];
 
@@ -52,7 +76,7 @@ pub fn choose(
     precision: &str,
     instructions: &str,
 ) -> Result<(&'static Subject, Precision, Instructions), String> {
-    let subject = SUBJECTS.iter().find(|s| s.name == fluid).ok_or("no such fluid")?;
+    let subject = SUBJECTS.iter().chain(&MIXTURES).find(|s| s.name == fluid).ok_or("no such fluid")?;
     let (_, precision) =
         Precision::ALL.into_iter().find(|(name, _)| *name == precision).ok_or("no such precision")?;
     let (_, set) = Instructions::ALL
@@ -93,13 +117,17 @@ impl Cloud {
         };
         // Variance 1: kT = 1.
         let velocity = |k: usize| std::array::from_fn(|c| 12f64.sqrt() * (uniform(6 * k + 3 + c) - 0.5));
+        let kind = |k: usize| match subject.rare {
+            0 => (k % fluid.species.len()) as i32,
+            rare => i32::from(k.is_multiple_of(rare)),
+        };
         Cloud {
             domain: PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3]).expect("a box"),
             edge,
             x: (0..count).map(position).collect(),
             v: (0..count).map(velocity).collect(),
             tag: (1..=count as i32).collect(),
-            kind: (0..count).map(|k| (k % fluid.species.len()) as i32).collect(),
+            kind: (0..count).map(kind).collect(),
             force: vec![[0.0; 3]; count],
             step: Step { seed: 1, number: 0, dt: subject.dt },
         }
@@ -137,16 +165,23 @@ impl Cloud {
 
     /// One evaluation of all forces, with noise.
     pub fn evaluate(&mut self, sweep: &mut Sweep) {
+        self.forces(|domain, request, force| sweep.evaluate(domain, request, force, false));
+    }
+
+    /// The same by an engine.
+    #[allow(dead_code)] // Not every user of this module has one.
+    pub fn evaluate_by(&mut self, engine: &mut Engine) {
+        self.forces(|domain, request, force| engine.forces(domain, request, force, false));
+    }
+
+    fn forces<T, E: std::fmt::Debug>(
+        &mut self,
+        evaluate: impl FnOnce(&PeriodicBox, &Request, &mut [[f64; 3]]) -> Result<T, E>,
+    ) {
         self.step.number += 1;
         let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
-        sweep
-            .evaluate(
-                &self.domain,
-                &Request { particles, v: &self.v, step: Some(self.step), want: Want::FORCES },
-                &mut self.force,
-                false,
-            )
-            .expect("forces");
+        let request = Request { particles, v: &self.v, step: Some(self.step), want: Want::FORCES };
+        evaluate(&self.domain, &request, &mut self.force).expect("forces");
     }
 }
 

@@ -16,7 +16,7 @@
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
-//! long_pairs     pair potentials of rare species with long ranges, apart from the sweep
+//! long_pairs/    pair potentials of rare species with long ranges, apart from the sweep
 //! sweep_path     the sweep, special pairs, and long pairs
 //! facade         Engine: chooses between the two, or a GPU, for each evaluation, and says which and why (path)
 //! ```

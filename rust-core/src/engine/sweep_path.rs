@@ -173,8 +173,9 @@ impl Evaluate for SweepPath {
         self.begin(Around { domain, images: &[] }, request)?;
         let mut tally = self.sweep.evaluate(domain, request, force, add)?;
         if let Some(long) = &mut self.long {
-            let of = (&**self.sweep.pool(), &self.plan);
-            tally += long.add_forces(of, domain, &request.particles, request.want, force)?;
+            let of = (&**self.sweep.pool(), self.sweep.set(), &self.plan);
+            let particles = (&request.particles, self.sweep.sorted());
+            tally += long.add_forces(of, domain, particles, request.want, force)?;
         }
         if self.corrections.pairs.len() > 0 {
             self.sweep.fetch_slopes(request.particles.owned);

@@ -8,7 +8,10 @@
 //! 3. [`distance_filter`]: each j-cluster is compared with its i-cluster in 16-bit fixed point, and the bits that remain
 //!    become the list of pairs;
 //! 4. [`leave_out`] removes excluded pairs from that list.
+//!
+//! [`around`] finds the particles around single points, within other ranges.
 
+pub mod around;
 pub mod buffers;
 pub mod cell_ranges;
 pub mod clusters;

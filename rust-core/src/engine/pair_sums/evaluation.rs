@@ -4,7 +4,7 @@
 use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
 use super::plane_list::{PairBlock, PlaneList, merge};
-use super::sweep_pairs::SweepPairs;
+use super::sweep_pairs::{Ranges, SweepPairs};
 use crate::engine::components::COMPONENTS;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::Pool;
@@ -24,6 +24,8 @@ pub struct Evaluator {
     pub fluid: Fluid,
     /// A plan with a pass for every density.
     plan: Plan,
+    /// The ranges of the conservative interactions.
+    ranges: Ranges,
     free_energy: FreeEnergy,
     work: Mutex<Work>,
 }
@@ -49,9 +51,10 @@ pub struct Evaluation {
     pub(super) planes: Vec<PlaneList>,
     /// The particles in the range of walls.
     pub near_walls: Vec<NearWall>,
-    /// Range of the conservative interactions.
+    /// Longest range of the conservative interactions, and the shortest one of two species.
     range: f64,
-    /// The distance up to which all pairs are there.
+    shortest: f64,
+    /// The distance up to which pairs with the longest range are there.
     reach: f64,
 }
 
@@ -95,15 +98,16 @@ impl Evaluator {
     pub fn new(fluid: Fluid) -> Result<Evaluator, TooLarge> {
         let free_energy = FreeEnergy::new(&fluid, usize::MAX).map_err(|_| TooLarge)?;
         let work = Mutex::new(Work { search: SweepPairs::new(fluid.dimensions), spare: Vec::new() });
-        Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energy, work, fluid })
+        let ranges = Ranges::conservative(&fluid);
+        Ok(Evaluator { plan: Plan::whole(&fluid)?, ranges, free_energy, work, fluid })
     }
 
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
     /// are not finite do not interact.
     pub fn evaluate(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
-        let range = self.fluid.conservative_range();
-        let reach = range * (1.0 + SLACK);
-        let mut planes = self.planes(pool, x, species, domain, reach);
+        let reach = self.ranges.times(1.0 + SLACK);
+        let mut planes = self.planes(pool, x, species, domain, &reach);
+        let (range, shortest, reach) = (self.ranges.longest(), self.ranges.shortest(), reach.longest());
         let faces = walls::faces(&self.fluid.walls, domain, self.fluid.dimensions);
         let (densities, psi) = self.excess(pool, &mut planes, (x, species), &faces);
         pool.each(&mut planes, |plane| plane.find_forces(&self.plan, &psi.slopes));
@@ -115,12 +119,12 @@ impl Evaluator {
             energy += of_wall;
             near_walls.push(near);
         });
-        Evaluation { energy, densities, psi, excess, planes, near_walls, range, reach }
+        Evaluation { energy, densities, psi, excess, planes, near_walls, range, shortest, reach }
     }
 
     /// Computes the energy `U` only.
     pub fn energy(&self, pool: &Pool, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
-        let planes = self.planes(pool, x, species, domain, self.fluid.conservative_range());
+        let planes = self.planes(pool, x, species, domain, &self.ranges);
         let faces = walls::faces(&self.fluid.walls, domain, self.fluid.dimensions);
         self.energy_of_pairs(pool, planes, (x, species), &faces)
     }
@@ -193,7 +197,7 @@ impl Evaluator {
         range: f64,
         mut visit: impl FnMut(Pair),
     ) {
-        let planes = self.planes(pool, x, &vec![0; x.len()], domain, range);
+        let planes = self.planes(pool, x, &vec![0; x.len()], domain, &Ranges::all(range));
         planes.iter().flat_map(|plane| plane.pairs(range)).for_each(&mut visit);
         self.work().spare.push(planes);
     }
@@ -207,23 +211,24 @@ impl Evaluator {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Finds the pairs, plane by plane; without a plane of cells all of them together.
+    /// Finds the pairs within their ranges, plane by plane; without a plane of cells all pairs within the longest range together.
     fn planes(
         &self,
         pool: &Pool,
         x: &[[f64; 3]],
         species: &[i32],
         domain: &PeriodicBox,
-        range: f64,
+        ranges: &Ranges,
     ) -> Vec<PlaneList> {
         let mut work = self.work();
         let mut planes = work.spare.pop().unwrap_or_default();
-        if !work.search.find(pool, x, species, domain, range, &mut planes) {
+        if !work.search.find(pool, x, species, domain, ranges, &mut planes) {
             let finite = |k: usize| x[k].iter().all(|c| c.is_finite());
             planes.resize_with(1, PlaneList::default);
             let all = &mut planes[0];
             all.clear(species);
             let push = |i, j, d| all.push(i, j, d);
+            let range = ranges.longest();
             BoxSearch::default().find(x, x.len(), finite, domain, self.fluid.dimensions, range, push);
         }
         planes
@@ -312,12 +317,13 @@ impl Evaluation {
         self.planes.iter().map(PlaneList::len)
     }
 
-    /// The pairs closer than a range, if that is at most the range of the conservative interactions.
+    /// The pairs closer than a range, if that is at most the range of the conservative interactions of any two species.
     pub fn pairs_within(&self, range: f64) -> Option<impl Iterator<Item = Pair>> {
-        (range <= self.range).then(|| self.planes.iter().flat_map(move |plane| plane.pairs(range)))
+        (range <= self.shortest).then(|| self.planes.iter().flat_map(move |plane| plane.pairs(range)))
     }
 
-    /// The pairs of a part in the range of the conservative interactions.
+    /// The pairs of a part in the range of the conservative interactions; those that are further apart than the range of their species may
+    /// be missing.
     pub fn pairs_of(&self, part: usize) -> impl Iterator<Item = Pair> {
         self.planes[part].pairs(self.range)
     }
@@ -358,8 +364,35 @@ correction = [0.1, 1.1, 0.01]
 A = { slopes = { n = "0.3*n" }, energy = "n^2" }
 "#;
 
-    const MODELS: [&str; 5] = [
+    /// Ranges that differ by species.
+    const SIZES: &str = r#"
+title = "sizes"
+species = ["A", "B"]
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = 25.0
+range = 0.5
+[[pair]]
+between = ["A", "B"]
+form = "soft"
+strength = 15.0
+range = 0.9
+[[pair]]
+between = ["B", "B"]
+form = "soft"
+strength = -20.0
+range = 1.4
+[[pair]]
+between = ["B", "B"]
+form = "soft"
+strength = 50.0
+range = 0.6
+"#;
+
+    const MODELS: [&str; 6] = [
         BOUNDED,
+        SIZES,
         include_str!("../../../../validation/models/warren2003-set6.toml"),
         include_str!("../../../../validation/models/huggins.toml"),
         include_str!("../../../../validation/models/binary-2d.toml"),
@@ -464,6 +497,26 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
                 assert!((w - v).abs() < 1e-10 * scale, "{domain:?}: {w} {v}");
             }
         }
+    }
+
+    /// Pairs beyond the range of their species are not listed, and a caller who needs all pairs is told so.
+    #[test]
+    fn only_pairs_within_the_ranges_of_their_species_are_listed() {
+        let (evaluator, x, species, domain) = random(SIZES, 15);
+        let found = evaluator.evaluate(&alone(), &x, &species, &domain);
+        let ranges = [[0.5, 0.9], [0.9, 1.4]];
+        let [mut within, mut all] = [0; 2];
+        evaluator.for_each_pair(&alone(), &x, &domain, 1.4, |p| {
+            let [a, b] = [p.i, p.j].map(|k| species[k] as usize);
+            within += usize::from(p.r < ranges[a][b]);
+            all += 1;
+        });
+        let listed = found.parts().sum::<usize>();
+        assert!((within..within + 3).contains(&listed) && all > 2 * within, "{listed} {within} {all}");
+        assert!(found.pairs_within(0.5).is_some() && found.pairs_within(0.6).is_none());
+        let (evaluator, x, species, domain) = random(BOUNDED, 15);
+        let found = evaluator.evaluate(&alone(), &x, &species, &domain);
+        assert!(found.pairs_within(1.0).is_some() && found.pairs_within(1.1).is_none());
     }
 
     /// The energy of a stretched configuration is that of its positions in the stretched box; pairs out of reach are not ignored.

@@ -4,18 +4,74 @@ use super::plane_list::PlaneList;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
 use crate::engine::sweep::{MARGIN, PairLists, Places, PlanePairs, Pool};
+use crate::model::Fluid;
+use crate::model::pair::PairForm;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{ListTerms, WeightTables};
 
+/// The ranges of pairs, by both species.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranges {
+    species: usize,
+    /// Row by row; a single one if all are alike.
+    table: Vec<f64>,
+}
+
+impl Ranges {
+    /// One range for all pairs.
+    pub fn all(range: f64) -> Ranges {
+        Ranges { species: 1, table: vec![range] }
+    }
+
+    /// Those of the conservative interactions of a fluid.
+    pub fn conservative(fluid: &Fluid) -> Ranges {
+        let densities = fluid.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
+        let (of_densities, species) = (densities.fold(0.0, f64::max), fluid.species.len());
+        let mut table = vec![of_densities; species * species];
+        for term in &fluid.pairs {
+            let [a, b] = term.between;
+            for k in [a * species + b, b * species + a] {
+                table[k] = table[k].max(term.potential.range());
+            }
+        }
+        let ranges = Ranges { species, table };
+        if ranges.shortest() == ranges.longest() { Ranges::all(ranges.longest()) } else { ranges }
+    }
+
+    pub fn longest(&self) -> f64 {
+        self.table.iter().copied().fold(0.0, f64::max)
+    }
+
+    pub fn shortest(&self) -> f64 {
+        self.table.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// All of them longer by a factor.
+    pub fn times(&self, factor: f64) -> Ranges {
+        Ranges { table: self.table.iter().map(|range| range * factor).collect(), ..*self }
+    }
+
+    /// Weights greater than 0 within the ranges.
+    fn terms(&self) -> ListTerms {
+        let weights = WeightTables {
+            species: self.species,
+            amplitude: SpeciesPairTable::of(self.table.len(), 1.0),
+            inverse_range: SpeciesPairTable::new(self.table.iter().map(|range| 1.0 / range)),
+            exponent: Exponent::One,
+        };
+        ListTerms::new(weights, MARGIN, false)
+    }
+}
+
 /// Finds pairs in boxes at least twice as wide as their range.
 #[derive(Debug)]
 pub struct SweepPairs {
     lists: PairLists,
     dimensions: usize,
-    kinds: Vec<i32>,
+    alike: Vec<i32>,
     tags: Vec<i32>,
     planes: Vec<PlanePairs>,
 }
@@ -25,36 +81,39 @@ impl SweepPairs {
         SweepPairs {
             lists: PairLists::new(InstructionSet::best(), dimensions),
             dimensions,
-            kinds: Vec::new(),
+            alike: Vec::new(),
             tags: Vec::new(),
             planes: Vec::new(),
         }
     }
 
     /// Finds the pairs of particles at `x` in planes, and returns whether it could: it cannot if a particle may be
-    /// near two images of another, or if a position is not finite. Pairs may be a little beyond the range.
+    /// near two images of another, or if a position is not finite. Pairs may be a little beyond their ranges.
     pub fn find(
         &mut self,
         pool: &Pool,
         x: &[[f64; 3]],
         species: &[i32],
         domain: &PeriodicBox,
-        range: f64,
+        ranges: &Ranges,
         found: &mut Vec<PlaneList>,
     ) -> bool {
-        let SweepPairs { lists, dimensions, kinds, tags, planes } = self;
+        let SweepPairs { lists, dimensions, alike, tags, planes } = self;
+        let range = ranges.longest();
         if !is_wide(domain, *dimensions, range) {
             return false;
         }
         tags.resize(x.len(), 0);
         tags.iter_mut().zip(1..).for_each(|(tag, k)| *tag = k);
-        // All pairs have one range, so that all particles may be of one species.
-        kinds.resize(x.len(), 0);
-        let particles = Particles { x, tag: tags, kind: kinds, owned: x.len() };
+        // Where all pairs have one range all particles may be of one species.
+        alike.resize(x.len(), 0);
+        let kind = if ranges.species > 1 { species } else { alike };
+        let particles = Particles { x, tag: tags, kind, owned: x.len() };
         let around = Around { domain, images: &[] };
         // In a long region the search would need a margin of its own.
-        let terms = |_| all_within(range);
-        if lists.find(pool, around, &particles, &[0], terms, [range, MARGIN], planes) != Ok(false) {
+        let kinds: Vec<i32> = (0..ranges.species as i32).collect();
+        let terms = |_| ranges.terms();
+        if lists.find(pool, around, &particles, &kinds, terms, [range, MARGIN], planes) != Ok(false) {
             return false;
         }
         let places = Places::new(*dimensions, domain, x, lists.order());
@@ -69,17 +128,6 @@ impl SweepPairs {
 pub fn is_wide(domain: &PeriodicBox, dimensions: usize, range: f64) -> bool {
     let wide = |k: usize| !domain.periodic()[k] || domain.height(k) > 2.0 * range * (1.0 + MARGIN);
     range > 0.0 && range.is_finite() && (0..dimensions).all(wide)
-}
-
-/// Weights greater than 0 within the range.
-fn all_within(range: f64) -> ListTerms {
-    let weights = WeightTables {
-        species: 1,
-        amplitude: SpeciesPairTable::of(1, 1.0),
-        inverse_range: SpeciesPairTable::of(1, 1.0 / range),
-        exponent: Exponent::One,
-    };
-    ListTerms::new(weights, MARGIN, false)
 }
 
 #[cfg(test)]
@@ -114,7 +162,14 @@ mod tests {
             x[21] = [x[20][0] + 1e-9, x[20][1], x[20][2]];
             let species: Vec<i32> = (0..x.len() as i32).map(|k| k % 2).collect();
             let (pool, mut planes) = (Pool::new(NonZeroUsize::new(2).unwrap()), Vec::new());
-            assert!(SweepPairs::new(dimensions).find(&pool, &x, &species, &domain, 0.9, &mut planes));
+            assert!(SweepPairs::new(dimensions).find(
+                &pool,
+                &x,
+                &species,
+                &domain,
+                &Ranges::all(0.9),
+                &mut planes
+            ));
             let signed =
                 |i: usize, j: usize, d: [f64; 3]| if i < j { (i, j, d) } else { (j, i, d.map(|c| -c)) };
             let pairs = planes.iter().flat_map(|plane| plane.pairs(0.9));
@@ -137,9 +192,9 @@ mod tests {
         let pool = &Pool::new(NonZeroUsize::MIN);
         let wide = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
         let narrow = PeriodicBox::orthogonal([0.0; 3], [1.7, 4.0, 4.0], [true; 3]).unwrap();
-        assert!(!search.find(pool, &[[0.5; 3]], &[0], &narrow, 0.9, &mut planes));
-        assert!(!search.find(pool, &[[f64::NAN, 0.5, 0.5]], &[0], &wide, 0.9, &mut planes));
-        assert!(search.find(pool, &[], &[], &wide, 0.9, &mut planes));
+        assert!(!search.find(pool, &[[0.5; 3]], &[0], &narrow, &Ranges::all(0.9), &mut planes));
+        assert!(!search.find(pool, &[[f64::NAN, 0.5, 0.5]], &[0], &wide, &Ranges::all(0.9), &mut planes));
+        assert!(search.find(pool, &[], &[], &wide, &Ranges::all(0.9), &mut planes));
         assert!(planes.iter().all(|plane| plane.pairs(0.9).next().is_none()));
     }
 }

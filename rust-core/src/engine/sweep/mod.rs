@@ -49,6 +49,7 @@ use region::{can_stretch, is_open, region};
 use std::sync::Arc;
 use std::time::Instant;
 use times::lap;
+pub(super) use workspace::Sorted;
 use workspace::{ForceSink, Input, Workspace};
 
 /// The forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. With ghosts a host
@@ -196,6 +197,11 @@ impl Sweep {
     /// The settings, with the instruction set in use.
     pub fn settings(&self) -> Settings {
         self.settings
+    }
+
+    /// The instruction set in use.
+    pub(super) fn set(&self) -> InstructionSet {
+        self.set
     }
 
     /// The pool of threads.
@@ -409,6 +415,11 @@ impl Sweep {
             return &[];
         }
         with!(&self.workspace, m => &m.order.order)
+    }
+
+    /// The particles of the last evaluation in the order of cells.
+    pub(super) fn sorted(&self) -> Sorted<'_> {
+        with!(&self.workspace, m => m.sorted())
     }
 
     /// Size in bytes of the arrays over particles and pairs.

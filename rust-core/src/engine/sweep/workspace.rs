@@ -45,6 +45,16 @@ use slopes::SlopeArrays;
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 
+/// All particles in the order of cells. Whole vectors can be read behind the last.
+#[derive(Debug, Clone, Copy)]
+pub struct Sorted<'a> {
+    pub order: &'a CellOrder,
+    /// Positions relative to the origin of the box geometry.
+    pub x: [&'a [f32]; 3],
+    /// Species of the particles; empty with one species.
+    pub species: &'a [u8],
+}
+
 /// Arrays in the order of cells, and scratch arrays of the passes.
 pub struct Workspace<P: PairPrecision> {
     fluid: FluidConstants<P::Scalar>,
@@ -100,6 +110,12 @@ impl<P: PairPrecision> Workspace<P> {
         let packs = self.fluid.terms.full_cache;
         self.slopes.make_room(&self.order, self.fluid.width(), packs);
         Ok(())
+    }
+
+    /// The particles of the last evaluation.
+    pub fn sorted(&self) -> Sorted<'_> {
+        let SortedParticles { x, species, .. } = &self.particles;
+        Sorted { order: &self.order, x: x.each_ref().map(|x| &x[..]), species }
     }
 
     /// Does everything after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over

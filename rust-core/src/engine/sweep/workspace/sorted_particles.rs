@@ -42,7 +42,7 @@ impl<R: PackedParticle> SortedParticles<R> {
             fixed16.resize(total + 4 * VECTOR_PADDING, 0);
         }
         self.packed.resize(total + VECTOR_PADDING, R::default());
-        self.species.resize(if multispecies { total.max(1) } else { 0 }, 0);
+        self.species.resize(if multispecies { total + VECTOR_PADDING } else { 0 }, 0);
     }
 
     /// Copies the first plane after the last, one period further.
