@@ -5,16 +5,16 @@ use super::looks::{FEW, WORTH_A_LOOK};
 use crate::scene::Scene;
 use psidpd_formats::memory::{self, MemoryError, PARTICLE};
 
-/// Bytes per particle of evaluations for configurational temperatures, whose arrays the watch keeps between looks, up to twice as long as
-/// they need: in runs of 18 444 particles, which have no pieces, 1600.
-const EVALUATION: f64 = 1400.0;
+/// Bytes per particle of evaluations for configurational temperatures, whose arrays the watch keeps between looks at all particles: 18 444
+/// took 1100 and 1500, with velocity Verlet and force-gradient, and pieces of 20 000, whose arrays are not kept, 900 and 1000.
+const EVALUATION: f64 = 1200.0;
 
 /// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330.
 const OBSERVED: f64 = 1300.0;
 
-/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles. 48 400 to 10⁶ particles
-/// took 800 to 850.
-const APART: f64 = 820.0;
+/// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles. 163 350 to 10⁶ particles
+/// took 650 to 730.
+const APART: f64 = 720.0;
 
 /// A checkpoint is made in memory, and a vector that grows has up to twice the length that it needs: runs at their peak had 2.8 times
 /// the samples of a map, and 3.8 times those of displacements.
