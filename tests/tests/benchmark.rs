@@ -70,6 +70,11 @@ fn a_small_benchmark_has_every_documented_field() {
         assert!(run["mega_particle_steps_per_second"]["median"].as_f64().unwrap() > 0.0);
         assert!(!run["parts"].as_object().unwrap().is_empty());
     }
+    // Mixtures of sizes are timed natively, at the smallest size, and none whose ranges its box does not hold.
+    let mixtures: Vec<_> = runs.iter().filter(|r| r["fluid"] == "two-sizes").collect();
+    let natively = |r: &&Value| r["size"] == 500 && r["code"].as_str().unwrap().starts_with("native ");
+    assert!(mixtures.len() >= 4 && mixtures.iter().all(natively), "{mixtures:?}");
+    assert!(runs.iter().all(|r| r["fluid"] != "colloid"));
     // The large box has few codes, but each on both numbers of ranks.
     let large: Vec<&str> =
         runs.iter().filter(|r| r["size"] == 700).filter_map(|r| r["code"].as_str()).collect();

@@ -16,6 +16,8 @@ pub struct Subject {
     pub species: &'static [&'static str],
     pub density: f64,
     pub dt: f64,
+    /// Of so many particles one is of the second species; with 0 species alternate.
+    pub one_in: usize,
 }
 
 /// Density of the many-body fluid, which sizes are counted in.
@@ -32,6 +34,7 @@ pub const MDPD: Subject = Subject {
     species: &["F"],
     density: MDPD_DENSITY,
     dt: 0.01,
+    one_in: 0,
 };
 
 pub const DPD: Subject = Subject {
@@ -41,6 +44,7 @@ pub const DPD: Subject = Subject {
     species: &["W"],
     density: 3.0,
     dt: 0.04,
+    one_in: 0,
 };
 
 /// The fluid of standard DPD as a pair style of LAMMPS's own.
@@ -68,9 +72,32 @@ pub const FORMULA: Subject = Subject {
     species: &["A", "B"],
     density: MDPD_DENSITY,
     dt: 0.01,
+    one_in: 0,
 };
 
 pub const SUBJECTS: [Subject; 3] = [MDPD, DPD, FORMULA];
+
+/// Mixtures of particle sizes, which the native runner alone is timed with.
+pub const MIXTURES: [Subject; 2] = [
+    Subject {
+        name: "colloid",
+        title: "Standard DPD with 1 % of large particles: ranges 1, 2, 3",
+        text: include_str!("bench/colloid.toml"),
+        species: &["A", "B"],
+        dt: 0.01,
+        one_in: 100,
+        ..DPD
+    },
+    Subject {
+        name: "two-sizes",
+        title: "Standard DPD with 10 % of larger particles: ranges 1, 1.5, 2",
+        text: include_str!("bench/two-sizes.toml"),
+        species: &["A", "B"],
+        dt: 0.01,
+        one_in: 10,
+        ..DPD
+    },
+];
 
 impl Subject {
     pub fn model(&self) -> Result<Model, ExperimentError> {
@@ -165,7 +192,8 @@ mod tests {
         let plan = |s: &Subject| Plan::new(&s.model().unwrap().at(1.0).unwrap()).unwrap();
         assert_eq!(SUBJECTS.map(|s| plan(&s).slope_width()), [1, 0, 4]);
         assert_eq!(SUBJECTS.map(|s| plan(&s).cutoff()), [1.0; 3]);
-        for subject in &SUBJECTS {
+        assert_eq!(MIXTURES.map(|s| plan(&s).cutoff()), [3.0, 2.0]);
+        for subject in SUBJECTS.iter().chain(&MIXTURES) {
             assert_eq!(plan(subject).species(), subject.species);
         }
         assert_eq!(MDPD.particles(48_400), 48_400);

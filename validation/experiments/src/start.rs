@@ -51,7 +51,7 @@ pub fn simulation(
     Ok(simulation)
 }
 
-/// Random particles at kT = 1; species alternate.
+/// Random particles at kT = 1.
 pub fn random(subject: &Subject, filling: Filling, seed: u64) -> Result<State, ExperimentError> {
     let [lx, ly, lz] = filling.lengths;
     let count = (lx * ly * filling.thickness * subject.density).round() as usize;
@@ -66,7 +66,11 @@ pub fn random(subject: &Subject, filling: Filling, seed: u64) -> Result<State, E
         .collect();
     let v = maxwell(std::iter::repeat_n(1.0, count), 1.0, 3, [true; 3], &mut random);
     let kinds = subject.species.len();
-    let species = (0..count).map(|k| (k % kinds) as i32).collect();
+    let species = (0..count).map(|k| match subject.one_in {
+        0 => (k % kinds) as i32,
+        one_in => i32::from(k % one_in == 0),
+    });
+    let species = species.collect();
     Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })
 }
 

@@ -1,7 +1,7 @@
 //! Who is timed, under which name.
 
 use crate::code::{Code, Host, Suffix};
-use crate::fluids::{DPD, MDPD, Subject};
+use crate::fluids::{DPD, MDPD, MIXTURES, Subject};
 use psidpd_core::engine::{Instructions, Precision, Settings};
 use std::num::NonZeroUsize;
 
@@ -162,7 +162,10 @@ impl Field {
 
 pub fn contenders(subject: &Subject, choice: &Choice, field: Field) -> Vec<Contender> {
     let mut all = everyone(subject, choice);
-    all.retain(|contender| field.has(subject, contender, choice));
+    let natively = MIXTURES.contains(subject);
+    all.retain(|contender| {
+        field.has(subject, contender, choice) && (contender.code == Code::Native || !natively)
+    });
     all
 }
 

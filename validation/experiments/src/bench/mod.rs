@@ -26,7 +26,7 @@ pub use spread::Spread;
 use crate::ExperimentError;
 use crate::code::{Code, Suffix};
 use crate::files::absolute_folder;
-use crate::fluids::{MDPD, SUBJECTS, Subject};
+use crate::fluids::{MDPD, MIXTURES, SUBJECTS, Subject};
 use crate::lammps::host::PluginHost;
 use crate::lammps::log::Loop;
 use crate::machine::machine;
@@ -118,7 +118,9 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Ben
     let equal_bits = progress.spinner("threads", || bench.equal_bits())?;
 
     let runs = bench.runs(&entries);
-    let fluids = SUBJECTS.iter().map(facts).collect::<Result<Vec<_>, _>>()?;
+    let is_timed = |subject: &&Subject| entries.iter().any(|entry| entry.subject == **subject);
+    let fluids = SUBJECTS.iter().chain(&MIXTURES).filter(is_timed).map(facts);
+    let fluids = fluids.collect::<Result<Vec<_>, _>>()?;
     let scaling = scaling(&runs, &entries, facts(&MDPD)?.slope_width);
     let outcome = Benchmark {
         format: 3,
@@ -192,12 +194,12 @@ impl Bench<'_> {
         let smallest = self.asked.sizes.iter().min().copied();
         let mut entries = Vec::new();
         for &size in &self.asked.sizes {
-            for subject in SUBJECTS {
+            for subject in subjects(size, Some(size) == smallest)? {
                 let name = format!("equilibrium: {}, {size}", subject.name);
                 let start =
                     self.progress.spinner(&name, || start::kept(&subject, size, &out.join("starts")))?;
-                let cutoff = subject.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
-                let pairs = pairs::pairs_per_particle(&start.state, cutoff);
+                let fluid = subject.model()?.at(1.0).map_err(ExperimentError::File)?;
+                let pairs = pairs::pairs_per_particle(&start.state, &fluid);
                 self.cases.insert((subject.name, size), Case { start, pairs });
                 deck::prepare(&self.place, &subject, subject == MDPD && choice.eam)?;
                 let field =
@@ -357,7 +359,7 @@ impl Bench<'_> {
         let smallest = self.asked.sizes.iter().min().copied().unwrap_or_default();
         let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
         let mut equal = BTreeMap::new();
-        for subject in &SUBJECTS {
+        for subject in SUBJECTS.iter().chain(&MIXTURES) {
             let Some(case) = self.cases.get(&(subject.name, smallest)) else { continue };
             for (name, precision) in Precision::ALL {
                 let settings = Settings { precision, ..Settings::default() };
@@ -367,6 +369,16 @@ impl Bench<'_> {
         }
         Ok(equal)
     }
+}
+
+/// The fluids that are timed at a size: mixtures of particle sizes at the smallest alone, if the box is twice as wide as their ranges.
+fn subjects(size: usize, smallest: bool) -> Result<Vec<Subject>, ExperimentError> {
+    let mut subjects = SUBJECTS.to_vec();
+    for mixture in MIXTURES.into_iter().filter(|_| smallest) {
+        let range = mixture.model()?.at(1.0).map_err(ExperimentError::File)?.cutoff();
+        subjects.extend((Subject::edge(size) >= 2.0 * range).then_some(mixture));
+    }
+    Ok(subjects)
 }
 
 fn scaling(runs: &[Timed], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
