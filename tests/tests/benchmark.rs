@@ -105,6 +105,13 @@ fn whole_scenes_are_timed() {
         assert!((scene["ratio"].as_f64().unwrap() - shipped / bare).abs() < 1e-9, "{scene}");
     }
     assert!(said(&output).contains("new --template droplet"), "{}", said(&output));
+    let there: Vec<_> = scenes.iter().filter(|s| !s["in_lammps"].is_null()).collect();
+    let names: Vec<_> = there.iter().map(|s| s["scene"].as_str().unwrap()).collect();
+    assert_eq!(names, ["standard-dpd", "warren-set6-bulk", "warren-set6-slab"]);
+    for scene in there {
+        let [measured, bare] = ["measured", "bare"].map(|of| scene["in_lammps"][of].as_f64().unwrap());
+        assert!(measured > 0.0 && bare > 0.0, "{scene}");
+    }
 }
 
 #[test]

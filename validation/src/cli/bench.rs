@@ -152,11 +152,13 @@ fn time_scenes(arguments: &Arguments, told: Told) -> Result<Verdict, Failure> {
         threads: &arguments.threads,
         rounds: arguments.rounds.map_or(1, NonZeroUsize::get),
         steps: arguments.steps,
+        lammps: arguments.lammps.as_deref(),
         out: &arguments.out,
     };
     let outcome = whole_scenes(&options, &Progress::new())?;
     say!(
-        "Whole scenes, processor time as shipped and without observables and output; the last column is the ratio of wall times:\n"
+        "Whole scenes, processor time as shipped and without observables and output, the ratio of wall times, and the same scene in LAMMPS with \
+         its own computes and without:\n"
     );
     say::table(&outcome.table());
     say!("{}", outcome.machine.processor);

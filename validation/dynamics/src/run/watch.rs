@@ -35,6 +35,10 @@ const COOLER: f64 = 0.9;
 /// Relative deviation that causes no warning.
 const TOLERANCE: f64 = 0.02;
 
+/// Ratio of masses up to which all velocities forget what they were within a stage: the heavier a particle is among others, the longer it
+/// keeps its velocity, and a few that keep it are no sample of a temperature.
+const ALIKE: f64 = 10.0;
+
 /// Probability of a false alarm for each thermometer of a stage.
 const ALARM: f64 = 1e-3;
 
@@ -154,6 +158,13 @@ impl Hot {
     }
 }
 
+/// Whether no species is much heavier than another.
+fn forget_velocities(simulation: &Simulation) -> bool {
+    let mass = &simulation.state().mass;
+    let least = mass.iter().copied().fold(f64::INFINITY, f64::min);
+    mass.iter().all(|mass| *mass <= ALIKE * least)
+}
+
 impl Watch {
     /// Whether a sample is due. Without `looks` there are no configurational temperatures.
     pub fn is_due(stage: &Stage, done: u64, looks: bool) -> bool {
@@ -185,7 +196,7 @@ impl Watch {
         let kt = found.all;
         // A body force or a wall may drive a flow that is hot by itself, and steep enough to be so within a cell.
         let driven = stage.body_forces && simulation.has_body_forces() || simulation.has_moving_walls();
-        if !driven {
+        if !driven && forget_velocities(simulation) {
             self.kinetic.push(kt / stage.kt);
         }
         if found.pairs.is_finite() {

@@ -17,6 +17,7 @@ pub mod outcome;
 pub mod page;
 mod pairs;
 pub mod scenes;
+mod scenes_in_lammps;
 mod spread;
 mod turns;
 

@@ -1,6 +1,7 @@
 //! Whole scenes: what users run, as shipped against the same scene without observables and output.
 
 use super::outcome::Machine;
+use super::scenes_in_lammps::{InLammps, Lammps};
 use crate::ExperimentError;
 use crate::files::absolute_folder;
 use crate::machine::processor_seconds;
@@ -52,6 +53,8 @@ pub struct Options<'a> {
     pub rounds: usize,
     /// The most steps of a stage.
     pub steps: Option<u64>,
+    /// The LAMMPS to compare with; one that is installed if there is none.
+    pub lammps: Option<&'a Path>,
     pub out: &'a Path,
 }
 
@@ -75,6 +78,8 @@ pub struct WholeScene {
     pub bare: Seconds,
     /// Processor time as shipped over that of the bare scene.
     pub ratio: f64,
+    /// The same scene in LAMMPS, if that has its fluid.
+    pub in_lammps: Option<InLammps>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -86,6 +91,7 @@ pub struct Outcome {
 /// Times the scenes one after the other, each in turns with and without observables and output.
 pub fn run(options: &Options, machine: Machine, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let out = absolute_folder(options.out)?;
+    let lammps = progress.spinner("LAMMPS", || Lammps::find(options, progress))?;
     let paths = write_scenes(&out.join("scenes"))?;
     let bar = progress.bar("scenes", (paths.len() * options.threads.len() * options.rounds) as u64);
     let mut scenes = Vec::new();
@@ -98,8 +104,14 @@ pub fn run(options: &Options, machine: Machine, progress: &Progress) -> Result<O
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for &threads in options.threads {
             let mut fastest: [Option<Seconds>; 2] = [None; 2];
-            let mut particles = 0;
+            let (mut particles, mut there) = (0, None::<[f64; 2]>);
             for _ in 0..options.rounds {
+                // LAMMPS has one rank.
+                if let Some(found) =
+                    (threads.get() == 1).then(|| lammps.time(&name, &scene)).transpose()?.flatten()
+                {
+                    there = Some(there.map_or(found, |before| [0, 1].map(|k| found[k].min(before[k]))));
+                }
                 for (scene, fastest) in [&bare, &scene].into_iter().zip(&mut fastest) {
                     let (seconds, count) = time(scene, &out.join("run"), threads)?;
                     particles = count;
@@ -120,6 +132,11 @@ pub fn run(options: &Options, machine: Machine, progress: &Progress) -> Result<O
                 as_shipped,
                 bare,
                 ratio: as_shipped.processor / bare.processor,
+                in_lammps: there.map(|[measured, bare]| InLammps {
+                    measured,
+                    bare,
+                    over_shipped: measured / as_shipped.processor,
+                }),
             });
         }
     }
@@ -160,10 +177,24 @@ fn time(scene: &Scene, out: &Path, threads: NonZeroUsize) -> Result<(Seconds, us
 
 impl Outcome {
     pub fn table(&self) -> Table {
-        let header =
-            ["scene", "particles", "steps", "threads", "as shipped, s", "without, s", "ratio", "wall"];
+        let header = [
+            "scene",
+            "particles",
+            "steps",
+            "threads",
+            "as shipped, s",
+            "without, s",
+            "ratio",
+            "wall",
+            "LAMMPS, s",
+            "without, s",
+            "over shipped",
+        ];
         let mut table = Table::new(header);
         for s in &self.scenes {
+            let there = |of: fn(&InLammps) -> f64| {
+                s.in_lammps.as_ref().map_or_else(|| "–".into(), |here| format!("{:.2}", of(here)))
+            };
             let name = if s.is_template { format!("new --template {}", s.scene) } else { s.scene.clone() };
             table.push([
                 name,
@@ -174,6 +205,9 @@ impl Outcome {
                 format!("{:.2}", s.bare.processor),
                 format!("{:.2}", s.ratio),
                 format!("{:.2}", s.as_shipped.wall / s.bare.wall),
+                there(|of| of.measured),
+                there(|of| of.bare),
+                there(|of| of.over_shipped),
             ]);
         }
         table

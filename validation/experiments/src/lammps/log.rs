@@ -22,6 +22,16 @@ pub fn timed(what: &str, text: &str) -> Result<Loop, ExperimentError> {
     parse(text).map_err(|problem| ExperimentError::Printed { what: what.to_owned(), problem })
 }
 
+/// Seconds of all loops of a run, which an error names as `what`.
+pub fn seconds_of_loops(what: &str, text: &str) -> Result<f64, ExperimentError> {
+    let seconds = |line: &str| line.strip_prefix("Loop time of ")?.split(' ').next()?.parse::<f64>().ok();
+    let loops: Vec<f64> = text.lines().filter_map(seconds).collect();
+    match loops.is_empty() {
+        true => Err(ExperimentError::Printed { what: what.to_owned(), problem: "no loop time" }),
+        false => Ok(loops.iter().sum()),
+    }
+}
+
 fn parse(text: &str) -> Result<Loop, &'static str> {
     let lines: Vec<&str> = text.lines().collect();
     let begin = lines.iter().rposition(|l| l.starts_with("Loop time of")).ok_or("no loop time")?;
