@@ -91,7 +91,7 @@ pub struct Outcome {
 /// Times the scenes one after the other, each in turns with and without observables and output.
 pub fn run(options: &Options, machine: Machine, progress: &Progress) -> Result<Outcome, ExperimentError> {
     let out = absolute_folder(options.out)?;
-    let lammps = progress.spinner("LAMMPS", || Lammps::find(options, progress))?;
+    let lammps = progress.spinner("LAMMPS", || Lammps::find(options.lammps, &out, progress))?;
     let paths = write_scenes(&out.join("scenes"))?;
     let bar = progress.bar("scenes", (paths.len() * options.threads.len() * options.rounds) as u64);
     let mut scenes = Vec::new();

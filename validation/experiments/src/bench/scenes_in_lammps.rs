@@ -1,7 +1,6 @@
 //! Shipped scenes in LAMMPS, as its users would measure them: by its own pair styles, computes and fixes, on one core.
 
 use super::deck::{Place, pair_styles};
-use super::scenes::Options;
 use crate::ExperimentError;
 use crate::fluids::{DPD_PAIR, GAMMA, SET6};
 use crate::lammps::deck::Deck;
@@ -15,6 +14,7 @@ use psidpd_report::Progress;
 use serde::Serialize;
 use std::collections::HashSet;
 use std::fmt::Write;
+use std::path::Path;
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(3600);
@@ -70,11 +70,11 @@ pub struct Lammps {
 }
 
 impl Lammps {
-    /// The LAMMPS that the options name, or one that is installed.
-    pub fn find(options: &Options, progress: &Progress) -> Result<Lammps, ExperimentError> {
+    /// The LAMMPS at a place, or one that is installed; scripts run in a folder inside `out`.
+    pub fn find(lammps: Option<&Path>, out: &Path, progress: &Progress) -> Result<Lammps, ExperimentError> {
         let install = || plugin::install_to_build(&|line| progress.note(line));
-        let host = options.lammps.map_or_else(install, Host::at)?;
-        let work = crate::files::absolute_folder(options.out)?.join("lammps");
+        let host = lammps.map_or_else(install, Host::at)?;
+        let work = out.join("lammps");
         let place = Place { lammps: PluginHost { host, plugin: None }, work };
         Ok(Lammps { styles: pair_styles(&place)?, place })
     }
