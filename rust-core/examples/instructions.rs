@@ -83,7 +83,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         return Ok(());
     }
     let force = match faces(rest.first())? {
-        0 if subject.rare > 0 => {
+        0 if subject.one_in > 0 => {
             let mut engine = Engine::new(&fluid, settings).map_err(|e| e.to_string())?;
             let mut cloud = Cloud::new(subject, &fluid, count);
             for _ in 0..evaluations {

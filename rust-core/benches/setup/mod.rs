@@ -15,7 +15,7 @@ pub struct Subject {
     /// Time step.
     pub dt: f64,
     /// Of so many particles one is of the second species; with 0 species alternate.
-    pub rare: usize,
+    pub one_in: usize,
 }
 
 /// Mixtures of particle sizes, whose forces are those of an [`Engine`](psidpd_core::engine::Engine): the sweep leaves long ranges of rare
@@ -26,14 +26,14 @@ pub static MIXTURES: [Subject; 2] = [
         text: include_str!("../../../validation/experiments/src/bench/colloid.toml"),
         density: 3.0,
         dt: 0.01,
-        rare: 100,
+        one_in: 100,
     },
     Subject {
         name: "two-sizes",
         text: include_str!("../../../validation/experiments/src/bench/two-sizes.toml"),
         density: 3.0,
         dt: 0.01,
-        rare: 10,
+        one_in: 10,
     },
 ];
 
@@ -44,21 +44,21 @@ pub static SUBJECTS: [Subject; 3] = [
         text: include_str!("../../../validation/models/warren2003-set6.toml"),
         density: 6.05,
         dt: 0.01,
-        rare: 0,
+        one_in: 0,
     },
     Subject {
         name: "dpd",
         text: include_str!("../../../validation/models/standard-dpd.toml"),
         density: 3.0,
         dt: 0.04,
-        rare: 0,
+        one_in: 0,
     },
     Subject {
         name: "formula",
         text: include_str!("../../../validation/experiments/src/bench/two-species.toml"),
         density: 6.05,
         dt: 0.01,
-        rare: 0,
+        one_in: 0,
     },
 ];
 
@@ -117,9 +117,9 @@ impl Cloud {
         };
         // Variance 1: kT = 1.
         let velocity = |k: usize| std::array::from_fn(|c| 12f64.sqrt() * (uniform(6 * k + 3 + c) - 0.5));
-        let kind = |k: usize| match subject.rare {
+        let kind = |k: usize| match subject.one_in {
             0 => (k % fluid.species.len()) as i32,
-            rare => i32::from(k.is_multiple_of(rare)),
+            one_in => i32::from(k.is_multiple_of(one_in)),
         };
         Cloud {
             domain: PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3]).expect("a box"),

@@ -44,8 +44,17 @@ impl Fluid {
 
     /// The longest range of a conservative interaction.
     pub fn conservative_range(&self) -> f64 {
-        let densities = self.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
-        densities.chain(self.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
+        self.pairs.iter().map(|p| p.potential.range()).fold(self.range_of_densities(), f64::max)
+    }
+
+    fn range_of_densities(&self) -> f64 {
+        self.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range())).fold(0.0, f64::max)
+    }
+
+    /// The longest range of a conservative interaction of two species; 0 if there is none.
+    pub fn conservative_range_between(&self, a: usize, b: usize) -> f64 {
+        let pairs = self.pairs.iter().filter(|p| p.between == [a, b] || p.between == [b, a]);
+        pairs.map(|p| p.potential.range()).fold(self.range_of_densities(), f64::max)
     }
 
     /// Whether some force jumps at its range, where `∇·F` has a delta function that samples of configurations miss.

@@ -52,7 +52,7 @@ pub struct Arguments {
     #[arg(long, value_name = "gpu|gpu:N")]
     device: Option<Device>,
     /// Time whole scenes in place of codes: each template of `psidpd new` and ten shipped scenes, as they are and without
-    /// observables and output. --threads, --rounds [default: 1] and --steps of each stage apply; --json has the results.
+    /// observables and output, and on one thread three of them in LAMMPS with its own computes. --threads, --rounds [default: 1] and --steps of each stage apply; --json has the results.
     #[arg(long, conflicts_with = "device")]
     scenes: bool,
     /// Folder for bench.json, report.html and the runs.

@@ -173,6 +173,13 @@ pub struct WeightTables<T> {
     pub exponent: Exponent<T>,
 }
 
+impl WeightTables<f64> {
+    /// The inverse ranges; of a range of zero the largest number, beyond which every pair is.
+    pub fn inverse_ranges(ranges: &[f64]) -> SpeciesPairTable<f64> {
+        SpeciesPairTable::new(ranges.iter().map(|range| if *range > 0.0 { 1.0 / range } else { f64::MAX }))
+    }
+}
+
 /// The pairs that are listed, and whether `r/|g|` is requested.
 #[derive(Debug, Clone)]
 pub struct ListTerms {

@@ -41,8 +41,8 @@ pub struct Input<'a> {
 pub struct Block {
     pub number: usize,
     pub tally: Tally,
-    /// The particles of rare species, each with the end of its pairs and with the force on it.
-    own: Vec<(u32, usize, [f64; 3])>,
+    /// The particles of rare species, each with the force on it.
+    own: Vec<(u32, [f64; 3])>,
     /// The others, and the forces on the particle of the rare species.
     others: Vec<u32>,
     force: Vec<[f64; 3]>,
@@ -103,7 +103,7 @@ impl Block {
                 let of_pairs = x[..count].iter().zip(&y[..count]).zip(&z[..count]).zip(&slope[..count]);
                 force.extend(of_pairs.map(|(((x, y), z), along)| [along * x, along * y, along * z]));
             }
-            own.push((host as u32, others.len(), sum));
+            own.push((host as u32, sum));
         }
     }
 
@@ -113,12 +113,12 @@ impl Block {
             let other = &mut force[*j as usize];
             (0..3).for_each(|c| other[c] -= f[c]);
         }
-        for (host, _, sum) in &self.own {
+        for (host, sum) in &self.own {
             (0..3).for_each(|c| force[*host as usize][c] += sum[c]);
         }
         // A sum that is not finite has a part that is not.
         let is_lost = |sum: &[f64; 3]| !sum.iter().all(|c| c.is_finite());
-        self.own.iter().filter(move |(_, _, sum)| is_lost(sum)).map(|(host, _, _)| *host as usize)
+        self.own.iter().filter(move |(_, sum)| is_lost(sum)).map(|(host, _)| *host as usize)
     }
 
     /// Size in bytes of the arrays.
@@ -126,7 +126,7 @@ impl Block {
         let Block { own, others, force, pairs, .. } = self;
         let Pairs { around, d, r, phi, slope, .. } = pairs;
         let numbers = d.iter().chain([r, phi, slope]).map(Vec::capacity).sum::<usize>();
-        own.capacity() * size_of::<(u32, usize, [f64; 3])>()
+        own.capacity() * size_of::<(u32, [f64; 3])>()
             + (others.capacity() + around.found.capacity()) * size_of::<u32>()
             + force.capacity() * size_of::<[f64; 3]>()
             + numbers * size_of::<f64>()

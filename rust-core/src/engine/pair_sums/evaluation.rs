@@ -390,9 +390,31 @@ strength = 50.0
 range = 0.6
 "#;
 
-    const MODELS: [&str; 6] = [
+    /// Species that do not interact with each other.
+    const STRANGERS: &str = r#"
+title = "strangers"
+species = ["A", "B"]
+[[pair]]
+between = ["A", "B"]
+form = "soft"
+strength = 0.0
+range = 0.1
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = 25.0
+range = 0.7
+[[pair]]
+between = ["B", "B"]
+form = "soft"
+strength = 9.0
+range = 1.2
+"#;
+
+    const MODELS: [&str; 7] = [
         BOUNDED,
         SIZES,
+        STRANGERS,
         include_str!("../../../../validation/models/warren2003-set6.toml"),
         include_str!("../../../../validation/models/huggins.toml"),
         include_str!("../../../../validation/models/binary-2d.toml"),
@@ -514,6 +536,11 @@ range = 0.6
         let listed = found.parts().sum::<usize>();
         assert!((within..within + 3).contains(&listed) && all > 2 * within, "{listed} {within} {all}");
         assert!(found.pairs_within(0.5).is_some() && found.pairs_within(0.6).is_none());
+        let (evaluator, x, species, domain) = random(STRANGERS, 15);
+        let found = evaluator.evaluate(&alone(), &x, &species, &domain);
+        let pairs: Vec<Pair> = (0..found.parts().count()).flat_map(|part| found.pairs_of(part)).collect();
+        let far = pairs.iter().filter(|pair| species[pair.i] != species[pair.j] && pair.r > 0.11).count();
+        assert!(far == 0 && pairs.len() > 20, "{far} {}", pairs.len());
         let (evaluator, x, species, domain) = random(BOUNDED, 15);
         let found = evaluator.evaluate(&alone(), &x, &species, &domain);
         assert!(found.pairs_within(1.0).is_some() && found.pairs_within(1.1).is_none());

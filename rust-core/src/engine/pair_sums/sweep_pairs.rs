@@ -5,7 +5,6 @@ use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
 use crate::engine::sweep::{MARGIN, PairLists, Places, PlanePairs, Pool};
 use crate::model::Fluid;
-use crate::model::pair::PairForm;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
 use psidpd_passes::ground::terms::Exponent;
@@ -28,15 +27,9 @@ impl Ranges {
 
     /// Those of the conservative interactions of a fluid.
     pub fn conservative(fluid: &Fluid) -> Ranges {
-        let densities = fluid.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
-        let (of_densities, species) = (densities.fold(0.0, f64::max), fluid.species.len());
-        let mut table = vec![of_densities; species * species];
-        for term in &fluid.pairs {
-            let [a, b] = term.between;
-            for k in [a * species + b, b * species + a] {
-                table[k] = table[k].max(term.potential.range());
-            }
-        }
+        let species = fluid.species.len();
+        let pairs = (0..species).flat_map(|a| (0..species).map(move |b| (a, b)));
+        let table = pairs.map(|(a, b)| fluid.conservative_range_between(a, b)).collect();
         let ranges = Ranges { species, table };
         if ranges.shortest() == ranges.longest() { Ranges::all(ranges.longest()) } else { ranges }
     }
@@ -59,7 +52,7 @@ impl Ranges {
         let weights = WeightTables {
             species: self.species,
             amplitude: SpeciesPairTable::of(self.table.len(), 1.0),
-            inverse_range: SpeciesPairTable::new(self.table.iter().map(|range| 1.0 / range)),
+            inverse_range: WeightTables::inverse_ranges(&self.table),
             exponent: Exponent::One,
         };
         ListTerms::new(weights, MARGIN, false)

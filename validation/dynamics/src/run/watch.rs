@@ -1,10 +1,10 @@
 //! Watches the temperature of a run: warns if it deviates from its target, and stops a run that stays far too hot.
 //!
-//! Kinetic temperatures are those of the motion within cells, so the motion of a drop or a flow does not count, and no pairs are
-//! searched: of all velocities, as users read it, and of the relative ones along pairs, which drag and noise act on. Each stage has a
-//! number of samples, a long stage one every [`INTERVAL`] steps; sampling changes no step. The configurational temperature, which is
-//! most sensitive to errors of the forces, is sampled up to forty times in the last two thirds of a stage of a thousand steps or
-//! more; not where an observable measures it with more configurations. Of many particles it is that of a piece.
+//! The kinetic temperature is that of relative velocities along pairs, which drag and noise act on, so the motion of a drop or a flow
+//! does not count; of pairs in cells of space, so that no pairs are searched. Each stage has a number of samples, a long stage one every
+//! [`INTERVAL`] steps; sampling changes no step. The configurational temperature, which is most sensitive to errors of the forces, is
+//! sampled up to forty times in the last two thirds of a stage of a thousand steps or more; not where an observable measures it with
+//! more configurations. Of many particles both are those of a piece.
 //!
 //! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
 //! less often because its mean must also deviate by more than [`TOLERANCE`].
@@ -23,7 +23,7 @@ const INTERVAL: u64 = 250;
 pub(super) const LEAST: u64 = 10;
 
 /// Target number of samples in a short stage.
-const SAMPLES: u64 = 24;
+const SAMPLES: u64 = 30;
 
 /// A run stops if it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples, and
 /// has not cooled to [`COOLER`] of its lowest temperature for as long. A start that cools, even slowly, continues.
@@ -35,18 +35,12 @@ const COOLER: f64 = 0.9;
 /// Relative deviation that causes no warning.
 const TOLERANCE: f64 = 0.02;
 
-/// Ratio of masses up to which all velocities forget what they were within a stage: the heavier a particle is among others, the longer it
-/// keeps its velocity, and a few that keep it are no sample of a temperature.
-const ALIKE: f64 = 10.0;
-
 /// Probability of a false alarm for each thermometer of a stage.
 const ALARM: f64 = 1e-3;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
     Kinetic,
-    /// The relative velocities along pairs.
-    Pairs,
     Configurational,
 }
 
@@ -75,25 +69,19 @@ impl fmt::Display for Deviation {
             );
         };
         let (what, cause) = match thermometer {
-            Thermometer::Kinetic => {
-                ("kinetic temperature", "the thermostat's and the forces' error at this step")
-            }
-            Thermometer::Pairs => (
-                "kinetic temperature of relative velocities along pairs",
-                "the thermostat's and the forces' error at this step",
-            ),
-            Thermometer::Configurational => ("configurational temperature", "the forces' error at this step"),
+            Thermometer::Kinetic => ("kinetic", "the thermostat's and the forces' error at this step"),
+            Thermometer::Configurational => ("configurational", "the forces' error at this step"),
         };
         if *falls {
             return write!(
                 f,
-                "stage \"{stage}\": the {what} is {mean:.3} +- {error:.3} kT and still falls: the start has not \
+                "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT and still falls: the start has not \
                  settled; give the stage more steps"
             );
         }
         write!(
             f,
-            "stage \"{stage}\": the {what} is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
+            "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
              dt, or an integrator that allows it (docs/integrators.md)"
         )
     }
@@ -119,8 +107,6 @@ impl Deviation {
 pub(super) struct Watch {
     /// The kinetic temperature of each sample, in units of kT.
     kinetic: Vec<f64>,
-    /// That of the relative velocities along pairs.
-    pairs: Vec<f64>,
     configurational: Vec<Configurational>,
     /// Of the present stage, with arrays of pairs for the next look.
     evaluator: Option<Evaluator>,
@@ -158,13 +144,6 @@ impl Hot {
     }
 }
 
-/// Whether no species is much heavier than another.
-fn forget_velocities(simulation: &Simulation) -> bool {
-    let mass = &simulation.state().mass;
-    let least = mass.iter().copied().fold(f64::INFINITY, f64::min);
-    mass.iter().all(|mass| *mass <= ALIKE * least)
-}
-
 impl Watch {
     /// Whether a sample is due. Without `looks` there are no configurational temperatures.
     pub fn is_due(stage: &Stage, done: u64, looks: bool) -> bool {
@@ -191,22 +170,16 @@ impl Watch {
             // Looks at a piece are rare among the steps of so many particles, so their memory is not kept.
             self.evaluator.take_if(|_| piece.is_some());
         }
-        let first = place(done, simulation.len());
-        let Some(found) = simulation.temperatures_in_cells(first).filter(|_| has_time) else { return Ok(()) };
-        let kt = found.all;
-        // A body force or a wall may drive a flow that is hot by itself, and steep enough to be so within a cell.
+        let middle = place(done, simulation.len());
+        let Some(kt) = simulation.temperature_in_cells(middle).filter(|_| has_time) else { return Ok(()) };
+        self.kinetic.push(kt / stage.kt);
+        // A body force or a wall may drive a flow that is hot by itself.
         let driven = stage.body_forces && simulation.has_body_forces() || simulation.has_moving_walls();
-        if !driven && forget_velocities(simulation) {
-            self.kinetic.push(kt / stage.kt);
-        }
-        if found.pairs.is_finite() {
-            self.pairs.push(found.pairs / stage.kt);
-        }
         if kt <= FAR_OFF * stage.kt || driven {
             self.hot = None;
             return Ok(());
         }
-        // The relative velocities of pairs, which drag and noise act on, are also free of steep flow.
+        // Before a run is stopped, all pairs that drag and noise act on are asked.
         let piece = piece(simulation, done);
         let Some(warmth) = simulation.warmth(stage.dt, piece.as_ref())? else { return Ok(()) };
         let ratio = warmth.kt / stage.kt;
@@ -239,7 +212,6 @@ impl Watch {
         let dt = stage.integrator.has_time().then_some(stage.dt);
         let found = [
             (Thermometer::Kinetic, estimate(kinetic), cools),
-            (Thermometer::Pairs, estimate(&self.pairs[self.pairs.len() / 3..]), false),
             (Thermometer::Configurational, estimate_configurational(&self.configurational, stage.kt), false),
         ];
         let deviation = |(thermometer, found, falls): (Thermometer, Option<Estimate>, bool)| {
@@ -248,10 +220,7 @@ impl Watch {
                 found.filter(|found| is_off(found) || falls && is_above(kinetic))?;
             Some(Deviation { stage: stage.name.clone(), thermometer, mean, error, falls, dt })
         };
-        let mut found: Vec<_> = found.into_iter().filter_map(deviation).collect();
-        // If the kinetic temperature is off, so is that of pairs.
-        found.dedup_by_key(|found| found.thermometer == Thermometer::Configurational);
-        found
+        found.into_iter().filter_map(deviation).collect()
     }
 }
 
@@ -566,13 +535,6 @@ mod tests {
         assert_eq!(kinetic(scattered(1.01)).deviations(&usual), []);
         assert_eq!(kinetic((0..30).map(|_| 3.0).chain(scattered(1.0))).deviations(&usual), []);
         assert_eq!(kinetic([9.0, 1.5]).deviations(&usual), []);
-        // Pairs alone may be off; where all velocities are, nothing is said of them.
-        for (mean, thermometer) in [(1.0, Thermometer::Pairs), (0.95, Thermometer::Kinetic)] {
-            let watch = Watch { pairs: scattered(0.95).collect(), ..kinetic(scattered(mean)) };
-            let found = watch.deviations(&usual);
-            let [one] = &found[..] else { panic!("{found:?}") };
-            assert!(one.thermometer == thermometer && (one.mean - 0.95).abs() < 1e-12, "{one:?}");
-        }
     }
 
     /// A tenth of kT = 2 is off, 1 % is not, and a temperature without error says nothing.
@@ -592,11 +554,11 @@ mod tests {
         assert!(of(2.2, 0.0).is_none() && of(2.2, f64::NAN).is_none() && of(2.2, 0.2).is_none());
     }
 
-    /// 24 samples of a short stage, ten steps apart at least and 250 at most; none without thermostat.
+    /// 30 samples of a short stage, ten steps apart at least and 250 at most; none without thermostat.
     #[test]
     fn samples_are_taken_when_the_page_says() {
         let every = |stage: &Stage| (1..=stage.steps).find(|done| Watch::is_due(stage, *done, true));
-        for (steps, expected) in [(48, 10), (240, 10), (720, 30), (960, 40)] {
+        for (steps, expected) in [(48, 10), (300, 10), (720, 24), (960, 32)] {
             let mut usual = stage(steps, Integrator::VelocityVerlet);
             assert_eq!(every(&usual), Some(expected));
             usual.thermostat = false;
@@ -630,8 +592,7 @@ mod tests {
             watched(SET6, &text)
         };
         let found = run(true).unwrap();
-        assert!(found.iter().any(|d| d.thermometer == Thermometer::Pairs && d.mean > FAR_OFF), "{found:?}");
-        assert!(found.iter().all(|d| d.thermometer != Thermometer::Kinetic), "{found:?}");
+        assert!(found.iter().any(|d| d.thermometer == Thermometer::Kinetic && d.mean > FAR_OFF), "{found:?}");
         let RunError::Stopped { cause, .. } = run(false).unwrap_err() else { panic!("another error") };
         assert!(matches!(*cause, RunError::TooHot { .. }), "{cause}");
     }

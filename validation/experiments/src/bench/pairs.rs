@@ -2,31 +2,16 @@
 
 use psidpd_core::engine::pair_sums::for_each_pair;
 use psidpd_core::model::Fluid;
-use psidpd_core::model::pair::PairForm;
 use psidpd_dynamics::run::State;
 
 /// Pairs closer than the longest range of their two species, per particle.
 pub fn pairs_per_particle(state: &State, fluid: &Fluid) -> f64 {
-    let ranges = ranges(fluid);
     let mut pairs = 0u64;
     for_each_pair(&state.x, &state.domain, 3, fluid.cutoff(), |pair| {
         let [a, b] = [pair.i, pair.j].map(|k| state.species[k] as usize);
-        pairs += u64::from(pair.r < ranges[a][b]);
+        pairs += u64::from(pair.r < fluid.conservative_range_between(a, b));
     });
     pairs as f64 / state.len() as f64
-}
-
-/// The longest range of each two species.
-fn ranges(fluid: &Fluid) -> Vec<Vec<f64>> {
-    let count = fluid.species.len();
-    let of_densities = fluid.densities.iter().map(|d| d.kernel.range()).fold(0.0, f64::max);
-    let mut ranges = vec![vec![of_densities; count]; count];
-    for term in &fluid.pairs {
-        let [a, b] = term.between;
-        let range = ranges[a][b].max(term.potential.range());
-        (ranges[a][b], ranges[b][a]) = (range, range);
-    }
-    ranges
 }
 
 #[cfg(test)]

@@ -106,6 +106,12 @@ Total wall time: 0:00:01
 ";
 
     #[test]
+    fn loops_add_up() {
+        assert_eq!(seconds_of_loops("it", TEXT).unwrap(), 9.9 + 0.85);
+        assert!(seconds_of_loops("it", "Loop time").is_err());
+    }
+
+    #[test]
     fn the_last_loop_is_read() {
         let account = parse(TEXT).unwrap();
         assert_eq!((account.seconds, account.steps, account.particles), (0.85, 100, 6050));
