@@ -62,7 +62,7 @@ pub use facade::{Engine, Pending, Statistics};
 #[doc(hidden)]
 pub use fault::Fault;
 pub use images::Images;
-pub use local_energy::{LocalEnergy, NoEnergy};
+pub use local_energy::{Cells, LocalEnergy, Near, NoEnergy};
 pub use particles::Particles;
 pub use path::{Path, Reason};
 pub use plan::{LinearTerm, Plan};

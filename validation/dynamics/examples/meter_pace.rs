@@ -1,7 +1,7 @@
-//! Times what each observable of a scene costs a step that it samples, in steps of velocity Verlet of the same scene: processor time of
-//! the calling thread, of which Linux tells. What momentum transport and totals cost in that step is counted in.
+//! Times what each observable of a scene costs a step that it samples, in steps of velocity Verlet of the same scene, on one thread: the
+//! difference of medians. What momentum transport and totals cost in that step is counted in.
 //!
-//! `cargo run --release --workspace --example meter_pace SCENE`
+//! `cargo run --release -p psidpd-dynamics --example meter_pace SCENE`
 
 use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_dynamics::integrator::Integrator;
@@ -9,6 +9,7 @@ use psidpd_dynamics::scene::Scene;
 use psidpd_observe::{Observe, Observers, Recorded};
 use std::error::Error;
 use std::path::Path;
+use std::time::Instant;
 
 /// The first samples, and those that are timed. Some of the first choose settings or look at the order of particles; the next to do
 /// so is the 33rd.
@@ -18,10 +19,9 @@ const TIMED: u64 = 15;
 /// Steps without a sample, for each with one.
 const PLAIN: u64 = 4;
 
-/// The processor time of this thread in nanoseconds, in ticks of some milliseconds.
-fn now() -> Result<f64, Box<dyn Error>> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat")?;
-    Ok(text.split(' ').next().ok_or("an empty file")?.parse()?)
+fn median(times: &mut [f64]) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -43,13 +43,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut observers = Observers::new(&observe, [stage.name.as_str()]);
         let name = format!("{:?}", request.meter);
         // Steps with a sample, without, and of velocity Verlet.
-        let mut times = [0.0; 3];
+        let mut times = [const { Vec::new() }; 3];
         for round in 1..=FIRST + TIMED {
             let mut spent = [0.0; 3];
             let step = round * request.every + request.skip;
             for (k, integrator) in [(0, own), (1, own), (2, verlet)] {
                 run.prepare_for(integrator, dt, Want::FORCES)?;
-                let begin = now()?;
+                let begin = Instant::now();
                 for _ in 0..if k == 0 { 0 } else { PLAIN } {
                     run.step(dt, integrator, Want::FORCES)?;
                 }
@@ -60,15 +60,15 @@ fn main() -> Result<(), Box<dyn Error>> {
                     view.step = step;
                     observers.sample(view, &stage.name);
                 }
-                spent[k] = (now()? - begin) / if k == 0 { 1.0 } else { PLAIN as f64 };
+                spent[k] = begin.elapsed().as_secs_f64() / if k == 0 { 1.0 } else { PLAIN as f64 };
                 run.record_flux(Recorded::Nothing);
             }
             if round > FIRST {
-                times.iter_mut().zip(spent).for_each(|(time, spent)| *time += spent);
+                times.iter_mut().zip(spent).for_each(|(times, spent)| times.push(spent));
             }
         }
-        let [sampled, plain, unit] = times;
-        let per_particle = unit / (TIMED * run.len() as u64) as f64;
+        let [sampled, plain, unit] = times.each_mut().map(|times| median(times));
+        let per_particle = unit * 1e9 / run.len() as f64;
         let name = name.split(['(', ' ']).next().unwrap_or_default();
         println!("{name:20} {:5.1}   {per_particle:.0}", (sampled - plain) / unit);
     }

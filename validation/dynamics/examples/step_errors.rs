@@ -1,6 +1,6 @@
 //! Errors of steps of random fluids: what a trial says beside what longer runs from other starts have.
 //!
-//! `cargo run --release --workspace --example step_errors FIRST LAST`: the numbers of the fluids, from 1; the number is the seed.
+//! `cargo run --release -p psidpd-dynamics --example step_errors FIRST LAST`: the numbers of the fluids, from 1; the number is the seed.
 //! Each line has the verdict first, so `sort -r` puts the worst first. `step_errors MODEL KT RHO...` tries a model, all masses 1, with
 //! the number density of each of its species.
 

@@ -5,10 +5,10 @@ use super::flux::Recorded;
 use super::frame::{Frame, View};
 use super::meter::AnyMeter;
 use super::observation::Observation;
-use super::order::{Order, SearchPairs, Sight};
+use super::order::{Order, Sight};
 use super::request::Observe;
 use psidpd_core::engine::Want;
-use psidpd_core::engine::pair_sums::{Evaluator, Pair};
+use psidpd_core::engine::pair_sums::Evaluator;
 use serde::{Deserialize, Serialize};
 
 /// The requested observables of a scene with their samples so far.
@@ -118,7 +118,6 @@ impl Observers {
                 sampled.left_out = sampled.left_out.saturating_add(u64::from(!taken));
             }
         }
-        // Behind the observables, whose pairs it may take.
         let of_liquids = |o: &Observer| o.stages.iter().any(|s| s.stage == stage && s.meter.of_liquids());
         if let Some(frame) = &frame
             && self.observers.iter().any(|o| due(o) && of_liquids(o))
@@ -128,8 +127,7 @@ impl Observers {
                 self.order.push((stage.to_owned(), Order::default()));
                 self.order.len() - 1
             });
-            let pairs = |range: f64, visit: &mut dyn FnMut(Pair)| frame.for_each_pair(range, visit);
-            self.order[at].1.sample(&sight(frame, &pairs), |k| frame.moves(k));
+            self.order[at].1.sample(&sight(frame), |k| frame.moves(k));
         }
     }
 
@@ -194,12 +192,11 @@ impl Observers {
 }
 
 /// What tells a crystal from a liquid in a configuration.
-fn sight<'a>(frame: &'a Frame<'a>, pairs: &'a SearchPairs<'a>) -> Sight<'a> {
+fn sight<'a>(frame: &'a Frame<'a>) -> Sight<'a> {
     let view = frame.view;
     let mass = (0..view.x.len()).map(|k| frame.mass(k)).sum::<f64>() / view.x.len() as f64;
     Sight {
         time: view.time,
-        pairs,
         domain: view.domain,
         dimensions: view.dimensions,
         x: view.x,

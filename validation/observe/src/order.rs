@@ -18,14 +18,19 @@
 //! A run may crystallise at any time. So displacements count from the start while they are small, and else from a later sample, that
 //! at which they were found to be large; and a run that was a liquid and is ordered has become a crystal, wherever its particles go.
 
-use crate::meter::linked::density_of_densest_tenth;
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::pair_sums::Pair;
+use crate::meter::rdf::shell_volume;
+use psidpd_core::engine::{Cells, Near, PeriodicBox};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// The largest number of particles that are followed.
 const PROBES: usize = 1000;
+
+/// The number of particles by which a liquid is told from what may be a crystal: one of its looks takes a tenth of the time.
+const FEW: usize = 50;
+
+/// The part of the smallest share of ordered particles in a crystal, below which these few are of a liquid.
+const LIQUID: f64 = 1.0 / 3.0;
 
 /// A particle with a larger c is ordered.
 const ORDERED: f64 = 0.5;
@@ -48,14 +53,10 @@ const GROWTH: f64 = 1.4;
 const LEAST_SAMPLES: u64 = 16;
 const LEAST_FLIGHTS: f64 = 10.0;
 
-/// Visits every pair of particles closer than a range, with the vector from j to i.
-pub type SearchPairs<'a> = dyn Fn(f64, &mut dyn FnMut(Pair)) + 'a;
-
 /// A configuration as this module needs it.
 #[derive(Clone, Copy)]
 pub struct Sight<'a> {
     pub time: f64,
-    pub pairs: &'a SearchPairs<'a>,
     pub domain: &'a PeriodicBox,
     pub dimensions: usize,
     /// Positions in the box, the numbers of periods that each particle has crossed, and tags.
@@ -196,59 +197,112 @@ fn product(a: &Bonds, b: &Bonds) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// The particles that move, in cells as wide as neighbours may be away.
+struct Mobile {
+    particles: Vec<usize>,
+    cells: Cells,
+}
+
+impl Mobile {
+    /// `None` without particles in the range of forces of others.
+    fn new(sight: &Sight, moves: impl Fn(usize) -> bool) -> Option<Mobile> {
+        let &Sight { domain, dimensions, x, range, .. } = sight;
+        let particles: Vec<usize> = (0..x.len()).filter(|k| moves(*k)).collect();
+        let at: Vec<[f64; 3]> = particles.iter().map(|k| x[*k]).collect();
+        let sorted = |range: f64| {
+            let mut cells = Cells::new(domain, dimensions, range, at.len());
+            cells.fill(&at);
+            cells
+        };
+        let cells = sorted(range);
+        // The density around particles of the densest tenth.
+        let mut near = Near::default();
+        let mut around = |x: &[f64; 3]| {
+            cells.around(*x, &mut near);
+            near.count.saturating_sub(1)
+        };
+        let mut counts: Vec<usize> = spread(&at, PROBES).map(&mut around).collect();
+        counts.sort_unstable();
+        let dense = counts.get(counts.len() * 9 / 10).copied().unwrap_or(0) as f64;
+        let rho = dense / shell_volume(dimensions, 0.0, range);
+        // No image of an image is needed.
+        let width = (0..dimensions).map(|k| domain.height(k)).fold(f64::INFINITY, f64::min);
+        let reach = reach(dimensions, rho).min(width);
+        let cells = if reach > range { sorted(reach) } else { cells };
+        (rho > 0.0 && reach.is_finite()).then_some(Mobile { particles, cells })
+    }
+}
+
+/// So many of all at most, in even steps.
+fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
+    all.iter().step_by(all.len().div_ceil(most).max(1))
+}
+
 /// A near particle: distance, index and unit vector.
-type Near = (f64, usize, [f64; 3]);
+type Beside = (f64, usize, [f64; 3]);
 
 /// The nearest neighbours of some particles, by distance.
 struct Nearest {
     /// The place of each particle in `lists`.
     at: Vec<Option<usize>>,
-    lists: Vec<Vec<Near>>,
+    lists: Vec<Vec<Beside>>,
 }
 
 impl Nearest {
-    /// Finds the neighbours of the particles `of`; those with too few are left out.
-    fn new(
-        sight: &Sight,
-        of: impl IntoIterator<Item = usize>,
-        moves: impl Fn(usize) -> bool,
-        reach: f64,
-    ) -> Nearest {
-        let most = neighbours(sight.dimensions);
-        let mut found = Nearest { at: vec![None; sight.x.len()], lists: Vec::new() };
-        for k in of {
-            found.at[k].get_or_insert_with(|| {
-                found.lists.push(Vec::with_capacity(most + 1));
-                found.lists.len() - 1
-            });
-        }
-        let Nearest { at, lists } = &mut found;
-        (sight.pairs)(reach, &mut |p| {
-            if !(moves(p.i) && moves(p.j) && p.r > 0.0) {
-                return;
-            }
-            // `d` is the vector from j to i.
-            for (k, other, sign) in [(p.i, p.j, -1.0), (p.j, p.i, 1.0)] {
-                let Some(list) = at[k].map(|k| &mut lists[k]) else { continue };
-                if list.len() == most && list[most - 1].0 <= p.r {
-                    continue;
-                }
-                let place = list.partition_point(|(r, ..)| *r <= p.r);
-                list.insert(place, (p.r, other, p.d.map(|c| sign * c / p.r)));
-                list.truncate(most);
-            }
-        });
-        at.iter_mut().for_each(|at| *at = at.filter(|k| lists[*k].len() == most));
-        found
+    fn none(sight: &Sight) -> Nearest {
+        Nearest { at: vec![None; sight.x.len()], lists: Vec::new() }
     }
 
-    fn of(&self, particle: usize) -> Option<&Vec<Near>> {
+    /// The neighbours of the particles `of` and of their neighbours; those with too few are left out.
+    fn of_shells(sight: &Sight, mobile: &Mobile, of: impl Iterator<Item = usize>) -> Nearest {
+        let mut all = Nearest::none(sight);
+        all.find(sight, mobile, of);
+        let beside: Vec<usize> = all.lists.iter().flatten().map(|near| near.1).collect();
+        all.find(sight, mobile, beside);
+        all
+    }
+
+    fn find(&mut self, sight: &Sight, mobile: &Mobile, of: impl IntoIterator<Item = usize>) {
+        let most = neighbours(sight.dimensions);
+        let (mut near, mut by_distance) = (Near::default(), Vec::new());
+        for k in of {
+            if self.at[k].is_some() {
+                continue;
+            }
+            mobile.cells.around(sight.x[k], &mut near);
+            by_distance.clear();
+            let others = near.r[0].iter().zip(&near.id).take(near.count).filter(|(square, _)| **square > 0.0);
+            by_distance.extend(others.map(|(square, id)| (*square, *id)));
+            if near.repeats {
+                // Of several images of a particle the nearest.
+                by_distance.sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+                by_distance.dedup_by_key(|(_, id)| *id);
+            }
+            if by_distance.len() < most {
+                continue;
+            }
+            let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+            by_distance.select_nth_unstable_by(most - 1, order);
+            by_distance.truncate(most);
+            by_distance.sort_unstable_by(order);
+            let beside = |(square, id): &(f64, u32)| {
+                let other = mobile.particles[*id as usize];
+                let d = sight.domain.minimum_image(sight.x[other], sight.x[k]);
+                let r = square.sqrt();
+                (r, other, d.map(|d| d / r))
+            };
+            self.at[k] = Some(self.lists.len());
+            self.lists.push(by_distance.iter().map(beside).collect());
+        }
+    }
+
+    fn of(&self, particle: usize) -> Option<&Vec<Beside>> {
         self.at[particle].map(|k| &self.lists[k])
     }
 
     /// The bond-order vector of each particle, divided by its length.
     fn bonds(&self, dimensions: usize) -> Vec<Bonds> {
-        let of_list = |list: &Vec<Near>| {
+        let of_list = |list: &Vec<Beside>| {
             let mut sum = [0.0; 13];
             for (_, _, direction) in list {
                 let harmonics = harmonics(*direction, dimensions);
@@ -259,34 +313,73 @@ impl Nearest {
         };
         self.lists.iter().map(of_list).collect()
     }
+
+    /// The order c of a particle, from these vectors.
+    fn order(&self, bonds: &[Bonds], particle: usize) -> Option<f64> {
+        let list = self.of(particle)?;
+        let share = |j: usize| Some(product(&bonds[self.at[particle]?], &bonds[self.at[j]?]));
+        Some(list.iter().filter_map(|n| share(n.1)).sum::<f64>() / list.len() as f64)
+    }
+}
+
+/// The share of ordered particles among a few.
+fn share_of_few(sight: &Sight, mobile: &Mobile) -> f64 {
+    let few: Vec<usize> = spread(&mobile.particles, FEW).copied().collect();
+    let all = Nearest::of_shells(sight, mobile, few.iter().copied());
+    let bonds = all.bonds(sight.dimensions);
+    let is_ordered = |k: &&usize| all.order(&bonds, **k).is_some_and(|c| c > ORDERED);
+    few.iter().filter(is_ordered).count() as f64 / few.len() as f64
+}
+
+/// The smallest share of ordered particles in a crystal.
+fn share_in_crystals(dimensions: usize) -> f64 {
+    SHARE[usize::from(dimensions > 2)]
+}
+
+/// Particles with the neighbours that they have now.
+fn probes(sight: &Sight, mobile: &Mobile) -> Vec<Probe> {
+    let mut by_tag = mobile.particles.clone();
+    by_tag.sort_unstable_by_key(|k| sight.tags[*k]);
+    let chosen: Vec<usize> = spread(&by_tag, PROBES).copied().collect();
+    let mut found = Nearest::none(sight);
+    found.find(sight, mobile, chosen.iter().copied());
+    let probe = |k: usize| {
+        let list = found.of(k)?;
+        let neighbour = |&(distance, j, e): &Beside| {
+            let apart = apart(sight, k, j);
+            let image = std::array::from_fn(|c| distance * e[c] - apart[c]);
+            Neighbour { tag: sight.tags[j], image, distance }
+        };
+        Some(Probe { tag: sight.tags[k], neighbours: list.iter().map(neighbour).collect() })
+    };
+    chosen.into_iter().filter_map(probe).collect()
 }
 
 impl Order {
     /// Takes a sample; `moves` tells mobile particles from frozen ones, which do not count.
     pub fn sample(&mut self, sight: &Sight, moves: impl Fn(usize) -> bool) {
         self.samples = self.samples.saturating_add(1);
-        // Few looks, however long the run.
+        // Few looks, however long the run, and none that is too early to tell.
         let (passed, unit) = (self.samples.saturating_sub(self.since), (self.since / 2).max(1));
-        if self.samples > 1 && !(passed.is_multiple_of(unit) && (passed / unit).is_power_of_two()) {
+        let looks = self.samples >= LEAST_SAMPLES / 2 && passed.is_multiple_of(unit);
+        if self.samples > 1 && !(looks && (passed / unit).is_power_of_two()) {
             return;
         }
-        let within = |visit: &mut dyn FnMut(Pair)| (sight.pairs)(sight.range, visit);
-        let rho = density_of_densest_tenth(sight.x.len(), sight.dimensions, sight.range, &moves, within);
-        let mut reach = reach(sight.dimensions, rho);
-        if !(rho > 0.0 && reach.is_finite()) {
-            return;
-        }
-        // No image of an image is needed.
-        let widths = (0..sight.dimensions).map(|k| sight.domain.height(k));
-        reach = widths.fold(reach, f64::min);
+        let Some(mobile) = Mobile::new(sight, moves) else { return };
         if self.samples == 1 {
             self.least = 1.0;
-            self.begin(sight, &moves, reach);
         }
-        let look = self.look(sight, &moves, reach);
-        let ordered = look.map_or(0.0, |look| look.ordered);
-        self.ordered = [self.ordered[1], ordered];
-        self.least = self.least.min(ordered);
+        self.dimensions = sight.dimensions;
+        let share = share_of_few(sight, &mobile);
+        if share < LIQUID * share_in_crystals(sight.dimensions) {
+            self.follow(sight, Vec::new());
+            return self.note(share);
+        }
+        if self.probes.is_empty() {
+            self.follow(sight, probes(sight, &mobile));
+        }
+        let look = self.look(sight, &mobile);
+        self.note(look.map_or(0.0, |look| look.ordered));
         match look.filter(|look| look.square.sqrt() <= GONE) {
             Some(look) => {
                 if self.looks.len() > 1 {
@@ -294,32 +387,24 @@ impl Order {
                 }
                 self.looks.push(look);
             }
-            None if self.samples > 1 => self.begin(sight, &moves, reach),
+            None if self.since < self.samples => self.follow(sight, probes(sight, &mobile)),
             None => {}
         }
     }
 
-    fn begin(&mut self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) {
-        (self.since, self.start, self.dimensions) = (self.samples, sight.time, sight.dimensions);
+    /// Follows particles from now on; a liquid has none.
+    fn follow(&mut self, sight: &Sight, probes: Vec<Probe>) {
+        (self.since, self.start, self.probes) = (self.samples, sight.time, probes);
         self.looks.clear();
-        let mut mobile: Vec<usize> = (0..sight.x.len()).filter(|k| moves(*k)).collect();
-        mobile.sort_unstable_by_key(|k| sight.tags[*k]);
-        let chosen = mobile.iter().copied().step_by(mobile.len().div_ceil(PROBES).max(1));
-        let chosen: Vec<usize> = chosen.collect();
-        let found = Nearest::new(sight, chosen.iter().copied(), moves, reach);
-        let probe = |k: usize| {
-            let list = found.of(k)?;
-            let neighbour = |&(distance, j, e): &Near| {
-                let apart = apart(sight, k, j);
-                let image = std::array::from_fn(|c| distance * e[c] - apart[c]);
-                Neighbour { tag: sight.tags[j], image, distance }
-            };
-            Some(Probe { tag: sight.tags[k], neighbours: list.iter().map(neighbour).collect() })
-        };
-        self.probes = chosen.into_iter().filter_map(probe).collect();
     }
 
-    fn look(&self, sight: &Sight, moves: &impl Fn(usize) -> bool, reach: f64) -> Option<Look> {
+    /// Keeps the share of ordered particles at a look.
+    fn note(&mut self, ordered: f64) {
+        self.ordered = [self.ordered[1], ordered];
+        self.least = self.least.min(ordered);
+    }
+
+    fn look(&self, sight: &Sight, mobile: &Mobile) -> Option<Look> {
         let dimensions = sight.dimensions;
         let needed = self.probes.iter().flat_map(|p| p.neighbours.iter().map(|n| n.tag).chain([p.tag]));
         let mut index: HashMap<i32, usize> = needed.map(|tag| (tag, usize::MAX)).collect();
@@ -328,17 +413,12 @@ impl Order {
         }
         let at = |tag: &i32| index.get(tag).copied().filter(|k| *k < sight.x.len());
         let probes = || self.probes.iter().filter_map(|p| at(&p.tag));
-        let of_probes = Nearest::new(sight, probes(), moves, reach);
-        let beside = probes().filter_map(|k| of_probes.of(k)).flatten().map(|near| near.1);
-        let all = Nearest::new(sight, probes().chain(beside), moves, reach);
+        let all = Nearest::of_shells(sight, mobile, probes());
         let bonds = all.bonds(dimensions);
         let (mut ordered, mut of_each, mut spacing) = (0.0, Vec::new(), 0.0);
         for probe in &self.probes {
-            let Some((k, list)) = at(&probe.tag).and_then(|k| Some((k, of_probes.of(k)?))) else {
-                continue;
-            };
-            let share = |j: usize| Some(product(&bonds[all.at[k]?], &bonds[all.at[j]?]));
-            let c = list.iter().filter_map(|n| share(n.1)).sum::<f64>() / list.len() as f64;
+            let found = at(&probe.tag).and_then(|k| Some((k, all.of(k)?, all.order(&bonds, k)?)));
+            let Some((k, list, c)) = found else { continue };
             let stretched = |n: &Neighbour| {
                 let d = apart(sight, k, at(&n.tag)?);
                 let r = (0..dimensions).map(|c| (d[c] + n.image[c]).powi(2)).sum::<f64>().sqrt();
@@ -367,7 +447,7 @@ impl Order {
 
     /// The crystal, if the run is one and was long enough to tell.
     pub fn crystal(&self) -> Option<Crystal> {
-        let share = SHARE[usize::from(self.dimensions > 2)];
+        let share = share_in_crystals(self.dimensions);
         let ordered = self.ordered[1];
         if self.samples < LEAST_SAMPLES || ordered < share {
             return None;

@@ -29,6 +29,7 @@ impl Block {
 /// Cells at least as wide as the range; along open directions the outer cells extend to infinity.
 #[derive(Debug, Clone)]
 pub struct Cells {
+    /// The box of the particles.
     pub domain: PeriodicBox,
     edges: [[f64; 3]; 3],
     periodic: [bool; 3],
@@ -50,6 +51,7 @@ pub struct Cells {
 pub struct Near {
     /// Number of particles found.
     pub count: usize,
+    /// Their numbers, in the order of [`Cells::fill`].
     pub id: Vec<u32>,
     /// Distances from the first point and from the second; until the roots are taken, their squares.
     pub r: [Vec<f64>; 2],
@@ -58,6 +60,7 @@ pub struct Near {
 }
 
 impl Cells {
+    /// Empty cells for so many particles.
     pub fn new(domain: &PeriodicBox, dimensions: usize, range: f64, particles: usize) -> Cells {
         let heights = [0, 1, 2].map(|k| domain.height(k));
         let most = MOST_PER_PARTICLE * particles as f64 + 64.0;
@@ -159,9 +162,20 @@ impl Cells {
         c[0] + nx * (c[1] + ny * c[2])
     }
 
+    /// Finds the particles within the range of a point that is inside along periodic directions, with squares of distances.
+    pub fn around(&self, x: [f64; 3], near: &mut Near) {
+        self.near(InstructionSet::best(), [x; 2], None, near);
+    }
+
     /// Finds the particles within the range of `from`, which is inside along periodic directions, or of
     /// `to`, which may be outside; leaves out the particle `but`.
-    pub fn near(&self, set: InstructionSet, [from, to]: [[f64; 3]; 2], but: usize, near: &mut Near) {
+    pub(super) fn near(
+        &self,
+        set: InstructionSet,
+        [from, to]: [[f64; 3]; 2],
+        but: Option<usize>,
+        near: &mut Near,
+    ) {
         let (a, b) = (self.coordinates(from), self.coordinates(to));
         let mut ends = [[0; 2]; 3];
         near.repeats = false;
@@ -173,7 +187,10 @@ impl Cells {
         }
         near.count = 0;
         let points = [self.flat(from), self.flat(to)];
-        vectors::run(set, Search { cells: self, points, ends, but: but as u32, near });
+        vectors::run(
+            set,
+            Search { cells: self, points, ends, but: but.map_or(u32::MAX, |but| but as u32), near },
+        );
     }
 }
 

@@ -19,7 +19,7 @@ use crate::model::expression::TooLarge;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
 use crate::model::{Fluid, PairTerm};
-use cells::{Cells, Near};
+pub use cells::{Cells, Near};
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
 
@@ -255,7 +255,7 @@ impl LocalEnergy {
     /// Finds the neighbours at two points, and their distances.
     fn find(&mut self, points: [[f64; 3]; 2], but: usize) {
         let Some(cells) = &self.cells else { return };
-        cells.near(self.set, points, but, &mut self.near);
+        cells.near(self.set, points, Some(but), &mut self.near);
         let Near { count, r: [before, after], .. } = &mut self.near;
         vectors::run(self.set, Roots([&mut before[..*count], &mut after[..*count]]));
     }
@@ -396,7 +396,7 @@ impl LocalEnergy {
         let LocalEnergy { plan, near, beside, work, species, set, moved, own, x, cells, .. } = self;
         let Some(cells) = cells else { return };
         let (id, kind) = (moved.ids[row] as usize, species[particle]);
-        cells.near(*set, [x[id]; 2], id, beside);
+        cells.near(*set, [x[id]; 2], Some(id), beside);
         let found = beside.count;
         vectors::run(*set, Roots([&mut beside.r[0][..found], &mut []]));
         let kernel = &plan.densities[plan.passes[pass]].kernel;

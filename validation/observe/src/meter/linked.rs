@@ -168,7 +168,7 @@ impl Distance {
 }
 
 /// The number density around the particles of the densest tenth of `count`, within `range` of each; `pairs` visits the pairs within.
-pub(crate) fn density_of_densest_tenth(
+fn density_of_densest_tenth(
     count: usize,
     dimensions: usize,
     range: f64,

@@ -17,7 +17,7 @@ mod pendant;
 mod poiseuille;
 mod pressure;
 mod profiles;
-mod rdf;
+pub(crate) mod rdf;
 mod species_pairs;
 mod spheres;
 mod stress_profile;

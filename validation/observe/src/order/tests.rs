@@ -1,7 +1,6 @@
 //! Configurations of known kind.
 
 use super::*;
-use psidpd_core::engine::pair_sums::for_each_pair;
 use rand::{RngExt, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use rand_distr::{Distribution, StandardNormal};
 
@@ -32,12 +31,8 @@ impl Stage {
         let (x, (images, tags)): (Vec<_>, (Vec<_>, Vec<_>)) =
             order.iter().map(pick).map(|(x, image, tag)| (x, (image, tag))).unzip();
         let Stage { domain, dimensions, time, .. } = self;
-        let pairs = |range: f64, visit: &mut dyn FnMut(Pair)| {
-            for_each_pair(&x, domain, *dimensions, range, visit);
-        };
         let sight = Sight {
             time: *time,
-            pairs: &pairs,
             domain,
             dimensions: *dimensions,
             x: &x,
