@@ -1,5 +1,5 @@
 //! Times what each observable of a scene costs a step that it samples, in steps of velocity Verlet of the same scene, on one thread: the
-//! difference of medians. What momentum transport and totals cost in that step is counted in.
+//! difference of medians, which leaves out what one sample in eight does (`surface_tension` stretches its box). What momentum transport and totals cost in that step is counted in.
 //!
 //! `cargo run --release -p psidpd-dynamics --example meter_pace SCENE`
 

@@ -214,22 +214,23 @@ impl Mobile {
             cells.fill(&at);
             cells
         };
-        let cells = sorted(range);
         // The density around particles of the densest tenth.
-        let mut near = Near::default();
-        let mut around = |x: &[f64; 3]| {
-            cells.around(*x, &mut near);
-            near.count.saturating_sub(1)
+        let dense = {
+            let (cells, mut near) = (sorted(range), Near::default());
+            let around = |x: &[f64; 3]| {
+                cells.around(*x, &mut near);
+                near.count.saturating_sub(1)
+            };
+            let mut counts: Vec<usize> = spread(&at, PROBES).map(around).collect();
+            counts.sort_unstable();
+            counts.get(counts.len() * 9 / 10).copied().unwrap_or(0)
         };
-        let mut counts: Vec<usize> = spread(&at, PROBES).map(&mut around).collect();
-        counts.sort_unstable();
-        let dense = counts.get(counts.len() * 9 / 10).copied().unwrap_or(0) as f64;
-        let rho = dense / shell_volume(dimensions, 0.0, range);
+        let rho = dense as f64 / shell_volume(dimensions, 0.0, range);
         // No image of an image is needed.
         let width = (0..dimensions).map(|k| domain.height(k)).fold(f64::INFINITY, f64::min);
         let reach = reach(dimensions, rho).min(width);
-        let cells = if reach > range { sorted(reach) } else { cells };
-        (rho > 0.0 && reach.is_finite()).then_some(Mobile { particles, cells })
+        let is_known = rho > 0.0 && reach.is_finite();
+        is_known.then(|| sorted(reach)).map(|cells| Mobile { particles, cells })
     }
 }
 
@@ -242,20 +243,17 @@ fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
 type Beside = (f64, usize, [f64; 3]);
 
 /// The nearest neighbours of some particles, by distance.
+#[derive(Default)]
 struct Nearest {
     /// The place of each particle in `lists`.
-    at: Vec<Option<usize>>,
+    at: HashMap<usize, usize>,
     lists: Vec<Vec<Beside>>,
 }
 
 impl Nearest {
-    fn none(sight: &Sight) -> Nearest {
-        Nearest { at: vec![None; sight.x.len()], lists: Vec::new() }
-    }
-
     /// The neighbours of the particles `of` and of their neighbours; those with too few are left out.
     fn of_shells(sight: &Sight, mobile: &Mobile, of: impl Iterator<Item = usize>) -> Nearest {
-        let mut all = Nearest::none(sight);
+        let mut all = Nearest::default();
         all.find(sight, mobile, of);
         let beside: Vec<usize> = all.lists.iter().flatten().map(|near| near.1).collect();
         all.find(sight, mobile, beside);
@@ -266,7 +264,7 @@ impl Nearest {
         let most = neighbours(sight.dimensions);
         let (mut near, mut by_distance) = (Near::default(), Vec::new());
         for k in of {
-            if self.at[k].is_some() {
+            if self.at.contains_key(&k) {
                 continue;
             }
             mobile.cells.around(sight.x[k], &mut near);
@@ -291,13 +289,13 @@ impl Nearest {
                 let r = square.sqrt();
                 (r, other, d.map(|d| d / r))
             };
-            self.at[k] = Some(self.lists.len());
+            self.at.insert(k, self.lists.len());
             self.lists.push(by_distance.iter().map(beside).collect());
         }
     }
 
     fn of(&self, particle: usize) -> Option<&Vec<Beside>> {
-        self.at[particle].map(|k| &self.lists[k])
+        self.at.get(&particle).map(|k| &self.lists[*k])
     }
 
     /// The bond-order vector of each particle, divided by its length.
@@ -317,7 +315,7 @@ impl Nearest {
     /// The order c of a particle, from these vectors.
     fn order(&self, bonds: &[Bonds], particle: usize) -> Option<f64> {
         let list = self.of(particle)?;
-        let share = |j: usize| Some(product(&bonds[self.at[particle]?], &bonds[self.at[j]?]));
+        let share = |j: usize| Some(product(&bonds[*self.at.get(&particle)?], &bonds[*self.at.get(&j)?]));
         Some(list.iter().filter_map(|n| share(n.1)).sum::<f64>() / list.len() as f64)
     }
 }
@@ -341,7 +339,7 @@ fn probes(sight: &Sight, mobile: &Mobile) -> Vec<Probe> {
     let mut by_tag = mobile.particles.clone();
     by_tag.sort_unstable_by_key(|k| sight.tags[*k]);
     let chosen: Vec<usize> = spread(&by_tag, PROBES).copied().collect();
-    let mut found = Nearest::none(sight);
+    let mut found = Nearest::default();
     found.find(sight, mobile, chosen.iter().copied());
     let probe = |k: usize| {
         let list = found.of(k)?;

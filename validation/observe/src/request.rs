@@ -32,6 +32,11 @@ impl Observe {
         self.requests.iter().map(of_request).sum()
     }
 
+    /// Whether there is an observable that means nothing for a crystal.
+    pub fn of_liquids(&self) -> bool {
+        self.requests.iter().any(|request| request.meter.of_liquids())
+    }
+
     /// Whether all pairs of a configuration may be listed.
     pub fn lists_pairs(&self) -> bool {
         self.requests.iter().any(|request| request.meter.lists_pairs())

@@ -12,6 +12,9 @@ const EVALUATION: f64 = 1200.0;
 /// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330.
 const OBSERVED: f64 = 1300.0;
 
+/// Bytes per particle of the cells for the test whether a liquid is a crystal: 10⁶ particles took 137.
+const OF_LIQUIDS: f64 = 140.0;
+
 /// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles. 163 350 to 10⁶ particles
 /// took 650 to 730.
 const APART: f64 = 720.0;
@@ -61,7 +64,8 @@ fn bytes_per_particle(scene: &Scene) -> f64 {
         (_, true) => EVALUATION * part,
         _ => 0.0,
     };
-    PARTICLE + pairs + evaluated
+    let cells = if scene.observe.of_liquids() { OF_LIQUIDS } else { 0.0 };
+    PARTICLE + pairs + evaluated + cells
 }
 
 #[cfg(test)]
@@ -84,8 +88,10 @@ mod tests {
         let share = 20_000.0 / 756_250.0;
         let of = |observe: &str| bytes_per_particle(&of(50.0, &format!("[observe]\n{observe} = true\n")));
         assert_eq!(of("density_profile"), bytes(50.0));
-        for observe in ["temperature", "stress_profile", "clusters", "msd"] {
-            assert!((of(observe) - bytes(50.0) - OBSERVED + share * EVALUATION).abs() < 1e-9, "{observe}");
+        assert_eq!(of("msd"), bytes(50.0) + OF_LIQUIDS);
+        for (observe, cells) in [("temperature", 0.0), ("clusters", 0.0), ("stress_profile", OF_LIQUIDS)] {
+            let more = OBSERVED - share * EVALUATION + cells;
+            assert!((of(observe) - bytes(50.0) - more).abs() < 1e-9, "{observe}");
         }
         let once = (1.0 - share) * EVALUATION;
         assert!((bytes(4.0) - bytes(50.0) - once).abs() < 1e-9);

@@ -216,6 +216,7 @@ impl Meter for ContactAngle {
     };
 
     const OF_LIQUIDS: bool = true;
+    const LISTS_PAIRS: bool = true;
 
     fn read(options: &Options) -> Result<ContactAngle, FileError> {
         let (domain, fluid) = (options.place.domain, options.place.fluid);

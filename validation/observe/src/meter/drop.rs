@@ -157,6 +157,7 @@ impl Meter for Drop {
 
     const FLUX: Recorded = Recorded::Lines;
     const OF_LIQUIDS: bool = true;
+    const LISTS_PAIRS: bool = true;
 
     fn read(options: &Options) -> Result<Drop, FileError> {
         let range = options.within_half_box("range")?.unwrap_or(options.half_box());

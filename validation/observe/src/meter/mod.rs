@@ -60,8 +60,8 @@ pub trait Meter: Sized {
     /// True if the results mean nothing for a crystal.
     const OF_LIQUIDS: bool = false;
 
-    /// True if all pairs of a configuration may be listed for it: for its samples, or for the test whether it is a crystal.
-    const LISTS_PAIRS: bool = Self::OF_LIQUIDS;
+    /// True if all pairs of a configuration may be listed for its samples.
+    const LISTS_PAIRS: bool = false;
 
     fn read(options: &Options) -> Result<Self, FileError>;
 

@@ -103,6 +103,7 @@ impl Meter for StressProfile {
 
     const FLUX: Recorded = Recorded::Lines;
     const OF_LIQUIDS: bool = true;
+    const LISTS_PAIRS: bool = true;
 
     fn read(options: &Options) -> Result<StressProfile, FileError> {
         let across = Across::read(options, false)?;
