@@ -1,5 +1,6 @@
 //! Times what each observable of a scene costs a step that it samples, in steps of velocity Verlet of the same scene, on one thread: the
-//! difference of medians, which leaves out what one sample in eight does (`surface_tension` stretches its box). What momentum transport and totals cost in that step is counted in.
+//! difference of medians. So what one sample in eight does, the stretches of `surface_tension`, does not count; what momentum transport
+//! and totals cost in that step does.
 //!
 //! `cargo run --release -p psidpd-dynamics --example meter_pace SCENE`
 
@@ -11,8 +12,8 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-/// The first samples, and those that are timed. Some of the first choose settings or look at the order of particles; the next to do
-/// so is the 33rd.
+/// The first samples, and those that are timed. Some of the first choose settings or look at the order of particles; few of the others
+/// do so.
 const FIRST: u64 = 17;
 const TIMED: u64 = 15;
 

@@ -29,7 +29,7 @@ const PROBES: usize = 1000;
 /// The number of particles by which a liquid is told from what may be a crystal: one of its looks takes a tenth of the time.
 const FEW: usize = 50;
 
-/// The part of the smallest share of ordered particles in a crystal, below which these few are of a liquid.
+/// If so small a part of [`SHARE`] of these few is ordered, they are those of a liquid.
 const LIQUID: f64 = 1.0 / 3.0;
 
 /// A particle with a larger c is ordered.
@@ -217,21 +217,28 @@ impl Mobile {
         // The density around particles of the densest tenth.
         let dense = {
             let (cells, mut near) = (sorted(range), Near::default());
-            let around = |x: &[f64; 3]| {
-                cells.around(*x, &mut near);
+            let around = |k: usize| {
+                cells.around(x[k], &mut near);
                 near.count.saturating_sub(1)
             };
-            let mut counts: Vec<usize> = spread(&at, PROBES).map(around).collect();
+            let mut counts: Vec<usize> = some(sight, &particles, PROBES).map(around).collect();
             counts.sort_unstable();
             counts.get(counts.len() * 9 / 10).copied().unwrap_or(0)
         };
         let rho = dense as f64 / shell_volume(dimensions, 0.0, range);
-        // No image of an image is needed.
+        // No image of a particle but the nearest is that near.
         let width = (0..dimensions).map(|k| domain.height(k)).fold(f64::INFINITY, f64::min);
-        let reach = reach(dimensions, rho).min(width);
+        let reach = reach(dimensions, rho).min(0.5 * width);
         let is_known = rho > 0.0 && reach.is_finite();
         is_known.then(|| sorted(reach)).map(|cells| Mobile { particles, cells })
     }
+}
+
+/// About so many of the particles at random, the same whatever their order.
+fn some<'a>(sight: &'a Sight, all: &'a [usize], most: usize) -> impl Iterator<Item = usize> + 'a {
+    let mixed = |tag: i32| (tag as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+    let below = (most << 32) as u64 / all.len().max(1) as u64;
+    all.iter().copied().filter(move |k| mixed(sight.tags[*k]) < below)
 }
 
 /// So many of all at most, in even steps.
@@ -271,11 +278,6 @@ impl Nearest {
             by_distance.clear();
             let others = near.r[0].iter().zip(&near.id).take(near.count).filter(|(square, _)| **square > 0.0);
             by_distance.extend(others.map(|(square, id)| (*square, *id)));
-            if near.repeats {
-                // Of several images of a particle the nearest.
-                by_distance.sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
-                by_distance.dedup_by_key(|(_, id)| *id);
-            }
             if by_distance.len() < most {
                 continue;
             }
@@ -320,13 +322,13 @@ impl Nearest {
     }
 }
 
-/// The share of ordered particles among a few.
+/// The share of ordered particles among a few of those that have neighbours.
 fn share_of_few(sight: &Sight, mobile: &Mobile) -> f64 {
-    let few: Vec<usize> = spread(&mobile.particles, FEW).copied().collect();
+    let few: Vec<usize> = some(sight, &mobile.particles, FEW).collect();
     let all = Nearest::of_shells(sight, mobile, few.iter().copied());
     let bonds = all.bonds(sight.dimensions);
-    let is_ordered = |k: &&usize| all.order(&bonds, **k).is_some_and(|c| c > ORDERED);
-    few.iter().filter(is_ordered).count() as f64 / few.len() as f64
+    let orders: Vec<f64> = few.iter().filter_map(|k| all.order(&bonds, *k)).collect();
+    orders.iter().filter(|c| **c > ORDERED).count() as f64 / orders.len().max(1) as f64
 }
 
 /// The smallest share of ordered particles in a crystal.
@@ -359,7 +361,7 @@ impl Order {
         self.samples = self.samples.saturating_add(1);
         // Few looks, however long the run, and none that is too early to tell.
         let (passed, unit) = (self.samples.saturating_sub(self.since), (self.since / 2).max(1));
-        let looks = self.samples >= LEAST_SAMPLES / 2 && passed.is_multiple_of(unit);
+        let looks = self.samples >= LEAST_SAMPLES / 4 && passed.is_multiple_of(unit);
         if self.samples > 1 && !(looks && (passed / unit).is_power_of_two()) {
             return;
         }

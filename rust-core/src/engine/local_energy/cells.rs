@@ -1,4 +1,4 @@
-//! Particles sorted into cells, for particles that move one by one.
+//! Particles sorted into cells, for particles that move one by one, and for the neighbours of a few particles.
 
 use crate::engine::vectors::{self, Loop};
 use psidpd_passes::domain::PeriodicBox;
@@ -29,8 +29,7 @@ impl Block {
 /// Cells at least as wide as the range; along open directions the outer cells extend to infinity.
 #[derive(Debug, Clone)]
 pub struct Cells {
-    /// The box of the particles.
-    pub domain: PeriodicBox,
+    pub(super) domain: PeriodicBox,
     edges: [[f64; 3]; 3],
     periodic: [bool; 3],
     dimensions: usize,
@@ -56,7 +55,7 @@ pub struct Near {
     /// Distances from the first point and from the second; until the roots are taken, their squares.
     pub r: [Vec<f64>; 2],
     /// Whether a particle may be listed more than once.
-    pub repeats: bool,
+    pub(super) repeats: bool,
 }
 
 impl Cells {
@@ -111,7 +110,7 @@ impl Cells {
     }
 
     /// Moves a particle to `x`, inside along periodic directions.
-    pub fn change(&mut self, id: usize, x: [f64; 3]) {
+    pub(super) fn change(&mut self, id: usize, x: [f64; 3]) {
         let ([from, place], to) = (self.place[id], self.cell(x));
         if from as usize == to {
             let x = self.flat(x);
@@ -134,6 +133,8 @@ impl Cells {
     fn insert(&mut self, id: u32, x: [f64; 3], cell: usize) {
         let (place, x) = (self.filled[cell] as usize, self.flat(x));
         if place.is_multiple_of(LANES) {
+            // Vectors would begin with room for four.
+            self.cells[cell].reserve_exact(1);
             self.cells[cell].push(Block::EMPTY);
         }
         self.cells[cell][place / LANES].put(place % LANES, id, x);

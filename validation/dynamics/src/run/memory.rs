@@ -12,8 +12,8 @@ const EVALUATION: f64 = 1200.0;
 /// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330.
 const OBSERVED: f64 = 1300.0;
 
-/// Bytes per particle of the cells for the test whether a liquid is a crystal: 10⁶ particles took 137.
-const OF_LIQUIDS: f64 = 140.0;
+/// Bytes per particle of the cells for the test whether a liquid is a crystal: 10⁶ particles took 37 and 42.
+const OF_LIQUIDS: f64 = 45.0;
 
 /// Bytes per particle of a thermostat apart from the forces: the pairs, their noise, and vectors of the particles. 163 350 to 10⁶ particles
 /// took 650 to 730.

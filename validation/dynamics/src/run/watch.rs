@@ -171,7 +171,8 @@ impl Watch {
             self.evaluator.take_if(|_| piece.is_some());
         }
         let middle = place(done, simulation.len());
-        let Some(kt) = simulation.temperature_in_cells(middle).filter(|_| has_time) else { return Ok(()) };
+        let found = if has_time { simulation.temperature_in_cells(middle) } else { None };
+        let Some(kt) = found else { return Ok(()) };
         self.kinetic.push(kt / stage.kt);
         // A body force or a wall may drive a flow that is hot by itself.
         let driven = stage.body_forces && simulation.has_body_forces() || simulation.has_moving_walls();

@@ -1,16 +1,17 @@
 //! Observables of a few particles whose answers are known without the code.
 
 use crate::particles::State;
-use crate::run::Simulation;
+use crate::run::{Integrator, Simulation};
 use crate::scene::Scene;
 use crate::tests::support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
 use nalgebra::Matrix3;
-use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::{COMPONENTS, Evaluator};
-use psidpd_observe::Observation;
+use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_observe::flux::{Drag, Flux, Line};
 use psidpd_observe::frame::{Frame, View};
 use psidpd_observe::meter::AnyMeter;
+use psidpd_observe::meter::surface_tension::stretched_energy;
+use psidpd_observe::{Measured, Observation, Recorded};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -86,6 +87,43 @@ fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
         assert!((found / error - 1.0).abs() < 1e-9 && error > 0.0, "{interfaces}: {found} {error}");
         let stress = value(&out[0], "stress_conservative");
         assert!((stress - 6.0 / interfaces * (5.0 - 1.5)).abs() < 1e-12, "{stress}");
+    }
+}
+
+/// Of a small perturbation few samples are stretched, whose tension and error are those of all. Of a large one all are.
+#[test]
+fn few_stretched_samples_have_the_tension_of_all() {
+    for (change, bound) in [(1e-4, 1e-4), (0.02, 1e-12)] {
+        let text = format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 4\nbox = [4.0, 4.0, 9.0]\ndt = 0.01\nsteps = 10\n[initial]\n\
+             kind = \"slab\"\nthickness = 4.0\ndensity = 6.0\n[observe]\nsurface_tension = {{ perturbation = {change} }}\n"
+        );
+        let scene = support::scene(SET6, &text).unwrap();
+        let mut run = Simulation::new(&scene.model, 1.0, scene.initial_state(), 4).unwrap();
+        run.prepare(0.01, Want::FORCES).unwrap();
+        run.advance(300, 0.01, Integrator::VelocityVerlet).unwrap();
+        run.record_flux(Recorded::Sum);
+        let fluid = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
+        let mut meter = scene.observe.requests[0].meter.clone();
+        let mut weights = Vec::new();
+        for _ in 0..64 {
+            run.advance(4, 0.01, Integrator::VelocityVerlet).unwrap();
+            run.step(0.01, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
+            let frame = Frame::new(run.view(0.0), &fluid);
+            assert!(meter.sample(&frame));
+            let energy = frame.evaluation().energy;
+            let weight = |change: f64| (energy - stretched_energy(&frame, 2, change)).exp();
+            weights.push([change, -change].map(weight));
+        }
+        let mean = |c: usize| weights.iter().map(|w| w[c]).sum::<f64>() / 64.0;
+        let area = 2.0 * 2.0 * change * 16.0;
+        let value = -(mean(0) / mean(1)).ln() / area;
+        let rows: Vec<f64> = weights.iter().map(|w| -(w[0] / mean(0) - w[1] / mean(1)) / area).collect();
+        let error = Measured::mean(&rows).error;
+        let out = meter.finish();
+        let found = out[0].scalar("free_energy").unwrap();
+        assert!((found.value / value - 1.0).abs() < bound, "{change}: {found:?} {value} {error}");
+        assert!((found.error / error - 1.0).abs() < 10.0 * bound, "{change}: {found:?} {value} {error}");
     }
 }
 

@@ -1,15 +1,18 @@
 //! The tension of interfaces normal to an axis.
 //!
-//! The derivative of the free energy is known in each sample from its virial: to the order of ε² it is what the stretched boxes give.
-//! So for small ε every eighth sample is stretched, and what the two differ by in these is added to the mean of the virials.
+//! The derivative of the free energy is known in each sample from its virial. With x = ΔU/kT the stretched boxes give the same but for
+//! about x³/6. So while x is small every eighth sample is stretched, and what the two differ by in these is added to the mean of the
+//! virials.
 
 use super::across::Across;
 use super::*;
 use nalgebra::Matrix3;
 
-/// Samples for each that is stretched, and the largest perturbation for which few suffice.
+/// Samples for each that is stretched.
 const EVERY: u64 = 8;
-const SMALL: f64 = 1e-3;
+
+/// After a change of the energy by a larger part of kT all samples are stretched.
+const LARGE: f64 = 0.2;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceTension {
@@ -19,6 +22,8 @@ pub struct SurfaceTension {
     perturbation: f64,
     kt: f64,
     samples: u64,
+    /// Whether all samples are stretched.
+    all: bool,
     /// γ from the momentum transport, from the conservative stress, and from its virial alone; then, 0 in samples that are not stretched,
     /// exp(−ΔU/kT) for more and for less area, γ from the virial, and 1.
     series: Series,
@@ -71,9 +76,9 @@ impl Meter for SurfaceTension {
                 the same limit as the time step goes to 0. `free_energy` is the \
                 test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
                 with their box at constant volume to 1 ± ε times the area, the many-body energy is computed again, \
-                and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. For ε up to \
-                0.001 that is done in every eighth sample, and what it differs by from γ of the virial alone is added to the mean of \
-                this over all samples: the errors are those of all. The two \
+                and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. While ΔU is below \
+                0.2 kT, that is done in every eighth sample; what it differs by from γ of the virial alone is added to the mean of \
+                this over all samples. The two \
                 routes agree in equilibrium, to the error of the time step. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
         keys: keys! {
             use AXIS;
@@ -107,6 +112,7 @@ impl Meter for SurfaceTension {
             perturbation: options.number("perturbation")?,
             kt: 0.0,
             samples: 0,
+            all: false,
             series: Series::new(7),
         })
     }
@@ -123,18 +129,16 @@ impl Meter for SurfaceTension {
         let conservative = tension(view.conservative_pressure);
         let of_virial = conservative - tension(kinetic_pressure(frame));
         let mut sample = [tension(carried), conservative, of_virial, 0.0, 0.0, 0.0, 0.0];
-        if self.perturbation > SMALL || self.samples.is_multiple_of(EVERY) {
+        if self.all || self.samples.is_multiple_of(EVERY) {
             let energy = frame.evaluation().energy;
             let weight = |change: f64| (-(stretched_energy(frame, axis, change) - energy) / self.kt).exp();
-            sample[3..].copy_from_slice(&[
-                weight(self.perturbation),
-                weight(-self.perturbation),
-                of_virial,
-                1.0,
-            ]);
+            let [more, less] = [self.perturbation, -self.perturbation].map(weight);
+            sample[3..].copy_from_slice(&[more, less, of_virial, 1.0]);
+            self.all |= [more, less].iter().any(|weight| weight.ln().abs() > LARGE);
         }
-        self.samples += 1;
-        self.series.push(&sample)
+        let taken = self.series.push(&sample);
+        self.samples += u64::from(taken);
+        taken
     }
 
     fn series(&mut self) -> Vec<&mut Series> {
@@ -142,7 +146,7 @@ impl Meter for SurfaceTension {
     }
 
     fn restart(&mut self) {
-        (self.kt, self.samples) = (0.0, 0);
+        (self.kt, self.samples, self.all) = (0.0, 0, false);
     }
 
     fn finish(&self) -> Vec<Observation> {

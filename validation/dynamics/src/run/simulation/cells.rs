@@ -2,12 +2,19 @@
 
 use super::Simulation;
 use crate::particles::State;
+use psidpd_core::engine::PeriodicBox;
 
 /// Cells whose particles count, among however many.
 const CELLS: u64 = 1024;
 
-/// Particles in a cell on average, at least.
+/// Particles in a cell on average, at least, as far as this needs cells less than twice as wide.
 const CROWD: f64 = 5.0;
+
+/// Particles of which the mean number in a cell is taken.
+const FEW: usize = 512;
+
+/// Particles that a thread looks through at a time.
+const PART: usize = 1 << 14;
 
 /// Largest number of cells along a direction, so that cells of any box have numbers.
 const MOST: f64 = 1_048_576.0;
@@ -19,39 +26,71 @@ const PARTNERS: usize = 8;
 #[derive(Clone, Copy, Default)]
 struct Cell {
     count: usize,
-    /// All of them, or so many at random. The order in memory is no choice: it is that of earlier positions, so that neighbours there which
-    /// are still in one cell are slow.
+    /// All of them, or so many at random. Particles that are next to each other in memory were so some steps ago: pairs of these that are
+    /// still in one cell are slower than others.
     some: [u32; PARTNERS],
 }
 
-impl Simulation {
-    /// The number of cells along each direction. They are as wide as the longest range, and wider where few particles would be in one.
-    fn cells(&self) -> [f64; 3] {
-        let (State { domain, x, .. }, dimensions) = (self.state(), self.dimensions());
-        let of_crowd = CROWD * domain.volume(dimensions) / x.len() as f64;
-        let edge = self.engine().plan().cutoff().max(of_crowd.powf(1.0 / dimensions as f64));
+/// A grid of cells in the box.
+struct Grid<'a> {
+    domain: &'a PeriodicBox,
+    count: [f64; 3],
+}
+
+impl<'a> Grid<'a> {
+    fn new(domain: &'a PeriodicBox, dimensions: usize, edge: f64) -> Grid<'a> {
         let along = |k: usize| (domain.height(k) / edge).floor().clamp(1.0, MOST);
-        std::array::from_fn(|k| if k < dimensions { along(k) } else { 1.0 })
+        Grid { domain, count: std::array::from_fn(|k| if k < dimensions { along(k) } else { 1.0 }) }
+    }
+
+    fn number(&self, x: &[f64; 3]) -> u64 {
+        let (s, count) = (self.domain.fraction(*x), self.count);
+        let at: [u32; 3] = std::array::from_fn(|c| (s[c] * count[c]).min(count[c] - 1.0) as u32);
+        (u64::from(at[0]) * count[1] as u64 + u64::from(at[1])) * count[2] as u64 + u64::from(at[2])
+    }
+
+    fn cells(&self) -> u64 {
+        self.count.iter().map(|count| *count as u64).product()
+    }
+}
+
+impl Simulation {
+    /// Cells as wide as the longest range, and wider where `of` are few in a cell. These are next to each other in memory, so that empty
+    /// space around a drop does not count; if they are far from each other, cells are as wide as for one in each.
+    fn grid(&self, of: &[[f64; 3]]) -> Grid<'_> {
+        let (domain, dimensions, range) =
+            (&self.state().domain, self.dimensions(), self.engine().plan().cutoff());
+        let grid = Grid::new(domain, dimensions, range);
+        let mut numbers: Vec<u64> = of.iter().map(|x| grid.number(x)).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let wider = (CROWD * numbers.len() as f64 / of.len() as f64).powf(1.0 / dimensions as f64);
+        if wider > 1.0 { Grid::new(domain, dimensions, range * wider) } else { grid }
     }
 
     /// kT of the relative velocities along pairs of mobile particles in a cell, `Σ w μ u²/Σ w` with `w = 1 − r²/r_c²` within the longest range
     /// r_c: flow on scales beyond that hardly contributes. It is an estimate of that of all pairs in their cells, whatever the order of
     /// particles. The cells are those around particle `middle`; `None` where they have no pair.
     pub(in crate::run) fn temperature_in_cells(&self, middle: usize) -> Option<f64> {
-        let State { domain, mass, x, v, species, .. } = self.state();
+        let State { mass, x, v, species, .. } = self.state();
         let inverse = self.engine().plan().cutoff().powi(-2);
-        let count = self.cells();
-        let number = |x: &[f64; 3]| {
-            let s = domain.fraction(*x);
-            let at: [u32; 3] = std::array::from_fn(|c| (s[c] * count[c]).min(count[c] - 1.0) as u32);
-            (u64::from(at[0]) * count[1] as u64 + u64::from(at[1])) * count[2] as u64 + u64::from(at[2])
-        };
-        let first = number(x.get(middle)?).saturating_sub(CELLS / 2);
+        let first = middle.min(x.len().saturating_sub(FEW));
+        let grid = self.grid(&x[first..x.len().min(first + FEW)]);
+        let first = grid.number(x.get(middle)?).saturating_sub(CELLS / 2);
+        let first = first.min(grid.cells().saturating_sub(CELLS));
+        let mut parts: Vec<_> = (0..x.len().div_ceil(PART)).map(|part| (part * PART, Vec::new())).collect();
+        self.engine().pool().each(&mut parts, |(start, found)| {
+            for k in *start..x.len().min(*start + PART) {
+                let cell = grid.number(&x[k]).wrapping_sub(first);
+                if cell < CELLS && self.frozen().get(k) != Some(&true) {
+                    found.push((k, cell as usize));
+                }
+            }
+        });
         let (mut sum, mut weights) = (0.0, 0.0);
         let mut cells = vec![Cell::default(); CELLS as usize];
-        for k in 0..x.len() {
-            let cell = cells.get_mut(number(&x[k]).wrapping_sub(first) as usize);
-            let Some(cell) = cell.filter(|_| self.frozen().get(k) != Some(&true)) else { continue };
+        for (k, cell) in parts.into_iter().flat_map(|(_, found)| found) {
+            let cell = &mut cells[cell];
             let known = cell.count.min(PARTNERS);
             let m = mass[species[k] as usize];
             let (mut squares, mut of_one) = (0.0, 0.0);
@@ -60,8 +99,8 @@ impl Simulation {
                 let other = mass[species[j] as usize];
                 let d: [f64; 3] = std::array::from_fn(|c| x[k][c] - x[j][c]);
                 let square = d.iter().map(|d| d * d).sum::<f64>();
-                // Without a branch, whose outcome no processor can foresee.
-                let weight = (1.0 - square * inverse).max(0.0);
+                // Which pairs are in range is chance, so that a branch costs more than the sum.
+                let weight = if square > 0.0 { (1.0 - square * inverse).max(0.0) } else { 0.0 };
                 let along = (0..3).map(|c| d[c] * (v[k][c] - v[j][c])).sum::<f64>();
                 squares +=
                     weight * (m * other * along * along) / ((m + other) * square.max(f64::MIN_POSITIVE));
@@ -83,11 +122,11 @@ impl Simulation {
             }
             cell.count += 1;
         }
-        (weights > 0.0).then(|| sum / weights)
+        Some(sum / weights).filter(|kt| kt.is_finite())
     }
 }
 
-/// A number that tells nothing of the particle.
+/// A number that depends on the index alone.
 fn random(k: usize) -> u64 {
     let mixed = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 33
@@ -99,7 +138,6 @@ mod tests {
     use crate::particles::Tags;
     use crate::tests::support::{SET6, scene};
     use nalgebra::{Matrix3, Vector3};
-    use psidpd_core::engine::PeriodicBox;
     use std::collections::HashMap;
 
     const MIXTURE: &str = include_str!("../../../../models/huggins.toml");
@@ -127,17 +165,14 @@ mod tests {
     }
 
     /// The definition, by all pairs in a cell, and the largest number of particles there.
-    fn plain(simulation: &Simulation) -> (f64, usize) {
+    fn plain(simulation: &Simulation, count: [f64; 3]) -> (f64, usize) {
         let State { domain, mass, x, v, species, .. } = simulation.state();
         let dimensions = simulation.dimensions();
         let range = simulation.engine().plan().cutoff();
-        let mean = domain.volume(dimensions) / x.len() as f64;
-        let edge = range.max((5.0 * mean).powf(1.0 / dimensions as f64));
         let mut cells: HashMap<Vec<usize>, Vec<usize>> = HashMap::new();
         for k in (0..x.len()).filter(|k| simulation.frozen().get(*k) != Some(&true)) {
             let s = domain.fraction(x[k]);
-            let count = |c: usize| (domain.height(c) / edge).floor();
-            let at = (0..dimensions).map(|c| (s[c] * count(c)) as usize).collect();
+            let at = (0..dimensions).map(|c| (s[c] * count[c]) as usize).collect();
             cells.entry(at).or_default().push(k);
         }
         let (mut sum, mut weights) = (0.0, 0.0);
@@ -175,15 +210,31 @@ mod tests {
         let even = with(&even, |state| state.mass = vec![0.5, 3.0]);
         let mut exact = 0;
         for of in [set6, tilted, held, crowd(PLANE, "[16.0, 18.0]", 4.0), mixed, even] {
-            let (expected, most) = plain(&of);
-            // In the middle of so few cells all of them count.
-            let middle = (0..of.len()).min_by_key(|k| ((of.state().x[*k][0] - 4.5).abs() * 1e9) as u64);
-            let found = of.temperature_in_cells(middle.unwrap()).unwrap();
-            let bound = if most <= PARTNERS + 1 { 1e-10 } else { 0.1 };
-            exact += usize::from(most <= PARTNERS + 1);
-            assert!((found / expected - 1.0).abs() < bound, "{found} {expected} {most}");
+            let last = of.len() - 1;
+            for middle in [0, last / 2, last] {
+                let first = middle.min(of.len().saturating_sub(FEW));
+                let count = of.grid(&of.state().x[first..of.len().min(first + FEW)]).count;
+                let (expected, most) = plain(&of, count);
+                let found = of.temperature_in_cells(middle).unwrap();
+                let bound = if most <= PARTNERS + 1 { 1e-10 } else { 0.1 };
+                exact += usize::from(most <= PARTNERS + 1);
+                assert!((found / expected - 1.0).abs() < bound, "{found} {expected} {most}");
+            }
         }
         assert!(exact > 0);
+    }
+
+    /// Cells are as wide as the range in a dense liquid, also in a drop in a wide box, and wider by a cube root of 5 at most.
+    #[test]
+    fn cells_hold_some_particles() {
+        let edge = |of: &Simulation| 30.0 / of.grid(&of.state().x[..FEW]).count[0];
+        let dense = with(&crowd(SET6, "30.0", 1000.0 / 27_000.0), |state| {
+            state.x.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            state.x.iter_mut().for_each(|x| *x = x.map(|c| 10.0 + c / 6.0));
+        });
+        assert!((1.0..1.01).contains(&edge(&dense)), "{}", edge(&dense));
+        let sparse = crowd(SET6, "30.0", 0.05);
+        assert!((1.6..1.8).contains(&edge(&sparse)), "{}", edge(&sparse));
     }
 
     /// In whatever order particles are in memory, in that of their velocities too, where neighbours move alike; whichever of many cells
@@ -218,5 +269,8 @@ mod tests {
         assert!(seen[0] != seen[1] && seen[1] != seen[2], "{seen:?}");
         let sparse = crowd(SET6, "30.0", 1.0 / 27_000.0);
         assert_eq!(sparse.temperature_in_cells(0), None);
+        // Particles at one point have no direction.
+        let together = with(&crowd(SET6, "10.0", 0.3), |state| state.x.fill([5.0; 3]));
+        assert_eq!(together.temperature_in_cells(0), None);
     }
 }
