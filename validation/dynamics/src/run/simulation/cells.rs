@@ -206,7 +206,7 @@ mod tests {
         held.set_frozen(&Tags::Ranges((1..900).step_by(3).map(|tag| tag..=tag).collect()));
         let mixed = with(&crowd(MIXTURE, "[8.0, 9.0, 8.0]", 4.0), |state| state.mass = vec![0.5, 3.0]);
         // On a lattice no cell has more particles than are known.
-        let even = placed("lattice", MIXTURE, "[9.0, 8.0, 9.0]", 4.0);
+        let even = placed("lattice", MIXTURE, "10.5", 4.0);
         let even = with(&even, |state| state.mass = vec![0.5, 3.0]);
         let mut exact = 0;
         for of in [set6, tilted, held, crowd(PLANE, "[16.0, 18.0]", 4.0), mixed, even] {
