@@ -17,6 +17,7 @@
 //!
 //! A run may crystallise at any time. So displacements count from the start while they are small, and else from a later sample, that
 //! at which they were found to be large; and a run that was a liquid and is ordered has become a crystal, wherever its particles go.
+//! Most runs are liquids: a few particles tell that, and then none are followed.
 
 use crate::meter::rdf::shell_volume;
 use psidpd_core::engine::{Cells, Near, PeriodicBox};
@@ -26,7 +27,7 @@ use std::collections::HashMap;
 /// The largest number of particles that are followed.
 const PROBES: usize = 1000;
 
-/// The number of particles by which a liquid is told from what may be a crystal: one of its looks takes a tenth of the time.
+/// The number of particles that tell a liquid from what may be a crystal.
 const FEW: usize = 50;
 
 /// If so small a part of [`SHARE`] of these few is ordered, they are those of a liquid.
