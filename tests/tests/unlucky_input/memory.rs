@@ -51,16 +51,23 @@ fn peak(here: &Path, scene: &str) -> f64 {
 
 /// A run of Warren's liquid takes about the memory that `check` says, for which more than there is is refused: with many
 /// particles, with steps enough for the temperature to be watched, with a thermostat apart from the forces, with few particles,
-/// with steps enough for that of their configurations, and with an observable of forces.
+/// with steps enough for that of their configurations, with an observable of forces, and with one of liquids.
 #[test]
 fn a_run_takes_the_memory_that_check_says() {
     let folder = with_a_run();
     let here = folder.path();
     let apart = "integrator = \"two-stage\"\n";
     let observed = "[observe]\nevery = 4\ntemperature = true\n";
-    for (edge, steps, rest) in
-        [(48, 2, ""), (44, 12, ""), (44, 2, apart), (20, 2, ""), (20, 1000, ""), (26, 12, observed)]
-    {
+    let of_liquids = "[observe]\nevery = 4\nviscosity = true\n";
+    for (edge, steps, rest) in [
+        (48, 2, ""),
+        (44, 12, ""),
+        (44, 2, apart),
+        (20, 2, ""),
+        (20, 1000, ""),
+        (26, 12, observed),
+        (44, 12, of_liquids),
+    ] {
         let text = format!(
             "title = \"t\"\nmodel = \"w.toml\"\nkT = 1.0\nbox = {edge}.0\ndensity = 6.05\ndt = 0.002\nsteps = {steps}\n{rest}"
         );

@@ -19,18 +19,18 @@
 //! at which they were found to be large; and a run that was a liquid and is ordered has become a crystal, wherever its particles go.
 //! Most runs are liquids: a few particles tell that, and then none are followed.
 
-use crate::meter::rdf::shell_volume;
+use crate::meter::linked::density_of_densest_tenth;
 use psidpd_core::engine::{Cells, Near, PeriodicBox};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// The largest number of particles that are followed.
+/// About the number of particles that are followed, where there are more.
 const PROBES: usize = 1000;
 
 /// The number of particles that tell a liquid from what may be a crystal.
 const FEW: usize = 50;
 
-/// If so small a part of [`SHARE`] of these few is ordered, they are those of a liquid.
+/// Below this part of [`SHARE`] the few are those of a liquid.
 const LIQUID: f64 = 1.0 / 3.0;
 
 /// A particle with a larger c is ordered.
@@ -215,18 +215,15 @@ impl Mobile {
             cells.fill(&at);
             cells
         };
-        // The density around particles of the densest tenth.
-        let dense = {
+        let rho = {
             let (cells, mut near) = (sorted(range), Near::default());
             let around = |k: usize| {
                 cells.around(x[k], &mut near);
                 near.count.saturating_sub(1)
             };
-            let mut counts: Vec<usize> = some(sight, &particles, PROBES).map(around).collect();
-            counts.sort_unstable();
-            counts.get(counts.len() * 9 / 10).copied().unwrap_or(0)
+            let counts = some(sight, &particles, PROBES).map(around).collect();
+            density_of_densest_tenth(counts, dimensions, range)
         };
-        let rho = dense as f64 / shell_volume(dimensions, 0.0, range);
         // No image of a particle but the nearest is that near.
         let width = (0..dimensions).map(|k| domain.height(k)).fold(f64::INFINITY, f64::min);
         let reach = reach(dimensions, rho).min(0.5 * width);
@@ -236,15 +233,10 @@ impl Mobile {
 }
 
 /// About so many of the particles at random, the same whatever their order.
-fn some<'a>(sight: &'a Sight, all: &'a [usize], most: usize) -> impl Iterator<Item = usize> + 'a {
+fn some<'a>(sight: &'a Sight, all: &'a [usize], count: usize) -> impl Iterator<Item = usize> + 'a {
     let mixed = |tag: i32| (tag as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-    let below = (most << 32) as u64 / all.len().max(1) as u64;
+    let below = (count << 32) as u64 / all.len().max(1) as u64;
     all.iter().copied().filter(move |k| mixed(sight.tags[*k]) < below)
-}
-
-/// So many of all at most, in even steps.
-fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
-    all.iter().step_by(all.len().div_ceil(most).max(1))
 }
 
 /// A near particle: distance, index and unit vector.
@@ -339,9 +331,7 @@ fn share_in_crystals(dimensions: usize) -> f64 {
 
 /// Particles with the neighbours that they have now.
 fn probes(sight: &Sight, mobile: &Mobile) -> Vec<Probe> {
-    let mut by_tag = mobile.particles.clone();
-    by_tag.sort_unstable_by_key(|k| sight.tags[*k]);
-    let chosen: Vec<usize> = spread(&by_tag, PROBES).copied().collect();
+    let chosen: Vec<usize> = some(sight, &mobile.particles, PROBES).collect();
     let mut found = Nearest::default();
     found.find(sight, mobile, chosen.iter().copied());
     let probe = |k: usize| {

@@ -95,15 +95,16 @@ fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
 fn few_stretched_samples_have_the_tension_of_all() {
     for (change, bound) in [(1e-4, 1e-4), (0.02, 1e-12)] {
         let text = format!(
-            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 4\nbox = [4.0, 4.0, 9.0]\ndt = 0.01\nsteps = 10\n[initial]\n\
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 0.7\nseed = 4\nbox = [4.0, 4.0, 9.0]\ndt = 0.01\nsteps = 10\n[initial]\n\
              kind = \"slab\"\nthickness = 4.0\ndensity = 6.0\n[observe]\nsurface_tension = {{ perturbation = {change} }}\n"
         );
         let scene = support::scene(SET6, &text).unwrap();
-        let mut run = Simulation::new(&scene.model, 1.0, scene.initial_state(), 4).unwrap();
+        let kt = 0.7;
+        let mut run = Simulation::new(&scene.model, kt, scene.initial_state(), 4).unwrap();
         run.prepare(0.01, Want::FORCES).unwrap();
         run.advance(300, 0.01, Integrator::VelocityVerlet).unwrap();
         run.record_flux(Recorded::Sum);
-        let fluid = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
+        let fluid = Evaluator::new(scene.model.at(kt).unwrap()).unwrap();
         let mut meter = scene.observe.requests[0].meter.clone();
         let mut weights = Vec::new();
         for _ in 0..64 {
@@ -112,13 +113,13 @@ fn few_stretched_samples_have_the_tension_of_all() {
             let frame = Frame::new(run.view(0.0), &fluid);
             assert!(meter.sample(&frame));
             let energy = frame.evaluation().energy;
-            let weight = |change: f64| (energy - stretched_energy(&frame, 2, change)).exp();
+            let weight = |change: f64| ((energy - stretched_energy(&frame, 2, change)) / kt).exp();
             weights.push([change, -change].map(weight));
         }
         let mean = |c: usize| weights.iter().map(|w| w[c]).sum::<f64>() / 64.0;
         let area = 2.0 * 2.0 * change * 16.0;
-        let value = -(mean(0) / mean(1)).ln() / area;
-        let rows: Vec<f64> = weights.iter().map(|w| -(w[0] / mean(0) - w[1] / mean(1)) / area).collect();
+        let value = -kt * (mean(0) / mean(1)).ln() / area;
+        let rows: Vec<f64> = weights.iter().map(|w| -kt * (w[0] / mean(0) - w[1] / mean(1)) / area).collect();
         let error = Measured::mean(&rows).error;
         let out = meter.finish();
         let found = out[0].scalar("free_energy").unwrap();

@@ -160,29 +160,22 @@ impl Distance {
         if let Some(value) = self.value() {
             return value;
         }
-        let pairs = |visit: &mut dyn FnMut(Pair)| for_each_pair(x, domain, dimensions, self.longest, visit);
-        let density = density_of_densest_tenth(x.len(), dimensions, self.longest, takes_part, pairs);
+        let mut neighbours = vec![0usize; x.len()];
+        for_each_pair(x, domain, dimensions, self.longest, |p| {
+            if takes_part(p.i) && takes_part(p.j) {
+                neighbours[p.i] += 1;
+                neighbours[p.j] += 1;
+            }
+        });
+        let counts = (0..x.len()).filter(|k| takes_part(*k)).map(|k| neighbours[k]).collect();
+        let density = density_of_densest_tenth(counts, dimensions, self.longest);
         let linked = (LINKED[dimensions - 2] / density).powf(1.0 / dimensions as f64);
         *self.chosen.insert(linked.min(self.longest))
     }
 }
 
-/// The number density around the particles of the densest tenth of `count`, within `range` of each; `pairs` visits the pairs within.
-fn density_of_densest_tenth(
-    count: usize,
-    dimensions: usize,
-    range: f64,
-    takes_part: impl Fn(usize) -> bool,
-    pairs: impl FnOnce(&mut dyn FnMut(Pair)),
-) -> f64 {
-    let mut neighbours = vec![0usize; count];
-    pairs(&mut |p| {
-        if takes_part(p.i) && takes_part(p.j) {
-            neighbours[p.i] += 1;
-            neighbours[p.j] += 1;
-        }
-    });
-    let mut counts: Vec<usize> = (0..count).filter(|k| takes_part(*k)).map(|k| neighbours[k]).collect();
+/// The number density around the particles of the densest tenth, of which `counts` has the numbers of others within `range`.
+pub(crate) fn density_of_densest_tenth(mut counts: Vec<usize>, dimensions: usize, range: f64) -> f64 {
     counts.sort_unstable();
     let dense = counts.get(counts.len() * 9 / 10).copied().unwrap_or(0) as f64;
     dense / shell_volume(dimensions, 0.0, range)

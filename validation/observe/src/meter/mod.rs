@@ -17,7 +17,7 @@ mod pendant;
 mod poiseuille;
 mod pressure;
 mod profiles;
-pub(crate) mod rdf;
+mod rdf;
 mod species_pairs;
 mod spheres;
 mod stress_profile;

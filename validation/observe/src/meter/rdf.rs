@@ -14,7 +14,7 @@ pub struct Rdf {
 }
 
 /// The volume of the shell from `a` to `b`; in two dimensions the area.
-pub(crate) fn shell_volume(dimensions: usize, a: f64, b: f64) -> f64 {
+pub(super) fn shell_volume(dimensions: usize, a: f64, b: f64) -> f64 {
     match dimensions {
         2 => PI * (b * b - a * a),
         _ => 4.0 / 3.0 * PI * (b * b * b - a * a * a),

@@ -74,8 +74,8 @@ impl Simulation {
     pub(in crate::run) fn temperature_in_cells(&self, middle: usize) -> Option<f64> {
         let State { mass, x, v, species, .. } = self.state();
         let inverse = self.engine().plan().cutoff().powi(-2);
-        let first = middle.min(x.len().saturating_sub(FEW));
-        let grid = self.grid(&x[first..x.len().min(first + FEW)]);
+        let from = middle.min(x.len().saturating_sub(FEW));
+        let grid = self.grid(&x[from..x.len().min(from + FEW)]);
         let first = grid.number(x.get(middle)?).saturating_sub(CELLS / 2);
         let first = first.min(grid.cells().saturating_sub(CELLS));
         let mut parts: Vec<_> = (0..x.len().div_ceil(PART)).map(|part| (part * PART, Vec::new())).collect();
