@@ -34,3 +34,22 @@ pub fn run<L: Loop>(set: InstructionSet, work: L) -> L::Out {
 pub fn run_best<L: Loop>(work: L) -> L::Out {
     run(InstructionSet::best(), work)
 }
+
+/// A whole number from 0 to 2²³ − 1 as an integer; others give some integer in that range. Vectors do this and not a cast, which is exact
+/// for all numbers. Sums of 2²³ and such a number hold it in their lowest bits.
+#[inline(always)]
+pub fn integer(number: f32) -> u32 {
+    (number + 8_388_608.0).to_bits() & 0x007f_ffff
+}
+
+#[cfg(test)]
+mod tests {
+    use super::integer;
+
+    #[test]
+    fn whole_numbers_are_integers() {
+        for number in (0..1 << 23).step_by(4099).chain([1, (1 << 23) - 1]) {
+            assert_eq!(integer(number as f32), number);
+        }
+    }
+}

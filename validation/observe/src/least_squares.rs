@@ -3,16 +3,25 @@
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
 
-/// Finds the parameters with the least sum of squared residuals, and that sum. The search begins at `start`; slopes are
-/// differences over `steps`. The search avoids parameters without residuals. The result is
-/// `None` if `start` has no residuals and if the search fails.
+/// [`least_squares_with`] slopes that are differences over `steps`.
 pub fn least_squares(
     start: &[f64],
     steps: &[f64],
     residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
 ) -> Option<(Vec<f64>, f64)> {
+    least_squares_with(start, &residuals, |at| slopes(at, steps, &residuals))
+}
+
+/// Finds the parameters with the least sum of squared residuals, and that sum. The search begins at `start`; `slopes` has a row for
+/// each residual and a column for each parameter. The search avoids parameters without residuals. The result is
+/// `None` if `start` has no residuals and if the search fails.
+pub fn least_squares_with(
+    start: &[f64],
+    residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
+    slopes: impl Fn(&[f64]) -> Option<DMatrix<f64>>,
+) -> Option<(Vec<f64>, f64)> {
     let count = residuals(start)?.len();
-    let problem = Problem { at: DVector::from_column_slice(start), steps, count, residuals };
+    let problem = Problem { at: DVector::from_column_slice(start), count, residuals, slopes };
     let search = LevenbergMarquardt::new().with_ftol(1e-14).with_xtol(1e-10).with_gtol(1e-14);
     let (found, report) = search.minimize(problem);
     // Where residuals have kinks, the search may reach the least sum without noticing it. Such a result is accepted too.
@@ -40,14 +49,18 @@ pub fn slopes(
     Some(DMatrix::from_columns(&columns))
 }
 
-struct Problem<'a, F> {
+struct Problem<R, S> {
     at: DVector<f64>,
-    steps: &'a [f64],
     count: usize,
-    residuals: F,
+    residuals: R,
+    slopes: S,
 }
 
-impl<F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, F> {
+impl<R, S> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<R, S>
+where
+    R: Fn(&[f64]) -> Option<Vec<f64>>,
+    S: Fn(&[f64]) -> Option<DMatrix<f64>>,
+{
     type ResidualStorage = VecStorage<f64, Dyn, nalgebra::U1>;
     type JacobianStorage = VecStorage<f64, Dyn, Dyn>;
     type ParameterStorage = VecStorage<f64, Dyn, nalgebra::U1>;
@@ -67,6 +80,6 @@ impl<F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for P
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        slopes(self.at.as_slice(), self.steps, &self.residuals)
+        (self.slopes)(self.at.as_slice())
     }
 }

@@ -1,10 +1,11 @@
 //! The density across a liquid slab, and the width of its interfaces.
 
+use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
 use super::edges::{Edges, edges};
 use super::error::ObserveError;
-use crate::least_squares::least_squares;
+use crate::least_squares::least_squares_with;
 
 /// If the mean of the unit vectors exp(2πi z/L) is shorter than this, it has no direction.
 const LEAST_RESULTANT: f64 = 1e-10;
@@ -213,26 +214,54 @@ fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]>
     let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
     let step = (excess / (liquid - vapour)).clamp(0.0, extent);
     let width = (0.1 * extent).max(1.0).ln();
-    let residuals = |[liquid, vapour, place, width]: [f64; 4]| {
-        // If d is below a thousandth of a bin or above any box, the curve no longer depends on d.
-        if !(-7.0..30.0).contains(&width) {
-            return None;
-        }
-        let d = width.exp();
-        let residual = |&(s, rho): &(f64, f64)| {
-            // The mean of tanh over the bin: d [ln cosh b − ln cosh a].
-            let mean = d * (ln_cosh((s + 0.5 - place) / d) - ln_cosh((s - 0.5 - place) / d));
-            0.5 * (liquid + vapour) - 0.5 * (liquid - vapour) * mean - rho
-        };
-        Some(points.iter().map(residual).collect())
+    let start = if free { vec![liquid, vapour, step, width] } else { vec![liquid, step, width] };
+    let all = |p: &[f64]| if free { [p[0], p[1], p[2], p[3]] } else { [p[0], 0.0, p[1], p[2]] };
+    let residuals = |p: &[f64]| {
+        let curve = Curve::of(all(p))?;
+        Some(points.iter().map(|(s, rho)| curve.at(*s) - rho).collect())
     };
-    if free {
-        let all = |p: &[f64]| residuals([p[0], p[1], p[2], p[3]]);
-        return least_squares(&[liquid, vapour, step, width], &[1e-6; 4], all)?.0.try_into().ok();
+    let slopes = |p: &[f64]| {
+        let curve = Curve::of(all(p))?;
+        let rows = points.iter().map(|(s, _)| curve.slopes(*s));
+        let rows = rows.flat_map(|[l, v, p, w]| [l].into_iter().chain(free.then_some(v)).chain([p, w]));
+        Some(DMatrix::from_row_iterator(points.len(), start.len(), rows))
+    };
+    Some(all(&least_squares_with(&start, residuals, slopes)?.0))
+}
+
+/// (ρ_L + ρ_V)/2 − (ρ_L − ρ_V)/2 tanh((s − s₀)/d), averaged over bins of height 1.
+struct Curve {
+    liquid: f64,
+    vapour: f64,
+    place: f64,
+    d: f64,
+}
+
+impl Curve {
+    /// The curve of ρ_L, ρ_V, s₀ and ln d; none if d is below a thousandth of a bin or above any box, where the curve no longer
+    /// depends on d.
+    fn of([liquid, vapour, place, width]: [f64; 4]) -> Option<Curve> {
+        (-7.0..30.0).contains(&width).then(|| Curve { liquid, vapour, place, d: width.exp() })
     }
-    let three = |p: &[f64]| residuals([p[0], 0.0, p[1], p[2]]);
-    let (found, _) = least_squares(&[liquid, step, width], &[1e-6; 3], three)?;
-    Some([found[0], 0.0, found[1], found[2]])
+
+    /// The lower and the upper end of the bin around `s`, from s₀ in units of d, and the mean of tanh over the bin, d [ln cosh b − ln cosh a].
+    fn ends(&self, s: f64) -> (f64, f64, f64) {
+        let [a, b] = [s - 0.5, s + 0.5].map(|end| (end - self.place) / self.d);
+        (a, b, self.d * (ln_cosh(b) - ln_cosh(a)))
+    }
+
+    fn at(&self, s: f64) -> f64 {
+        0.5 * (self.liquid + self.vapour) - 0.5 * (self.liquid - self.vapour) * self.ends(s).2
+    }
+
+    /// The derivatives with respect to ρ_L, ρ_V, s₀ and ln d.
+    fn slopes(&self, s: f64) -> [f64; 4] {
+        let (a, b, mean) = self.ends(s);
+        let (of_a, of_b) = (a.tanh(), b.tanh());
+        let half = 0.5 * (self.liquid - self.vapour);
+        let by_width = mean - self.d * (b * of_b - a * of_a);
+        [0.5 * (1.0 - mean), 0.5 * (1.0 + mean), half * (of_b - of_a), -half * by_width]
+    }
 }
 
 /// The function ln cosh x + ln 2; callers use only differences of it.
@@ -316,6 +345,24 @@ mod tests {
         let found = interface(&profile).unwrap();
         assert!(found.vapour >= 0.0 && found.liquid > 0.0, "{found:?}");
         assert!(slab_edges(&profile).unwrap().vapour >= 0.0);
+    }
+
+    #[test]
+    fn slopes_are_differences() {
+        let at = [3.1, 0.2, 5.3, 0.4];
+        let curve = |p: [f64; 4]| Curve::of(p).unwrap();
+        for s in [0.5, 3.5, 5.5, 7.5, 30.5] {
+            let found = curve(at).slopes(s);
+            for k in 0..4 {
+                let beside = |h: f64| {
+                    let mut at = at;
+                    at[k] += h;
+                    curve(at).at(s)
+                };
+                let expected = (beside(1e-5) - beside(-1e-5)) / 2e-5;
+                assert!((found[k] - expected).abs() < 1e-9, "{s} {k}: {} {expected}", found[k]);
+            }
+        }
     }
 
     #[test]

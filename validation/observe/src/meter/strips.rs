@@ -7,7 +7,7 @@
 
 use super::across::Across;
 use crate::flux::BLOCK;
-use psidpd_core::engine::vectors::{Loop, run_best};
+use psidpd_core::engine::vectors::{Loop, integer, run_best};
 
 /// The weights of a line: two numbers.
 pub const WEIGHTS: usize = 2;
@@ -144,8 +144,8 @@ impl Loop for Place<'_> {
             here_from[k] = if is_short { short_from } else { up * slope };
             here_to[k] = if is_short { short_to } else { -down * slope };
             after[k] = if is_short { 0.0 } else { slope };
-            at_from[k] = first.max(0.0).min(top) as u32;
-            at_to[k] = last.max(0.0).min(top) as u32;
+            at_from[k] = integer(first.max(0.0).min(top) as f32);
+            at_to[k] = integer(last.max(0.0).min(top) as f32);
             is_long |= (to[k] - from[k]).abs() > bins;
         }
         is_long
