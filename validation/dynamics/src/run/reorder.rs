@@ -19,16 +19,16 @@ pub(super) fn is_due(step: u64) -> bool {
 type Whole = fn(&[f64; 3]) -> [i32; 3];
 
 /// Permutes arrays through one scratch array.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Reordering {
-    scratch: Vec<[f64; 3]>,
+#[derive(Debug)]
+pub(super) struct Reordering<'a> {
+    pub scratch: &'a mut Vec<[f64; 3]>,
 }
 
-impl Reordering {
+impl Reordering<'_> {
     /// Moves vector `order[k]` to index `k`.
     pub fn vectors(&mut self, pool: &Pool, order: &[u32], vectors: &mut Vec<[f64; 3]>) {
         self.gather(pool, order, |k| vectors[k]);
-        std::mem::swap(&mut self.scratch, vectors);
+        std::mem::swap(self.scratch, vectors);
     }
 
     /// Moves the three integers of particle `order[k]` to index `k`.
@@ -45,7 +45,7 @@ impl Reordering {
 
     fn gather(&mut self, pool: &Pool, order: &[u32], get: impl Fn(usize) -> [f64; 3] + Sync) {
         self.scratch.resize(order.len(), [0.0; 3]);
-        pool.parts(&mut self.scratch, |first, to| {
+        pool.parts(self.scratch, |first, to| {
             for (to, k) in to.iter_mut().zip(&order[first..]) {
                 *to = get(*k as usize);
             }
@@ -63,7 +63,7 @@ mod tests {
         let order = [2, 0, 3, 1];
         for threads in [1, 3, 7] {
             let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
-            let mut reordering = Reordering::default();
+            let mut reordering = Reordering { scratch: &mut Vec::new() };
             let mut vectors: Vec<[f64; 3]> = (0..5).map(|k| [k as f64, 0.5, -1.0]).collect();
             reordering.vectors(&pool, &order, &mut vectors);
             assert_eq!(vectors, [2.0, 0.0, 3.0, 1.0].map(|k| [k, 0.5, -1.0]));

@@ -84,12 +84,12 @@ pub struct Moved {
     pub beyond: Vec<Beyond>,
 }
 
-/// Does `work` with all particles of `moving`, and `factor` over the mass of each species; with what is kept, if the step
-/// `keeps` anything.
+/// Does `work` with all particles of `moving`, and `factor` over the mass of each species; with as many arrays of
+/// what is kept as the step `keeps`.
 pub fn share<'a>(
     moving: Moving<'a>,
     factor: f64,
-    keeps: bool,
+    keeps: usize,
     pool: &Pool,
     work: impl Fn(&mut Part, &[f64]) + Sync,
 ) -> Moved {
@@ -98,19 +98,16 @@ pub fn share<'a>(
     kept.over_mass.clear();
     kept.over_mass.extend(mass.iter().map(|mass| factor / mass));
     let count = x.len();
-    let [mut kept_v, mut kept_f] = if keeps {
-        kept.v.resize(count, [0.0; 3]);
-        kept.f.resize(count, [0.0; 3]);
-        [&mut kept.v[..], &mut kept.f[..]]
-    } else {
-        Default::default()
-    };
+    let mut of_before = [&mut [][..], &mut []];
+    for (slice, array) in of_before.iter_mut().zip([&mut kept.v, &mut kept.f]).take(keeps) {
+        array.resize(count, [0.0; 3]);
+        *slice = array;
+    }
     let parts = pool.threads().min(count / WORTH).max(1);
     let mut shares = Vec::with_capacity(parts);
     for number in 0..parts {
         let range = part(count, number, parts);
         let length = range.len();
-        let of_kept = length.min(kept_v.len());
         shares.push(Part {
             first: range.start,
             x: x.split_off_mut(..length).unwrap_or_default(),
@@ -118,10 +115,7 @@ pub fn share<'a>(
             f: f.split_off(..length).unwrap_or_default(),
             species: species.split_off(..length).unwrap_or_default(),
             image: image.split_off_mut(..length).unwrap_or_default(),
-            kept: [
-                kept_v.split_off_mut(..of_kept).unwrap_or_default(),
-                kept_f.split_off_mut(..of_kept).unwrap_or_default(),
-            ],
+            kept: of_before.each_mut().map(|kept| kept.split_off_mut(..length).unwrap_or_default()),
             faults: Faults::default(),
             legs: Vec::new(),
             hits: Vec::new(),

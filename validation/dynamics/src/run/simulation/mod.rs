@@ -300,9 +300,11 @@ impl Simulation {
 
     /// Sorts all particle arrays into the order of the last sweep, if there was one.
     fn reorder(&mut self) {
-        let Some(order) = self.forces.engine.results().order else { return };
-        if self.particles.reorder(self.forces.engine.pool(), order) {
-            self.external.find_frozen(&mut self.particles);
+        let Simulation { particles, motion, external, forces, .. } = self;
+        let Some(order) = forces.engine.results().order else { return };
+        // What a step has kept is needed no more at its end.
+        if particles.reorder(forces.engine.pool(), order, &mut motion.kept.v) {
+            external.find_frozen(particles);
         }
     }
 }

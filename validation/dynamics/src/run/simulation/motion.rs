@@ -13,8 +13,8 @@ use psidpd_core::model::Fluid;
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     pub bounds: Bounds,
-    /// Data that Groot and Warren's step keeps during the evaluation of the forces.
-    kept: Kept,
+    /// Data that steps keep during the evaluation of the forces.
+    pub kept: Kept,
     /// The duration of a deferred kick at the end of the present step.
     pub deferred: Option<f64>,
     /// The forces that the next step holds where it begins, if others have replaced them.
@@ -46,7 +46,7 @@ impl Simulation {
         let dt = path.time;
         let deferred = self.motion.deferred.take_if(|deferred| *deferred == h).is_some();
         self.make_deferred_kick()?;
-        let Moved { faults, legs, hits, .. } = self.moving(path, h, false, |part, over_mass, around| {
+        let Moved { faults, legs, hits, .. } = self.moving(path, h, 0, |part, over_mass, around| {
             if deferred {
                 drift(part, over_mass, around, |x, v, f, over_mass| {
                     let kick = over_mass * f;
@@ -68,7 +68,7 @@ impl Simulation {
     pub(in crate::run) fn drift(&mut self, path: Path) -> Result<(), RunError> {
         let dt = path.time;
         self.make_deferred_kick()?;
-        let Moved { faults, legs, hits, .. } = self.moving(path, 0.0, false, |part, over_mass, around| {
+        let Moved { faults, legs, hits, .. } = self.moving(path, 0.0, 0, |part, over_mass, around| {
             drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
         });
         self.record_ways(path, &legs, &hits);
@@ -78,7 +78,7 @@ impl Simulation {
     /// Kick: `v += h f/m`.
     pub(in crate::run) fn kick(&mut self, h: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let Moved { faults, .. } = self.moving(None, h, false, |part, over_mass, _| {
+        let Moved { faults, .. } = self.moving(None, h, 0, |part, over_mass, _| {
             kick::<false, _>(part, over_mass, |v, f, _, over_mass| v + over_mass * f);
         });
         self.refuse(faults, None, false)
@@ -100,7 +100,7 @@ impl Simulation {
     /// Puts particles at `x + c f/m` for an evaluation of forces, mirrored at faces and round surfaces; [`Simulation::step_back`]
     /// follows.
     pub(super) fn displace(&mut self, c: f64) {
-        self.moving(None, c, true, |part, over_mass, around| {
+        self.moving(None, c, 1, |part, over_mass, around| {
             let bounds = around.faces.bounds;
             for (k, to) in part.kept[0].iter_mut().enumerate() {
                 let m = over_mass[part.species[k] as usize];
@@ -126,7 +126,7 @@ impl Simulation {
     pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let path = Path::whole(dt, lambda * dt);
-        let Moved { faults, legs, hits, .. } = self.moving(path, dt, true, |part, over_mass, around| {
+        let Moved { faults, legs, hits, .. } = self.moving(path, dt, 2, |part, over_mass, around| {
             part.kept[0].copy_from_slice(part.v);
             part.kept[1].copy_from_slice(part.f);
             drift(part, over_mass, around, |x, v, f, over_mass| {
@@ -139,19 +139,19 @@ impl Simulation {
 
     /// Corrector: `v = v₀ + ½dt (f₀ + f)/m` with the values that [`Simulation::predict`] has kept.
     pub(in crate::run) fn correct(&mut self, dt: f64) -> Result<(), RunError> {
-        let Moved { faults, .. } = self.moving(None, 0.5 * dt, true, |part, half, _| {
+        let Moved { faults, .. } = self.moving(None, 0.5 * dt, 2, |part, half, _| {
             kick::<true, _>(part, half, |_, f, [before_v, before_f], half| before_v + half * (before_f + f));
         });
         self.refuse(faults, None, false)
     }
 
     /// Does `work` with the particles of each thread, `factor` over the mass of each species, and the box with its limits;
-    /// `path` is that of a drift. A step that `keeps` velocities and forces of before has room for them.
+    /// `path` is that of a drift. A step that `keeps` one or both of velocities and forces of before has room for them.
     fn moving(
         &mut self,
         path: impl Into<Option<Path>>,
         factor: f64,
-        keeps: bool,
+        keeps: usize,
         work: impl Fn(&mut Part, &[f64], Surroundings) + Sync,
     ) -> Moved {
         let (path, records) = (path.into(), self.is_recording());

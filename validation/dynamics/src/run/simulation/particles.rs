@@ -15,8 +15,8 @@ pub(super) struct Particles {
     moves: u64,
     /// `Σ m v v` of the present velocities, cached at the first request.
     flux: OnceLock<[f64; 6]>,
-    /// Scratch memory for reordering; `None` if particles keep their order.
-    reordering: Option<Reordering>,
+    /// Whether some steps end with a sort.
+    reordering: bool,
 }
 
 impl Particles {
@@ -32,7 +32,7 @@ impl Particles {
             }
         }
         let force = vec![[0.0; 3]; state.len()];
-        Ok(Particles { state, force, moves: 0, flux: OnceLock::new(), reordering: None })
+        Ok(Particles { state, force, moves: 0, flux: OnceLock::new(), reordering: false })
     }
 
     /// Calls `replace` with the particles to replace them, without wrapping; the box stays.
@@ -92,13 +92,13 @@ impl Particles {
         self.moves
     }
 
-    /// Sorts all particle arrays into `order`, if reordering is on.
-    pub fn reorder(&mut self, pool: &Pool, order: &[u32]) -> bool {
-        let Some(reordering) = &mut self.reordering else { return false };
+    /// Sorts all particle arrays into `order`, if reordering is on; `scratch` loses what it has.
+    pub fn reorder(&mut self, pool: &Pool, order: &[u32], scratch: &mut Vec<[f64; 3]>) -> bool {
         let State { x, v, species, tag, image, .. } = &mut self.state;
-        if order.len() != x.len() {
+        if !self.reordering || order.len() != x.len() {
             return false;
         }
+        let mut reordering = Reordering { scratch };
         self.moves += 1;
         reordering.vectors(pool, order, x);
         reordering.vectors(pool, order, v);
@@ -141,7 +141,7 @@ impl Simulation {
     ///
     /// The steps that sort depend on their number only. Trajectories differ by the rounding of sums.
     pub fn set_reordering(&mut self, on: bool) {
-        self.particles.reordering = on.then(Reordering::default);
+        self.particles.reordering = on;
     }
 
     pub fn len(&self) -> usize {
