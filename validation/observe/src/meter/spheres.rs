@@ -11,8 +11,7 @@
 //! sphere adds to one shell what it takes from the next, and spheres hold these sums instead of shells. At the distance r from the
 //! centre, with q = b/r, u − b arctan(u/b) = u B(q) with B(q) = 1 − q arccos(q)/√(1 − q²).
 //!
-//! Places seen from the centre, and all that follows from them, are in single precision: what a line gives to a shell is wrong by 10⁻⁷ of
-//! its force times its distance, either way, and at a sphere as much more for one shell as less for the next. Sums are in double precision.
+//! What spheres get is computed in single precision: the error of 10⁻⁷ of a line is as much more for one shell as less for the next.
 
 use crate::flux::{BLOCK, Lines};
 use psidpd_core::engine::PeriodicBox;
@@ -21,9 +20,32 @@ use psidpd_core::engine::vectors::{Loop, integer, run_best};
 /// Number of spheres in a vector.
 const LANES: usize = 8;
 
-/// B(q) in powers of 2q − 1, from 9 Chebyshev points on 0 ≤ q ≤ 1; u B(q) is exact to 1.3·10⁻⁷ r, as B has no singularity nearer than
+/// B(q) in powers of 2q − 1, from 19 Chebyshev points on 0 ≤ q ≤ 1; u B(q) is exact to 2·10⁻¹⁵ r, as B has no singularity nearer than
 /// q = −1.
-const RADIAL: [f32; 9] = [
+const RADIAL: [f64; 19] = [
+    0.39540021192192737,
+    -0.4727997174374554,
+    0.09693347461462647,
+    -0.024948022563270816,
+    0.006987758973299643,
+    -0.002044350283436247,
+    0.0006140772446200063,
+    -0.0001877318099106242,
+    5.8118057606280716e-05,
+    -1.8163180943513735e-05,
+    5.717702381376172e-06,
+    -1.8080738190342905e-06,
+    5.752131907975442e-07,
+    -1.8734285467795428e-07,
+    6.00533537419544e-08,
+    -1.599391033294376e-08,
+    5.145041951256982e-09,
+    -3.3143978507833837e-09,
+    1.0739518721790928e-09,
+];
+
+/// The same from 9 points: u B(q) is exact to 1.3·10⁻⁷ r.
+const SHORT_RADIAL: [f32; 9] = [
     0.395_400_2,
     -0.472_798_9,
     0.096_933_22,
@@ -149,8 +171,8 @@ pub struct Seen {
     across: [f32; BLOCK],
     /// The shells of both ends, and what they get: G and L.
     shell: [[u32; BLOCK]; 2],
-    normal: [[f32; BLOCK]; 2],
-    whole: [[f32; BLOCK]; 2],
+    normal: [[f64; BLOCK]; 2],
+    whole: [[f64; BLOCK]; 2],
     /// The spheres `first < k ≤ last` that the line crosses inwards, and those that it crosses outwards.
     inwards: [[f32; BLOCK]; 2],
     outwards: [[f32; BLOCK]; 2],
@@ -166,8 +188,8 @@ impl Default for Seen {
             force: numbers,
             across: numbers,
             shell: [[0; BLOCK]; 2],
-            normal: none,
-            whole: none,
+            normal: [[0.0; BLOCK]; 2],
+            whole: [[0.0; BLOCK]; 2],
             inwards: none,
             outwards: none,
             crossed: [[0; BLOCK]; 2],
@@ -189,8 +211,8 @@ impl<const PARALLEL: bool> Loop for Share<'_, PARALLEL> {
         for k in 0..lines.count {
             for end in 0..2 {
                 let shell = seen.shell[end][k] as usize;
-                normal[shell] += f64::from(seen.normal[end][k]);
-                whole[shell] += f64::from(seen.whole[end][k]);
+                normal[shell] += seen.normal[end][k];
+                whole[shell] += seen.whole[end][k];
             }
             let [in_first, in_last] = [seen.inwards[0][k], seen.inwards[1][k]];
             let [out_first, out_last] = [seen.outwards[0][k], seen.outwards[1][k]];
@@ -207,7 +229,7 @@ impl<const PARALLEL: bool> Loop for Share<'_, PARALLEL> {
                     let outwards = if sphere > out_first && sphere <= out_last { 1.0 } else { 0.0 };
                     let chord = ((radius[lane] - b) * (radius[lane] + b)).max(0.0).sqrt();
                     let whole = force * (inwards + outwards) * chord;
-                    gains[0][lane] = whole * radial(b * inverse[lane]);
+                    gains[0][lane] = whole * short_radial(b * inverse[lane]);
                     if !PARALLEL {
                         gains[0][lane] += across * (inwards - outwards) * logarithm[lane];
                     }
@@ -235,38 +257,36 @@ fn lanes(values: &[f32], first: usize) -> &[f32; LANES] {
 #[inline(always)]
 fn see<const PARALLEL: bool>(spheres: &Spheres, around: &Around, lines: &Lines, seen: &mut Seen) {
     let Lines { from, d, f, .. } = lines;
-    let (per_length, most) = ((1.0 / spheres.thickness) as f32, spheres.bins as f32);
+    let (per_length, most) = (1.0 / spheres.thickness, spheres.bins as f64);
     let depth = if spheres.dimensions == 2 { 0.0 } else { 1.0 };
     for k in 0..BLOCK {
         let [x, y, z] = around.place([from[0][k], from[1][k], from[2][k]]);
         let p = [x, y, depth * z];
         let (d, f) = ([d[0][k], d[1][k], d[2][k]], [f[0][k], f[1][k], f[2][k]]);
-        let area = cross(p, d);
-        let square = dot(d, d);
+        let length = dot(d, d).sqrt();
         // A line of no length has no direction, and no force counts.
-        let is_line = square > f64::from(f32::MIN_POSITIVE);
-        let b2 = if is_line { dot(area, area) / square } else { 0.0 } as f32;
-        let b = b2.sqrt();
-        let length = (square as f32).sqrt();
-        let inverse = if is_line { 1.0 / length } else { 0.0 };
-        let start = -(dot(p, d) as f32) * inverse;
+        let inverse = if length > 0.0 { 1.0 / length } else { 0.0 };
+        let start = -dot(p, d) * inverse;
         let end = start + length;
-        let force = dot(d, f) as f32 * inverse;
-        let across = if PARALLEL { 0.0 } else { dot(p, f) as f32 + force * start };
-        (seen.b[k], seen.force[k], seen.across[k]) = (b, force, across);
+        let area = cross(p, d);
+        let b = dot(area, area).sqrt() * inverse;
+        let b2 = b * b;
+        let force = dot(d, f) * inverse;
+        let across = if PARALLEL { 0.0 } else { dot(p, f) + force * start };
+        (seen.b[k], seen.force[k], seen.across[k]) = (b as f32, force as f32, across as f32);
         let mut shells = [0.0; 2];
         for (side, (u, sign)) in [(start, -1.0), (end, 1.0)].into_iter().enumerate() {
-            let square = (b2 + u * u).max(f32::MIN_POSITIVE);
+            let square = (b2 + u * u).max(f64::MIN_POSITIVE);
             let r = square.sqrt();
             let normal = u * radial(b / r);
             let beside = if PARALLEL { 0.0 } else { 0.5 * across * ln(square) };
             seen.normal[side][k] = sign * (force * normal - beside);
             seen.whole[side][k] = sign * force * u;
             let shell = (r * per_length).floor().min(most);
-            seen.shell[side][k] = integer(shell);
-            shells[side] = shell;
+            shells[side] = shell as f32;
+            seen.shell[side][k] = integer(shells[side]);
         }
-        let nearest = (b * per_length).floor().min(most);
+        let nearest = (b * per_length).floor().min(most) as f32;
         let [of_start, of_end] = shells;
         let comes = start < 0.0;
         let goes = end > 0.0;
@@ -276,7 +296,7 @@ fn see<const PARALLEL: bool>(spheres: &Spheres, around: &Around, lines: &Lines, 
             (seen.inwards[side][k], seen.outwards[side][k]) = (inwards[side], outwards[side]);
         }
         let [of_inwards, of_outwards] =
-            [inwards, outwards].map(|[first, last]| if first < last { first } else { most });
+            [inwards, outwards].map(|[first, last]| if first < last { first } else { most as f32 });
         let first = integer(of_inwards.min(of_outwards) + 1.0);
         seen.crossed[0][k] = first - first % LANES as u32;
         seen.crossed[1][k] = integer(inwards[1].max(outwards[1]) + 1.0);
@@ -293,36 +313,46 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// B(q). Its terms are added in pairs, as a sum that waits for each term takes longer than all the rest.
+/// B(q).
 #[inline(always)]
-fn radial(q: f32) -> f32 {
-    let [a, b, c, d, e, f, g, h, i] = RADIAL;
+fn radial(q: f64) -> f64 {
     let x = 2.0 * q - 1.0;
-    let square = x * x;
-    let fourth = square * square;
-    let low = (a + b * x) + (c + d * x) * square;
-    let high = (e + f * x) + (g + h * x) * square;
-    low + (high + i * fourth) * fourth
+    let mut series = RADIAL[18];
+    for k in (0..18).rev() {
+        series = series * x + RADIAL[k];
+    }
+    series
+}
+
+#[inline(always)]
+fn short_radial(q: f32) -> f32 {
+    let x = 2.0 * q - 1.0;
+    let mut series = SHORT_RADIAL[8];
+    for k in (0..8).rev() {
+        series = series * x + SHORT_RADIAL[k];
+    }
+    series
 }
 
 /// The natural logarithm of a positive normal number, without a branch: with x = m 2^k and √½ ≤ m < √2 it is k ln 2 + 2 artanh
 /// (m − 1)/(m + 1), whose terms decrease by a factor of 34 or more.
 #[inline(always)]
-fn ln(x: f32) -> f32 {
-    const TERMS: usize = 5;
+fn ln(x: f64) -> f64 {
+    const TERMS: usize = 11;
     let bits = x.to_bits();
-    let mantissa = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000);
-    let exponent = (bits >> 23) as i32 - 127;
-    let is_large = mantissa > std::f32::consts::SQRT_2;
+    let mantissa = f64::from_bits(bits & 0x000f_ffff_ffff_ffff | 0x3ff0_0000_0000_0000);
+    // Numbers of 2⁵² and more hold an integer in their lowest bits.
+    let exponent = f64::from_bits(bits >> 52 | 0x4330_0000_0000_0000) - 4_503_599_627_370_496.0 - 1023.0;
+    let is_large = mantissa > std::f64::consts::SQRT_2;
     let m = if is_large { 0.5 * mantissa } else { mantissa };
-    let k = if is_large { exponent + 1 } else { exponent };
+    let k = if is_large { exponent + 1.0 } else { exponent };
     let t = (m - 1.0) / (m + 1.0);
     let square = t * t;
-    let mut series = 1.0 / (2 * TERMS - 1) as f32;
+    let mut series = 1.0 / (2 * TERMS - 1) as f64;
     for n in (1..TERMS).rev() {
-        series = series * square + 1.0 / (2 * n - 1) as f32;
+        series = series * square + 1.0 / (2 * n - 1) as f64;
     }
-    k as f32 * std::f32::consts::LN_2 + 2.0 * t * series
+    k * std::f64::consts::LN_2 + 2.0 * t * series
 }
 
 #[cfg(test)]
@@ -337,12 +367,12 @@ mod tests {
             let q = f64::from(k) / 2000.0;
             let chord = (1.0 - q * q).sqrt();
             let expected = chord - q * q.acos();
-            assert!((chord * f64::from(radial(q as f32)) - expected).abs() < 5e-7, "{q}");
-            let x = (0.04 * f64::from(k - 1000)).exp() as f32;
-            let expected = f64::from(x).ln();
-            assert!((f64::from(ln(x)) - expected).abs() <= 2e-7 * expected.abs().max(1.0), "{x}");
+            assert!((chord * radial(q) - expected).abs() < 1e-14, "{q}");
+            assert!((chord * f64::from(short_radial(q as f32)) - expected).abs() < 5e-7, "{q}");
+            let x = (0.3 * f64::from(k - 1000)).exp();
+            assert!((ln(x) - x.ln()).abs() <= 1e-15 * x.ln().abs().max(1.0), "{x}");
         }
-        assert!((ln(f32::MIN_POSITIVE) - f32::MIN_POSITIVE.ln()).abs() < 1e-4);
+        assert!((ln(f64::MIN_POSITIVE) - f64::MIN_POSITIVE.ln()).abs() < 1e-12);
     }
 
     /// The shares of a line by functions of each shell, as they are defined: normal part and length.
