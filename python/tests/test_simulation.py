@@ -119,6 +119,8 @@ def test_forces_are_those_of_the_engine():
 
 
 def test_ctrl_c_stops_at_once_and_keeps_the_state():
+    # In the background of a script, programs are started deaf to it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     simulation = psidpd.Simulation(scene(10**9))
     threading.Thread(target=lambda: (time.sleep(0.4), os.kill(os.getpid(), signal.SIGINT))).start()
     began = time.monotonic()
