@@ -146,7 +146,7 @@ impl Simulation {
     }
 
     /// Does `work` with the particles of each thread, `factor` over the mass of each species, and the box with its limits;
-    /// `path` is that of a drift. A step that `keeps` one or both of velocities and forces of before has room for them.
+    /// `path` is that of a drift. There is room for as many arrays of what was before as a step `keeps`, at most two.
     fn moving(
         &mut self,
         path: impl Into<Option<Path>>,
