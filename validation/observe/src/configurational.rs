@@ -63,11 +63,11 @@ fn weight(frame: &Frame, rounds: &[Face], range: f64, x: [f64; 3]) -> (f64, [f64
 /// Visits `w F·F` and `w ∇²U − ∇w·F` of each mobile particle, with its index.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
-    let laplacians = evaluation.laplacians(frame.view.pool, &frame.evaluator.fluid);
+    let (forces, laplacians) = evaluation.forces_and_laplacians(frame.view.pool, &frame.evaluator.fluid);
     let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
     let mut rounds = faces(&frame.evaluator.fluid.walls, frame.view.domain, frame.view.dimensions);
     rounds.retain(|wall| matches!(wall.place, Place::Round { .. }));
-    for (k, (f, l)) in evaluation.forces(frame.view.pool).iter().zip(laplacians).enumerate() {
+    for (k, (f, l)) in forces.iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
             let (w, gradient) = weight(frame, &rounds, range, frame.view.x[k]);
             let across: f64 = gradient.iter().zip(f).map(|(g, f)| g * f).sum();

@@ -1,6 +1,6 @@
 //! Local densities: `n_β,i = Σ_j w(r_ij)` over the neighbours of species β.
 
-use super::pairs::{PairList, Pairs};
+use super::pairs::{BLOCK, PairList, Pairs, in_turns};
 use crate::engine::plan::Plan;
 use crate::engine::vectors::{Loop, run_best};
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
@@ -60,18 +60,22 @@ pub fn add_density(
         type Output = ();
 
         fn visit<S: Shape>(self) {
-            let list = self.pairs;
+            let Pass { pairs: list, kernel, owned, n, width, offset } = self;
             let mut weights = [0.0; BLOCK];
             for from in (0..list.len()).step_by(BLOCK) {
-                let r = &list.r[from..(from + BLOCK).min(list.len())];
-                run_best(Weights { kernel: self.kernel, r, weights: &mut weights, _shape: S::default() });
-                for (at, k) in (from..from + r.len()).enumerate() {
-                    let factor = list.factor.get(k).copied().unwrap_or(1.0);
-                    let w = weights[at] * factor;
-                    let (i, j) = (list.i[k] as usize, list.j[k] as usize);
-                    self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
-                    if j < self.owned {
-                        self.n[j * self.width + self.offset + list.species_i[k] as usize] += w;
+                let pairs = from..(from + BLOCK).min(list.len());
+                let r = &list.r[pairs.clone()];
+                run_best(Weights { kernel, r, weights: &mut weights, _shape: S::default() });
+                if let Some(factors) = list.factor.get(pairs.clone()) {
+                    weights.iter_mut().zip(factors).for_each(|(w, factor)| *w *= factor);
+                }
+                let [i, j] = [&list.i, &list.j].map(|of| &of[pairs.clone()]);
+                let [a, b] = [&list.species_i, &list.species_j].map(|of| &of[pairs.clone()]);
+                for k in in_turns(r.len()) {
+                    let (i, j) = (i[k] as usize, j[k] as usize);
+                    n[i * width + offset + usize::from(b[k])] += weights[k];
+                    if j < owned {
+                        n[j * width + offset + usize::from(a[k])] += weights[k];
                     }
                 }
             }
@@ -80,9 +84,6 @@ pub fn add_density(
 
     kernel.kind().visit(Pass { pairs, kernel, owned, n, width, offset });
 }
-
-/// Number of pairs in a block.
-const BLOCK: usize = 256;
 
 /// The weights of a block of pairs in a density; 0 beyond its range.
 struct Weights<'a, S> {

@@ -2,7 +2,7 @@
 //! in a loop of its own, compiled for its kernel, and a last loop adds these to the particles.
 
 use super::closed_forms::subtract_slopes;
-use super::pairs::PairList;
+use super::pairs::{BLOCK, PairList};
 use crate::engine::particles::Particles;
 use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
 use crate::engine::request::Request;
@@ -14,9 +14,6 @@ use crate::model::pair::PairForm;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
 use std::ops::Range;
-
-/// Number of pairs in a block, whose scalars stay in the first-level cache.
-const BLOCK: usize = 256;
 
 /// Input of a force pass.
 pub struct ForceInput<'a> {

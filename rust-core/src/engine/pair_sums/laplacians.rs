@@ -3,7 +3,8 @@
 use super::closed_forms::add_laplacians;
 use super::evaluation::Evaluation;
 use super::free_energy::Psi;
-use super::plane_list::{BLOCK, PlaneList, merge};
+use super::pairs::{BLOCK, in_turns};
+use super::plane_list::{PlaneList, merge};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors::{Loop, run_best};
 use crate::model::Fluid;
@@ -11,110 +12,188 @@ use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
 use std::ops::Range;
 
+/// The largest derivatives of ψ here: it may be infinite if no particle is in range, and its product with the weight 0 of a pair should be 0.
+const MOST: f64 = 1e300;
+
+/// A vector and a part of `∇² U` of a particle: the force and `∇² φ`, or the gradient of a density and what comes with its weights.
+type Row = [f64; 4];
+
 impl Evaluation {
-    /// `∇_k² U` of each particle `k`, minus the divergence of its force:
+    /// The forces on all particles, and for each particle `k` minus the divergence of its force:
     ///
     /// ```text
-    /// Σ_i [ψ_i,vu ∇_k n_iv·∇_k n_iu + ψ_i,v ∇_k² n_iv] + Σ_j ∇² φ(r_kj)
+    /// ∇_k² U = Σ_i [ψ_i,vu ∇_k n_iv·∇_k n_iu + ψ_i,v ∇_k² n_iv] + Σ_j ∇² φ(r_kj)
     /// ```
     ///
     /// The result is exact where each two particles form one pair, in boxes at least twice the range wide.
-    pub fn laplacians(&self, pool: &Pool, fluid: &Fluid) -> Vec<f64> {
-        let (variables, count) = (fluid.variables(), self.psi.value.len());
-        let width = 1 + 3 * variables;
-        let mut work: Vec<(&PlaneList, Vec<f64>)> =
-            self.planes.iter().map(|plane| (plane, Vec::new())).collect();
+    pub fn forces_and_laplacians(&self, pool: &Pool, fluid: &Fluid) -> (Vec<[f64; 3]>, Vec<f64>) {
+        let (variables, kinds, count) = (fluid.variables(), fluid.species.len(), self.psi.value.len());
+        let mut work: Vec<(&PlaneList, Sums)> =
+            self.planes.iter().map(|plane| (plane, Sums::default())).collect();
         pool.each(&mut work, |(plane, sums)| *sums = second_derivatives(plane, fluid, &self.psi));
-        let parts = work.iter().map(|(plane, sums)| (&plane.hosts[..], &sums[..]));
-        let mut sums = merge(parts, count, width);
-        self.add_walls(fluid, &mut sums);
-        let of_particle = |k: usize| {
-            let (sum, gradients) =
-                (sums[k * width], sums[k * width + 1..][..3 * variables].as_chunks::<3>().0);
-            let second = &self.psi.second[k * variables * variables..][..variables * variables];
-            let own = gradients.iter().zip(second.chunks_exact(variables.max(1))).map(|(g, row)| {
-                let along = gradients.iter().zip(row);
-                along.map(|(h, second)| second * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2])).sum::<f64>()
-            });
-            sum + own.sum::<f64>()
+        let rows = |of: &dyn Fn(&Sums) -> &[Row], width: usize| {
+            let parts = work.iter().map(|(plane, sums)| (&plane.hosts[..], of(sums).as_flattened()));
+            merge(parts, count, 4 * width)
         };
-        (0..count).map(of_particle).collect()
+        let mut own = rows(&|sums| &sums.own, 1);
+        let own = own.as_chunks_mut::<4>().0;
+        let mut gradients: Vec<Vec<f64>> =
+            (0..fluid.densities.len()).map(|d| rows(&|sums| &sums.gradients[d], kinds)).collect();
+        self.add_walls(fluid, own, &mut gradients);
+        let of_particle = |k: usize| {
+            let second = &self.psi.second[k * variables * variables..][..variables * variables];
+            let gradient = |v: usize| &gradients[v / kinds][4 * (k * kinds + v % kinds)..][..3];
+            let product = |v: usize, u: usize| -> f64 {
+                let along = gradient(v).iter().zip(gradient(u)).map(|(g, h)| g * h);
+                second[v * variables + u] * along.sum::<f64>()
+            };
+            let by_psi = (0..variables).map(|v| (0..variables).map(|u| product(v, u)).sum::<f64>());
+            let by_weights = gradients.iter().flat_map(|of| &of.as_chunks::<4>().0[k * kinds..][..kinds]);
+            let laplacian = own[k][3] + by_weights.map(|row| row[3]).sum::<f64>() + by_psi.sum::<f64>();
+            ([own[k][0], own[k][1], own[k][2]], laplacian)
+        };
+        (0..count).map(of_particle).unzip()
     }
-}
 
-impl Evaluation {
-    /// Adds the second derivatives by walls, and the gradients of their densities.
-    fn add_walls(&self, fluid: &Fluid, sums: &mut [f64]) {
+    /// The second of [`Evaluation::forces_and_laplacians`].
+    pub fn laplacians(&self, pool: &Pool, fluid: &Fluid) -> Vec<f64> {
+        self.forces_and_laplacians(pool, fluid).1
+    }
+
+    /// Adds the forces of walls with their divergences, and the gradients of the densities of walls.
+    fn add_walls(&self, fluid: &Fluid, own: &mut [Row], gradients: &mut [Vec<f64>]) {
         let (variables, kinds) = (fluid.variables(), fluid.species.len());
         for near in &self.near_walls {
             let wall = &fluid.walls[near.wall];
-            let (row, z) = (near.particle * (1 + 3 * variables), near.distance);
-            let field = &wall.fields[near.species];
+            let (field, z, force) = (&wall.fields[near.species], near.distance, near.force());
+            let own = &mut own[near.particle];
+            (0..3).for_each(|c| own[c] += force[c]);
             // ∇²H = H″ + H′ ∇·n.
             let divergence = wall.wall.surface.divergence(z);
             for (d, density) in &field.densities {
                 let [_, slope, curvature] = density.at(z);
-                let v = d * kinds + wall.wall.species;
+                let species = wall.wall.species;
                 let laplacian = curvature + divergence * slope;
-                sums[row] += times(self.psi.slopes[near.particle * variables + v], laplacian);
-                (0..3).for_each(|c| sums[row + 1 + 3 * v + c] += slope * near.normal[c]);
+                own[3] += times(self.psi.slopes[near.particle * variables + d * kinds + species], laplacian);
+                let gradient = &mut gradients[*d][4 * (near.particle * kinds + species)..][..3];
+                (0..3).for_each(|c| gradient[c] += slope * near.normal[c]);
             }
             for [_, slope, curvature] in field.energies.iter().map(|energy| energy.at(z)) {
-                sums[row] += curvature + divergence * slope;
+                own[3] += curvature + divergence * slope;
             }
         }
     }
 }
 
-/// For each particle of a plane the part of its pairs in `∇² U`, followed by the gradients `∇_i n_iv` of its densities.
-fn second_derivatives(plane: &PlaneList, fluid: &Fluid, psi: &Psi) -> Vec<f64> {
-    let (count, variables, densities) = (fluid.species.len(), fluid.variables(), fluid.densities.len());
-    let (list, width) = (&plane.list, 1 + 3 * variables);
-    let mut sums = vec![0.0; plane.hosts.len() * width];
-    let mut slopes = vec![[0.0; BLOCK]; densities];
-    let mut laplacians = vec![[0.0; BLOCK]; densities];
-    for from in (0..list.len()).step_by(BLOCK) {
-        let pairs = from..(from + BLOCK).min(list.len());
-        let r = &list.r[pairs.clone()];
-        for (d, density) in fluid.densities.iter().enumerate() {
-            let (slope, laplacian) = (&mut slopes[d][..r.len()], &mut laplacians[d][..r.len()]);
-            let rest = (fluid.dimensions - 1) as f64;
-            density.kernel.kind().visit(Derivatives { kernel: &density.kernel, r, rest, slope, laplacian });
+/// What the pairs of a plane add to its particles.
+#[derive(Default)]
+struct Sums {
+    /// The force, and `∇² φ`.
+    own: Vec<Row>,
+    /// For each density the gradients `∇_i n_iv`, one for each species, and the terms with `w″` and `w′ w′`.
+    gradients: Vec<Vec<Row>>,
+}
+
+fn second_derivatives(plane: &PlaneList, fluid: &Fluid, psi: &Psi) -> Sums {
+    let (kinds, variables, densities) = (fluid.species.len(), fluid.variables(), fluid.densities.len());
+    // Of the particles of the plane, one for each species.
+    let of_plane = |of: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+        let finite = |k: u32, b| of(k as usize, b).clamp(-MOST, MOST);
+        plane.hosts.iter().flat_map(|k| (0..kinds).map(move |b| finite(*k, b))).collect()
+    };
+    let slope = |d: usize| of_plane(&|k, b| psi.slopes[k * variables + d * kinds + b]);
+    let second = |d: usize, e: usize| {
+        of_plane(&|k, b| psi.second[(k * variables + d * kinds + b) * variables + e * kinds + b])
+    };
+    let first: Vec<Vec<f64>> = (0..densities).map(slope).collect();
+    let second: Vec<Vec<Vec<f64>>> =
+        (0..densities).map(|d| (0..densities).map(|e| second(d, e)).collect()).collect();
+    let particles = plane.hosts.len();
+    let mut sums = Sums {
+        own: vec![[0.0; 4]; particles],
+        gradients: vec![vec![[0.0; 4]; particles * kinds]; densities],
+    };
+    let mut weights = vec![Weights::default(); densities];
+    let count = plane.list.len();
+    for pairs in (0..count).step_by(BLOCK).map(|from| from..(from + BLOCK).min(count)) {
+        for (density, weights) in fluid.densities.iter().zip(&mut weights) {
+            let (r, rest) = (&plane.list.r[pairs.clone()], (fluid.dimensions - 1) as f64);
+            density.kernel.kind().visit(Derivatives { kernel: &density.kernel, r, rest, weights });
         }
-        let of_pairs = potential_laplacians(plane, fluid, pairs.clone());
-        for (k, of_pair) in pairs.clone().zip(of_pairs) {
-            let (i, j, r) = (list.i[k] as usize, list.j[k] as usize, list.r[k]);
-            if r == 0.0 || i == j {
-                continue;
-            }
-            let [here, there] = [i, j].map(|k| plane.hosts[k] as usize * variables);
-            let (a, b) = (list.species_i[k] as usize, list.species_j[k] as usize);
-            let (mut of_i, mut of_j) = (of_pair, of_pair);
-            for d in 0..densities {
-                let slope = slopes[d][k - from];
-                let (at_i, at_j) = (d * count + b, d * count + a);
-                let per_length = slope / r;
-                for c in 0..3 {
-                    let gradient = per_length * list.d[c][k];
-                    sums[i * width + 1 + 3 * at_i + c] += gradient;
-                    sums[j * width + 1 + 3 * at_j + c] -= gradient;
-                }
-                let laplacian = laplacians[d][k - from];
-                let both = times(psi.slopes[here + at_i] + psi.slopes[there + at_j], laplacian);
-                of_i += both;
-                of_j += both;
-                // Second derivatives of ψ of each particle when the other moves.
-                for e in 0..densities {
-                    let product = slope * slopes[e][k - from];
-                    of_j += times(psi.second[(here + at_i) * variables + e * count + b], product);
-                    of_i += times(psi.second[(there + at_j) * variables + e * count + a], product);
-                }
-            }
-            sums[i * width] += of_i;
-            sums[j * width] += of_j;
-        }
+        let potential = potential_laplacians(plane, fluid, pairs.clone());
+        let psi = (&first[..], &second[..]);
+        run_best(OfBlock { plane, pairs, kinds, psi, weights: &weights, potential, sums: &mut sums });
     }
     sums
+}
+
+/// Adds the pairs of a block to the sums of both particles.
+struct OfBlock<'a> {
+    plane: &'a PlaneList,
+    pairs: Range<usize>,
+    kinds: usize,
+    /// First derivatives of ψ by each density, and second ones by each two, for each particle of the plane and each species; finite.
+    psi: (&'a [Vec<f64>], &'a [Vec<Vec<f64>>]),
+    weights: &'a [Weights],
+    /// `∇² φ`.
+    potential: [f64; BLOCK],
+    sums: &'a mut Sums,
+}
+
+impl Loop for OfBlock<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let OfBlock { plane, pairs, kinds, psi: (first, second), weights, potential, sums } = self;
+        let list = &plane.list;
+        let [i, j] = [&list.i, &list.j].map(|of| &of[pairs.clone()]);
+        let [a, b] = [&list.species_i, &list.species_j].map(|of| &of[pairs.clone()]);
+        let [x, y, z] = list.d.each_ref().map(|d| &d[pairs.clone()]);
+        let strengths = &plane.strengths[pairs.clone()];
+        let count = pairs.len().min(BLOCK);
+        // What each particle has for the other's species.
+        let (mut here, mut there) = ([0; BLOCK], [0; BLOCK]);
+        for k in 0..count {
+            here[k] = i[k] as usize * kinds + usize::from(b[k]);
+            there[k] = j[k] as usize * kinds + usize::from(a[k]);
+        }
+        for k in in_turns(count).filter(|k| i[*k] != j[*k]) {
+            let force = [strengths[k] * x[k], strengths[k] * y[k], strengths[k] * z[k]];
+            add_to_both(&mut sums.own, [i[k] as usize, j[k] as usize], force, [potential[k]; 2]);
+        }
+        for (d, (weight, gradients)) in weights.iter().zip(&mut sums.gradients).enumerate() {
+            let (mut of_i, mut of_j) = ([0.0; BLOCK], [0.0; BLOCK]);
+            for k in 0..count {
+                of_i[k] = (first[d][here[k]] + first[d][there[k]]) * weight.laplacian[k];
+                of_j[k] = of_i[k];
+            }
+            // Second derivatives of ψ of each particle when the other moves.
+            for (other, second) in weights.iter().zip(&second[d]) {
+                for k in 0..count {
+                    let product = weight.slope[k] * other.slope[k];
+                    of_i[k] += second[there[k]] * product;
+                    of_j[k] += second[here[k]] * product;
+                }
+            }
+            for k in in_turns(count).filter(|k| i[*k] != j[*k]) {
+                let of = weight.per_length[k];
+                add_to_both(
+                    gradients,
+                    [here[k], there[k]],
+                    [of * x[k], of * y[k], of * z[k]],
+                    [of_i[k], of_j[k]],
+                );
+            }
+        }
+    }
+}
+
+/// Adds a vector to one row, subtracts it from another, and adds a scalar to each.
+#[inline(always)]
+fn add_to_both(rows: &mut [Row], [i, j]: [usize; 2], [x, y, z]: [f64; 3], [to_i, to_j]: [f64; 2]) {
+    rows[i].iter_mut().zip([x, y, z, to_i]).for_each(|(to, add)| *to += add);
+    rows[j].iter_mut().zip([x, y, z, -to_j]).for_each(|(to, add)| *to -= add);
 }
 
 /// The product of a derivative of ψ, which may be infinite if no particle is in range, with a derivative of the weight of a pair.
@@ -148,14 +227,31 @@ fn potential_laplacians(plane: &PlaneList, fluid: &Fluid, pairs: Range<usize>) -
     sums
 }
 
-/// The slopes `w′` and the Laplacians `w″ + (d − 1) w′/r` of a kernel in a block of pairs; 0 beyond its range.
+/// Derivatives of the weights of the pairs of a block in a density; 0 beyond its range and at zero distance. Behind the last pair they are
+/// unspecified.
+#[derive(Clone)]
+struct Weights {
+    /// `w′`
+    slope: [f64; BLOCK],
+    /// `w′/r`
+    per_length: [f64; BLOCK],
+    /// `w″ + (d − 1) w′/r`
+    laplacian: [f64; BLOCK],
+}
+
+impl Default for Weights {
+    fn default() -> Weights {
+        Weights { slope: [0.0; BLOCK], per_length: [0.0; BLOCK], laplacian: [0.0; BLOCK] }
+    }
+}
+
+/// Computes [`Weights`] at distances `r`.
 struct Derivatives<'a> {
     kernel: &'a Kernel,
     r: &'a [f64],
     /// The number of dimensions less one.
     rest: f64,
-    slope: &'a mut [f64],
-    laplacian: &'a mut [f64],
+    weights: &'a mut Weights,
 }
 
 impl ShapeVisitor for Derivatives<'_> {
@@ -173,15 +269,16 @@ impl<S: Shape> Loop for OfShape<'_, S> {
 
     #[inline(always)]
     fn run(self) {
-        let Derivatives { kernel, r, rest, slope, laplacian } = self.0;
+        let Derivatives { kernel, r, rest, weights: Weights { slope, per_length, laplacian } } = self.0;
         let inverse_range = 1.0 / kernel.range();
         let (first, second) = (kernel.slope_factor(), kernel.slope_factor() * inverse_range);
-        for ((r, slope), laplacian) in r.iter().zip(slope).zip(laplacian) {
+        for (((r, slope), per_length), laplacian) in r.iter().zip(slope).zip(per_length).zip(laplacian) {
             let s = r * inverse_range;
-            let here = if s < 1.0 { first * S::slope(s) } else { 0.0 };
-            let curvature = if s < 1.0 { second * S::curvature(s) } else { 0.0 };
-            *slope = here;
-            *laplacian = if s < 1.0 { curvature + rest * here / r } else { 0.0 };
+            let is_near = (s < 1.0) & (*r > 0.0);
+            let (here, bend) = (first * S::slope(s), second * S::curvature(s));
+            *slope = if is_near { here } else { 0.0 };
+            *per_length = if is_near { here / r } else { 0.0 };
+            *laplacian = if is_near { bend + rest * here / r } else { 0.0 };
         }
     }
 }

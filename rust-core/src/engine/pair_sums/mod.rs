@@ -37,7 +37,8 @@ pub use super::components::COMPONENTS;
 pub use evaluation::{Evaluation, Evaluator, NearWall};
 pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
-pub use plane_list::{BLOCK as PAIR_BLOCK, PairBlock};
+pub use pairs::BLOCK as PAIR_BLOCK;
+pub use plane_list::PairBlock;
 pub use shells::count_in_shells;
 
 use super::counts::PassCounts;

@@ -13,6 +13,19 @@ pub struct Pairs {
     pub density_only: PairList,
 }
 
+/// Number of pairs in a block, whose scalars stay in the first-level cache.
+pub const BLOCK: usize = 256;
+
+/// The number of parts of a block whose pairs are added in turns.
+const PARTS: usize = 4;
+
+/// The places of the first `count` pairs of a block, those of its parts in turns. Lists are sorted by their first particles: so the sums of a
+/// particle do not wait for the pair before.
+#[inline(always)]
+pub fn in_turns(count: usize) -> impl Iterator<Item = usize> {
+    (0..BLOCK).map(|at| at / PARTS + at % PARTS * (BLOCK / PARTS)).filter(move |k| *k < count)
+}
+
 /// Parallel arrays over pairs. `d = r_i − r_j`.
 #[derive(Debug, Clone, Default)]
 pub struct PairList {

@@ -6,16 +6,13 @@
 use super::densities::add_density;
 use super::forces::{Block, ForceInput};
 use super::in_box::Pair;
-use super::pairs::PairList;
+use super::pairs::{BLOCK, PairList};
 use crate::engine::plan::Plan;
 use crate::engine::sweep::{Images, Places, PlanePairs};
 use crate::engine::vectors::{Loop, run_best};
 use crate::model::PairTerm;
 use crate::model::pair::PairForm;
 use psidpd_passes::plane::list::pairs_of_each;
-
-/// Number of pairs in a block, whose scalars stay in the first-level cache.
-pub const BLOCK: usize = 256;
 
 /// Number of pairs in a vector.
 const LANES: usize = 8;
@@ -30,7 +27,7 @@ pub struct PlaneList {
     pub(super) list: PairList,
     /// Conservative force of each pair along `ê_ij`, positive if repulsive, divided by its distance, once forces are computed; none
     /// at zero distance.
-    strengths: Vec<f64>,
+    pub(super) strengths: Vec<f64>,
     /// Densities of the particles, a number of them for each.
     sums: Vec<f64>,
     /// Energy of the pairs.
@@ -80,16 +77,21 @@ impl PlaneList {
         self.hosts.extend(particles().map(|k| places.host(k) as u32));
         self.species.clear();
         self.species.extend(self.hosts.iter().map(|k| species[*k as usize]));
-        let x: Vec<[f64; 3]> = particles().map(|k| places.x(k)).collect();
+        let kinds = self.species.iter().map(|species| *species as u8);
+        let particles: Vec<([f64; 3], u8)> = particles().map(|k| places.x(k)).zip(kinds).collect();
         let list = &mut self.list;
         list.resize(lists.own.pairs.len());
         for (i, of_i) in pairs_of_each(&lists.own.start) {
-            let (at, kind) = (x[i], self.species[i] as u8);
-            for k in of_i {
-                let j = lists.own.pairs[k].j as usize;
-                (list.i[k], list.j[k]) = (i as u32, j as u32);
-                (list.species_i[k], list.species_j[k]) = (kind, self.species[j] as u8);
-                (0..3).for_each(|c| list.d[c][k] = at[c] - x[j][c]);
+            let (at, kind) = particles[i];
+            list.i[of_i.clone()].fill(i as u32);
+            list.species_i[of_i.clone()].fill(kind);
+            let [x, y, z] = list.d.each_mut().map(|d| &mut d[of_i.clone()]);
+            let (j, kinds) = (&mut list.j[of_i.clone()], &mut list.species_j[of_i.clone()]);
+            let pairs = lists.own.pairs[of_i].iter().zip(j).zip(kinds).zip(x.iter_mut().zip(y).zip(z));
+            for (((pair, j), kind), ((x, y), z)) in pairs {
+                let (to, species) = particles[pair.j as usize];
+                (*j, *kind) = (pair.j, species);
+                (*x, *y, *z) = (at[0] - to[0], at[1] - to[1], at[2] - to[2]);
             }
         }
         run_best(Distances { list, images: places.images });
