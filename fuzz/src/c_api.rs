@@ -118,7 +118,7 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
     let want = u32::from(bytes.byte());
     let v = if bytes.flag() { cloud.v.as_ptr() } else { null() };
     let request = Request { particles: cloud.particles(), v, step, want };
-    let mut tally = Tally { excess: 0.0, pair: 0.0, virial: [0.0; 6], thermostat_virial: [0.0; 6] };
+    let mut tally = Tally::default();
     let newton = small(bytes);
     let force = cloud.force.as_mut_ptr();
     // SAFETY: the engine is null or valid. All arrays have the lengths that the structures state, do not overlap, and live

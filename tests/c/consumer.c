@@ -154,6 +154,8 @@ static void print_outcome(const char *name, const struct host *host)
     for (k = 0; k < 6; k++) printf(" %.17g", host->tally.virial[k]);
     printf("\n%s.thermostat_virial", name);
     for (k = 0; k < 6; k++) printf(" %.17g", host->tally.thermostat_virial[k]);
+    printf("\n%s.drag_virial", name);
+    for (k = 0; k < 6; k++) printf(" %.17g", host->tally.drag_virial[k]);
     printf("\n%s.force", name);
     for (i = 0; i < 3 * OWNED; i++) printf(" %.17g", host->force[i]);
     printf("\n");

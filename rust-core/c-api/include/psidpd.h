@@ -24,7 +24,7 @@
 
 /// The version of this interface. It goes up when a function or structure changes its meaning or
 /// layout or goes away, not when one is added.
-#define PSIDPD_ABI_VERSION 2
+#define PSIDPD_ABI_VERSION 3
 
 /// For psidpd_settings: pairs in double precision.
 #define PSIDPD_PRECISION_DOUBLE 0
@@ -262,6 +262,8 @@ typedef struct psidpd_tally {
   double virial[6];
   /// Virial of the dissipative and random forces.
   double thermostat_virial[6];
+  /// Virial of the dissipative forces alone.
+  double drag_virial[6];
 } psidpd_tally;
 
 /// Pairs that the host lists: at least all within the cut-off, those of two owned particles once, those of an owned

@@ -105,7 +105,7 @@ fn status_values_are_what_they_always_were() {
     for (status, value) in values {
         assert_eq!(status as i32, value);
     }
-    assert_eq!(psidpd_abi_version(), 2);
+    assert_eq!(psidpd_abi_version(), 3);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::ffi::c_char;
 
 /// The version of this interface. It goes up when a function or structure changes its meaning or
 /// layout or goes away, not when one is added.
-pub const PSIDPD_ABI_VERSION: u32 = 2;
+pub const PSIDPD_ABI_VERSION: u32 = 3;
 
 /// The PSIDPD_ABI_VERSION that the library was built with. A program must stop if it
 /// differs from the one in its header.

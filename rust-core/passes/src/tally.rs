@@ -49,6 +49,8 @@ pub struct Tally {
     pub virial: [f64; 6],
     /// Virial of the dissipative and random forces.
     pub thermostat_virial: [f64; 6],
+    /// Virial of the dissipative forces alone.
+    pub drag_virial: [f64; 6],
 }
 
 impl Tally {
@@ -70,6 +72,7 @@ impl AddAssign for Tally {
         for k in 0..6 {
             self.virial[k] += other.virial[k];
             self.thermostat_virial[k] += other.thermostat_virial[k];
+            self.drag_virial[k] += other.drag_virial[k];
         }
     }
 }

@@ -73,7 +73,12 @@ impl Fault {
     /// Makes the virials of a sweep wrong.
     pub(super) fn spoil_virial(self, tally: &mut Tally) {
         if self == Fault::Virial {
-            tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= FACTOR);
+            tally
+                .virial
+                .iter_mut()
+                .chain(&mut tally.thermostat_virial)
+                .chain(&mut tally.drag_virial)
+                .for_each(|w| *w *= FACTOR);
         }
     }
 }

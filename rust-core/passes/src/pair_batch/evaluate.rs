@@ -57,6 +57,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
             for c in 0..6 {
                 tally.virial[c] += sum_lanes(sums.virial[c]);
                 tally.thermostat_virial[c] += sum_lanes(sums.thermostat[c]);
+                tally.drag_virial[c] += sum_lanes(sums.drag[c]);
             }
         }
     }

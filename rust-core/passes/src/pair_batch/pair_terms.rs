@@ -19,13 +19,15 @@ pub struct PairSums<R> {
     pub excess: R,
     pub virial: [R; 6],
     pub thermostat: [R; 6],
+    /// That of drag alone.
+    pub drag: [R; 6],
 }
 
 impl<R: Reals> PairSums<R> {
     #[inline(always)]
     pub fn zero() -> PairSums<R> {
         let zero = R::constant(0.0);
-        PairSums { pair: zero, excess: zero, virial: [zero; 6], thermostat: [zero; 6] }
+        PairSums { pair: zero, excess: zero, virial: [zero; 6], thermostat: [zero; 6], drag: [zero; 6] }
     }
 }
 
@@ -108,10 +110,11 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
             }
             if let Some(thermostat) = &thermostat {
                 let word = <A::Reals as Reals>::Words::load(p_noise.add(k));
-                let f = thermostat.force::<MULTISPECIES>(pairs, word);
+                let [f, drag] = thermostat.force::<MULTISPECIES>(pairs, word);
                 if TALLY {
-                    let f = f * (pair_weight * pairs.geometry.inverse);
-                    add_virial(f, pairs.geometry.d, &mut sums.thermostat);
+                    let per_length = pair_weight * pairs.geometry.inverse;
+                    add_virial(f * per_length, pairs.geometry.d, &mut sums.thermostat);
+                    add_virial(drag * per_length, pairs.geometry.d, &mut sums.drag);
                 }
                 force = force + f;
             }

@@ -157,19 +157,20 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
         }
     }
 
-    /// The force `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`, with `ξ` from a random word.
+    /// The force `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`, with `ξ` from a random word, and its first part alone.
     ///
     /// # Safety
     /// The caller fulfils the contract of `simd`.
     #[inline(always)]
-    pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> R {
+    pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> [R; 2] {
         // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
         unsafe {
             let species_pair = pairs.species_pair;
             let w = self.weight.weight::<MULTISPECIES>(pairs.geometry.r, species_pair);
             let xi = (R::of_signed(word) + R::constant(0.5))
                 * (self.noise_scale * self.sigma.lookup::<MULTISPECIES>(species_pair));
-            w * (xi - self.gamma.lookup::<MULTISPECIES>(species_pair) * w * pairs.geometry.radial_velocity)
+            let drag = self.gamma.lookup::<MULTISPECIES>(species_pair) * w * pairs.geometry.radial_velocity;
+            [w * (xi - drag), R::constant(0.0) - w * drag]
         }
     }
 }

@@ -118,6 +118,7 @@ fn agree(a: &Outcome, b: &Outcome) {
     for k in 0..6 {
         close(a.0.virial[k], b.0.virial[k], "virial");
         close(a.0.thermostat_virial[k], b.0.thermostat_virial[k], "thermostat virial");
+        close(a.0.drag_virial[k], b.0.drag_virial[k], "drag virial");
     }
     assert_eq!((a.1.len(), a.2.len()), (b.1.len(), b.2.len()));
     a.1.as_flattened().iter().zip(b.1.as_flattened()).for_each(|(a, b)| close(*a, *b, "force"));

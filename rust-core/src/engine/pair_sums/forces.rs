@@ -57,6 +57,8 @@ pub struct Block<const N: usize> {
     /// Forces along `ê_ij`.
     pub conservative: [f64; N],
     thermostat: [f64; N],
+    /// Drag alone.
+    drag: [f64; N],
     /// Energies of terms linear in a density: the parts of `i` and of `j`.
     pub excess_i: [f64; N],
     pub excess_j: [f64; N],
@@ -80,9 +82,10 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
             forces.copy_from_slice(&block.conservative[..pairs.len()]);
         }
         if let (Some((noise, inverse_root_dt)), Some(plan)) = (&input.thermostat, &input.plan.thermostat) {
-            add_thermostat(input, plan, noise, *inverse_root_dt, pairs.clone(), &mut block.thermostat);
+            add_thermostat(input, plan, noise, *inverse_root_dt, pairs.clone(), &mut block);
         } else {
             block.thermostat.fill(0.0);
+            block.drag.fill(0.0);
         }
         scatter(input, output, pairs.clone(), &block);
         if input.request.want.virial || input.request.want.particle_virial {
@@ -99,6 +102,7 @@ impl<const N: usize> Block<N> {
         Block {
             conservative: [0.0; N],
             thermostat: [0.0; N],
+            drag: [0.0; N],
             excess_i: [0.0; N],
             excess_j: [0.0; N],
             pair: [0.0; N],
@@ -282,14 +286,15 @@ fn add_thermostat(
     noise: &PairNoise,
     inverse_root_dt: f64,
     pairs: Range<usize>,
-    out: &mut [f64; BLOCK],
+    block: &mut Block<BLOCK>,
 ) {
     let list = input.list;
     let count = input.plan.species.len();
     for k in pairs.clone() {
+        let at = k - pairs.start;
         let pair = list.species_i[k] as usize * count + list.species_j[k] as usize;
         let (r, range) = (list.r[k], plan.range[pair]);
-        out[k - pairs.start] = 0.0;
+        (block.thermostat[at], block.drag[at]) = (0.0, 0.0);
         let strength = list.thermostat_factor.get(k).copied().unwrap_or(1.0);
         // A pair at zero distance has no direction.
         if r < range && r > 0.0 && strength != 0.0 {
@@ -302,8 +307,9 @@ fn add_thermostat(
                 + list.d[1][k] * (vi[1] - vj[1])
                 + list.d[2][k] * (vi[2] - vj[2]);
             let xi = noise.xi(input.request.particles.tag[i] as u32, input.request.particles.tag[j] as u32);
-            let force = w * (plan.sigma[pair] * xi * inverse_root_dt - plan.gamma[pair] * w * dot / r);
-            out[k - pairs.start] = strength * force;
+            let drag = plan.gamma[pair] * w * dot / r;
+            block.thermostat[at] = strength * (w * (plan.sigma[pair] * xi * inverse_root_dt - drag));
+            block.drag[at] = -strength * (w * drag);
         }
     }
 }
@@ -340,7 +346,7 @@ fn share(input: &ForceInput, j: usize) -> f64 {
 
 fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize>, block: &Block<BLOCK>) {
     let list = input.list;
-    let mut virials = [[0.0; 6]; 2];
+    let mut virials = [[0.0; 6]; 3];
     for k in pairs.clone() {
         let r = list.r[k];
         if r == 0.0 {
@@ -351,10 +357,11 @@ fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize
         let dyad = [d[0] * d[0], d[1] * d[1], d[2] * d[2], d[0] * d[1], d[0] * d[2], d[1] * d[2]];
         let (inverse, share) = (1.0 / r, share(input, j));
         let conservative = block.conservative[k - pairs.start] * inverse;
-        let thermostat = block.thermostat[k - pairs.start] * inverse;
+        let [thermostat, drag] = [&block.thermostat, &block.drag].map(|of| of[k - pairs.start] * inverse);
         for c in 0..6 {
             virials[0][c] += share * conservative * dyad[c];
             virials[1][c] += share * thermostat * dyad[c];
+            virials[2][c] += share * drag * dyad[c];
         }
         if input.request.want.particle_virial {
             let half = 0.5 * (conservative + thermostat);
@@ -368,8 +375,8 @@ fn tally_virial(input: &ForceInput, output: &mut ForceOutput, pairs: Range<usize
         }
     }
     if input.request.want.virial {
-        let Tally { virial, thermostat_virial, .. } = &mut output.tally;
-        for (sum, of_block) in [virial, thermostat_virial].into_iter().zip(virials) {
+        let Tally { virial, thermostat_virial, drag_virial, .. } = &mut output.tally;
+        for (sum, of_block) in [virial, thermostat_virial, drag_virial].into_iter().zip(virials) {
             sum.iter_mut().zip(of_block).for_each(|(sum, of_block)| *sum += of_block);
         }
     }

@@ -41,6 +41,8 @@ pub struct PairBlock<'a> {
     pairs: [&'a [u32]; 2],
     /// The components of `r_i − r_j`.
     pub d: [&'a [f64]; 3],
+    /// The distances.
+    pub r: &'a [f64],
     /// The force on particle `i`, divided by `d`.
     pub strengths: &'a [f64],
 }
@@ -147,6 +149,7 @@ impl PlaneList {
                 hosts,
                 pairs: [&list.i, &list.j].map(|of| &of[pairs.clone()]),
                 d: list.d.each_ref().map(|d| &d[pairs.clone()]),
+                r: &list.r[pairs.clone()],
                 strengths: &strengths[pairs],
             }
         })

@@ -105,7 +105,8 @@ fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 
 fn tally_difference(a: &Tally, b: &Tally) -> f64 {
     let list = |t: &Tally| -> Vec<f64> {
-        [t.excess, t.pair].into_iter().chain(t.virial).chain(t.thermostat_virial).collect()
+        let virials = t.virial.into_iter().chain(t.thermostat_virial).chain(t.drag_virial);
+        [t.excess, t.pair].into_iter().chain(virials).collect()
     };
     let (a, b) = (list(a), list(b));
     let scale = largest(&a).max(1e-300);

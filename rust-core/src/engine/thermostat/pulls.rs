@@ -35,9 +35,9 @@ impl PairThermostat {
     /// last, and zero if distances were not stored. `pulls` get the pairs, plane by plane. Results do not depend on the number of
     /// threads.
     pub fn drags(&self, pool: &Pool, v: &[[f64; 3]], pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
-        let order = self.lists.order();
+        let v: Vec<[f64; 3]> = self.lists.order().iter().map(|k| v[*k as usize]).collect();
         let factor = |[i, j, _]: [usize; 3], _: usize, g: [f64; 3]| {
-            let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
+            let (a, b) = (v[i], v[j]);
             -2.0 / self.dt * (g[0] * (a[0] - b[0]) + g[1] * (a[1] - b[1]) + g[2] * (a[2] - b[2]))
         };
         self.pulls_by(pool, factor, pulls)

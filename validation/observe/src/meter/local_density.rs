@@ -120,6 +120,7 @@ impl Meter for LocalDensity {
         }
         // The pairs in a shell divided by those at g = 1, times the integral of w over the shell; and r w′ summed over pairs.
         let width = density.kernel.range() / SHELLS as f64;
+        let per_length = 1.0 / width;
         let volume_of =
             |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
         let means: Vec<f64> = self.shells.iter().enumerate().map(|(k, w)| w / volume_of(k)).collect();
@@ -127,20 +128,22 @@ impl Meter for LocalDensity {
             (0..evaluation.parts().count()).map(|part| (part, Vec::new())).collect();
         view.pool.each(&mut parts, |(part, sums)| {
             sums.resize(2 * kinds * kinds, 0.0);
-            for p in evaluation.pairs_of(*part) {
-                let (a, b) = (species[p.i] as usize, species[p.j] as usize);
-                let shell = means.get((p.r / width) as usize).copied().unwrap_or(0.0);
-                let slope = p.r * density.force_kernel.slope(p.r) / self.dimensions as f64;
-                for k in [a * kinds + b, b * kinds + a] {
-                    sums[2 * k] += shell;
-                    sums[2 * k + 1] -= slope;
+            for block in evaluation.blocks_of(*part) {
+                for ([i, j], r) in block.particles().zip(block.r) {
+                    let [a, b] = [i, j].map(|k| species[k] as usize);
+                    let shell = means.get((r * per_length) as usize).copied().unwrap_or(0.0);
+                    let slope = r * density.force_kernel.slope(*r);
+                    for k in [a * kinds + b, b * kinds + a] {
+                        sums[2 * k] += shell;
+                        sums[2 * k + 1] -= slope;
+                    }
                 }
             }
         });
         for (_, sums) in &parts {
             for (mean, sums) in rest.chunks_exact_mut(4).zip(sums.chunks_exact(2)) {
                 mean[2] += sums[0];
-                mean[3] += sums[1];
+                mean[3] += sums[1] / self.dimensions as f64;
             }
         }
         for a in 0..kinds {

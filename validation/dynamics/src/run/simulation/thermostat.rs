@@ -139,12 +139,16 @@ impl Simulation {
         self.add_external_forces();
         self.thermostat.in_forces = Some(true);
         self.record_forces(self.tally().virial, None);
-        if self.is_recording() {
+        if !self.is_recording() || !self.has_pair_thermostat() {
+            return Ok(());
+        }
+        if self.records_lines() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
-            let found = thermostat.find_pairs(particles, external, forces, (dt, true, *number))?.is_some();
-            if found {
-                self.record_drag_at(1.0, &self.particles.now().v.clone());
-            }
+            thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
+            self.record_drag_at(1.0, &self.particles.now().v.clone());
+        } else {
+            let drag = self.tally().drag_virial;
+            self.record_drag(1.0, |_, _, _| drag);
         }
         Ok(())
     }
