@@ -15,18 +15,6 @@ const PAGE: usize = 2 << 20;
 /// back to the system when they are released; the system's allocator would keep that of lists that grew, a sixth of all.
 pub struct LargePages;
 
-/// Lets the system's allocator keep up to 16 MiB that nothing uses. By default it returns some hundred kilobytes to the system already: then each
-/// sample of an observable gets its arrays page by page from the system, which takes 2 to 5 % of short runs.
-pub fn keep_small_arrays() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: these settings change no memory. If they are refused the program is slower, but correct.
-    unsafe {
-        // A threshold that is set stays: otherwise the allocator changes both as it maps arrays. Larger ones do not come to it.
-        libc::mallopt(libc::M_MMAP_THRESHOLD, PAGE as i32);
-        libc::mallopt(libc::M_TRIM_THRESHOLD, 16 << 20);
-    }
-}
-
 /// The layout of an array that fills large pages; `None` for other arrays.
 fn in_pages(layout: Layout) -> Option<Layout> {
     if layout.size() < PAGE {

@@ -131,7 +131,6 @@ fn command() -> clap::Command {
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
 pub fn main() -> ExitCode {
-    psidpd_core::memory::keep_small_arrays();
     ExitCode::from(with_arguments(std::env::args_os()))
 }
 
