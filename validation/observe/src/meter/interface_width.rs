@@ -1,6 +1,6 @@
 use super::across::Across;
 use super::*;
-use crate::profile::{interface, slab_edges};
+use crate::profile::{interface, interface_from, slab_edges};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {
@@ -52,10 +52,11 @@ impl Meter for InterfaceWidth {
         let profile = |means: &[f64]| -> Vec<(f64, f64)> {
             centres.iter().zip(means).map(|(z, n)| (*z, n / volume)).collect()
         };
+        let whole = interface(&profile(&self.series.means()));
         let fit = self.series.jackknife(|means| {
             let profile = profile(means);
             let found = slab_edges(&profile)?;
-            let fit = interface(&profile);
+            let fit = interface_from(&profile, whole);
             let (width, place) = fit.map_or((f64::NAN, found.place), |fit| (fit.width, fit.place));
             Some(vec![width, found.liquid, found.vapour, 2.0 * place, found.ten_ninety, found.steepest])
         });
