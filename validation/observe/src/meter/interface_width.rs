@@ -36,7 +36,7 @@ impl Meter for InterfaceWidth {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let Some(fractions) = self.across.fractions(&frame.view) else { return false };
+        let Some(fractions) = self.across.fractions(frame) else { return false };
         let mut counts = vec![0.0; self.across.bins];
         fractions.iter().filter_map(|s| self.across.bin(*s)).for_each(|bin| counts[bin] += 1.0);
         self.series.push(&counts)
