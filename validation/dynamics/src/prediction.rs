@@ -139,16 +139,18 @@ pub fn expected(model: &Model, fluid: &Fluid, uniform: Option<f64>) -> Vec<Expec
             all.push(Expected { name: name.into(), mean_field, published: None });
         }
     };
-    if let Some(p) = predict(fluid, uniform) {
-        add("pressure", uniform.map(|_| p.pressure));
-        let phases = p.phases.as_ref().ok();
+    // Without correlations, which have no part in these values.
+    if fluid.species.len() == 1
+        && fluid.stated_slopes().is_none()
+        && let Ok(theory) = MeanField::new(fluid)
+    {
+        add("pressure", uniform.map(|rho| theory.pressure(&[rho])));
+        let phases = theory.binodal().ok();
         add("liquid", phases.map(|b| b.liquid));
         add("vapour", phases.map(|b| b.vapour));
-        let interface = p.interface.as_ref().ok();
-        add("tension", interface.map(|i| i.tension));
-        add("width", interface.map(|i| i.width));
-    } else if let (Some(rho), 1, None) = (uniform, fluid.species.len(), fluid.stated_slopes()) {
-        add("pressure", MeanField::new(fluid).ok().map(|theory| theory.pressure(&[rho])));
+        let interface = theory.interface(0).ok();
+        add("tension", interface.as_ref().map(|i| i.tension));
+        add("width", interface.as_ref().map(|i| i.width));
     }
     for (name, value) in published(model, fluid.kt, uniform) {
         match all.iter_mut().find(|e| e.name == name) {

@@ -1,6 +1,7 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
 use super::flux::{BLOCK, Carrier, Flux, Line, Lines, Place, Pull};
+use super::options::Centre;
 use super::piece::{Piece, Whole};
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair};
 use psidpd_core::engine::thermostat::Pulls;
@@ -63,6 +64,8 @@ pub struct Frame<'a> {
     evaluation: OnceCell<Evaluation>,
     /// The evaluations of forces that acted at positions other than the present ones.
     earlier: OnceCell<Vec<Option<Earlier>>>,
+    /// Positions along one axis, most likely those of all profiles: the axis, the centre, and what `Across::fractions` found.
+    pub(crate) fractions: OnceCell<(usize, Centre, Option<Vec<f64>>)>,
 }
 
 /// Forces that acted at other positions than the present ones.
@@ -77,7 +80,8 @@ const LINES: usize = 2048;
 
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
-        Frame { view, evaluator, piece: None, evaluation: OnceCell::new(), earlier: OnceCell::new() }
+        let (evaluation, earlier, fractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Frame { view, evaluator, piece: None, evaluation, earlier, fractions }
     }
 
     /// A piece of a configuration, or all of it.

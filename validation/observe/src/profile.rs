@@ -126,8 +126,13 @@ pub struct Interface {
 
 /// The fit of [`interface_width`], as the mean of both flanks; `None` under the same conditions.
 pub fn interface(profile: &[(f64, f64)]) -> Option<Interface> {
+    interface_from(profile, None)
+}
+
+/// The same, of a search that begins at the fit to a profile that is almost the same.
+pub fn interface_from(profile: &[(f64, f64)], start: Option<Interface>) -> Option<Interface> {
     let (height, flanks) = flanks(profile)?;
-    let [a, b] = flanks.map(|points| flank_interface(&points, height));
+    let [a, b] = flanks.map(|points| flank_interface_from(&points, height, start));
     let (a, b) = (a?, b?);
     Some(Interface {
         liquid: 0.5 * (a.liquid + b.liquid),
@@ -177,6 +182,10 @@ fn flanks(profile: &[(f64, f64)]) -> Option<(f64, [Flank; 2])> {
 
 /// The fit to one flank, given as (distance from the centre, density) with distances that increase by `height`.
 pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Interface> {
+    flank_interface_from(points, height, None)
+}
+
+fn flank_interface_from(points: &[(f64, f64)], height: f64, start: Option<Interface>) -> Option<Interface> {
     if points.len() < FLANK_BINS {
         return None;
     }
@@ -188,9 +197,13 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     }
     let scaled: Vec<(f64, f64)> = points.iter().map(|(s, rho)| (s / height, rho / scale)).collect();
     let extent = extent / height;
-    let free = fit_flank(&scaled, extent, true)?;
+    let start = start.map_or_else(
+        || sharp_step(&scaled, extent),
+        |i| Some([i.liquid / scale, i.vapour / scale, i.place / height, (0.5 * i.width / height).ln()]),
+    )?;
+    let free = fit_flank(&scaled, start, true)?;
     // A density is never negative. If the fitted ρ_V is, the fit is repeated with ρ_V = 0.
-    let fit = if free[1] < 0.0 { fit_flank(&scaled, extent, false)? } else { free };
+    let fit = if free[1] < 0.0 { fit_flank(&scaled, free, false)? } else { free };
     let width = 2.0 * fit[3].exp();
     let slab = fit[0] > fit[1] && fit[2] > 0.0 && fit[2] < extent;
     (slab && width >= 1.0 && width < extent).then_some(Interface {
@@ -201,28 +214,32 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     })
 }
 
-/// The best (ρ_L, ρ_V, s₀, ln d) with lengths in bins; ρ_V is 0 unless it is `free`.
-fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]> {
+/// A first guess of (ρ_L, ρ_V, s₀, ln d) with lengths in bins: a sharp step that holds as many particles.
+fn sharp_step(points: &[(f64, f64)], extent: f64) -> Option<[f64; 4]> {
     let quarter = (points.len() / 4).max(1);
     let mean = |p: &[(f64, f64)]| p.iter().map(|p| p.1).sum::<f64>() / p.len() as f64;
-    let liquid = mean(&points[..quarter]);
-    let vapour = if free { mean(&points[points.len() - quarter..]) } else { 0.0 };
-    if liquid <= vapour {
-        return None;
-    }
-    // A sharp step that holds as many particles.
+    let (liquid, vapour) = (mean(&points[..quarter]), mean(&points[points.len() - quarter..]));
     let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
     let step = (excess / (liquid - vapour)).clamp(0.0, extent);
-    let width = (0.1 * extent).max(1.0).ln();
-    let start = if free { vec![liquid, vapour, step, width] } else { vec![liquid, step, width] };
+    (liquid > vapour).then(|| [liquid, vapour, step, (0.1 * extent).max(1.0).ln()])
+}
+
+/// The best (ρ_L, ρ_V, s₀, ln d) by a search from `start`; ρ_V is 0 unless it is `free`.
+fn fit_flank(points: &[(f64, f64)], [l, v, p, w]: [f64; 4], free: bool) -> Option<[f64; 4]> {
+    let start = if free { vec![l, v, p, w] } else { vec![l, p, w] };
     let all = |p: &[f64]| if free { [p[0], p[1], p[2], p[3]] } else { [p[0], 0.0, p[1], p[2]] };
+    // The upper end of a bin is the lower end of the next.
+    let first = points[0].0 - 0.5;
+    let ends =
+        |curve: &Curve| -> Vec<End> { (0..=points.len()).map(|k| curve.end(first + k as f64)).collect() };
     let residuals = |p: &[f64]| {
         let curve = Curve::of(all(p))?;
-        Some(points.iter().map(|(s, rho)| curve.at(*s) - rho).collect())
+        Some(ends(&curve).array_windows().zip(points).map(|(bin, (_, rho))| curve.over(bin) - rho).collect())
     };
     let slopes = |p: &[f64]| {
         let curve = Curve::of(all(p))?;
-        let rows = points.iter().map(|(s, _)| curve.slopes(*s));
+        let ends = ends(&curve);
+        let rows = ends.array_windows().map(|bin| curve.slopes(bin));
         let rows = rows.flat_map(|[l, v, p, w]| [l].into_iter().chain(free.then_some(v)).chain([p, w]));
         Some(DMatrix::from_row_iterator(points.len(), start.len(), rows))
     };
@@ -244,29 +261,38 @@ impl Curve {
         (-7.0..30.0).contains(&width).then(|| Curve { liquid, vapour, place, d: width.exp() })
     }
 
-    /// The lower and the upper end of the bin around `s`, from s₀ in units of d, and the mean of tanh over the bin, d [ln cosh b − ln cosh a].
-    fn ends(&self, s: f64) -> (f64, f64, f64) {
-        let [a, b] = [s - 0.5, s + 0.5].map(|end| (end - self.place) / self.d);
-        (a, b, self.d * (ln_cosh(b) - ln_cosh(a)))
+    fn end(&self, s: f64) -> End {
+        let x = (s - self.place) / self.d;
+        let rest = (-2.0 * x.abs()).exp();
+        End { x, ln_cosh: x.abs() + rest.ln_1p(), tanh: ((1.0 - rest) / (1.0 + rest)).copysign(x) }
     }
 
-    fn at(&self, s: f64) -> f64 {
-        0.5 * (self.liquid + self.vapour) - 0.5 * (self.liquid - self.vapour) * self.ends(s).2
+    /// The mean of tanh over a bin, d [ln cosh b − ln cosh a].
+    fn mean_tanh(&self, [a, b]: &[End; 2]) -> f64 {
+        self.d * (b.ln_cosh - a.ln_cosh)
+    }
+
+    fn over(&self, bin: &[End; 2]) -> f64 {
+        0.5 * (self.liquid + self.vapour) - 0.5 * (self.liquid - self.vapour) * self.mean_tanh(bin)
     }
 
     /// The derivatives with respect to ρ_L, ρ_V, s₀ and ln d.
-    fn slopes(&self, s: f64) -> [f64; 4] {
-        let (a, b, mean) = self.ends(s);
-        let (of_a, of_b) = (a.tanh(), b.tanh());
+    fn slopes(&self, bin: &[End; 2]) -> [f64; 4] {
+        let (mean, [a, b]) = (self.mean_tanh(bin), bin);
         let half = 0.5 * (self.liquid - self.vapour);
-        let by_width = mean - self.d * (b * of_b - a * of_a);
-        [0.5 * (1.0 - mean), 0.5 * (1.0 + mean), half * (of_b - of_a), -half * by_width]
+        let by_width = mean - self.d * (b.x * b.tanh - a.x * a.tanh);
+        [0.5 * (1.0 - mean), 0.5 * (1.0 + mean), half * (b.tanh - a.tanh), -half * by_width]
     }
 }
 
-/// The function ln cosh x + ln 2; callers use only differences of it.
-fn ln_cosh(x: f64) -> f64 {
-    x.abs() + (-2.0 * x.abs()).exp().ln_1p()
+/// An end of a bin.
+#[derive(Clone, Copy)]
+struct End {
+    /// Its distance from s₀ in units of d.
+    x: f64,
+    /// ln cosh x + ln 2; only differences of it count.
+    ln_cosh: f64,
+    tanh: f64,
 }
 
 #[cfg(test)]
@@ -332,6 +358,10 @@ mod tests {
             let profile: Vec<(f64, f64)> = centres.map(|z| (z, density(z))).collect();
             let width = interface_width(&profile).unwrap();
             assert!((width - 1.4).abs() < 1e-3, "{bins}: {width}");
+            // Wherever the search begins.
+            let begin = Interface { liquid: 5.0, vapour: 0.0, place: 4.5, width: 2.0 };
+            let again = interface_from(&profile, Some(begin)).unwrap().width;
+            assert!((again / width - 1.0).abs() < 1e-7, "{bins}: {width} {again}");
         }
     }
 
@@ -351,13 +381,14 @@ mod tests {
     fn slopes_are_differences() {
         let at = [3.1, 0.2, 5.3, 0.4];
         let curve = |p: [f64; 4]| Curve::of(p).unwrap();
+        let bin = |curve: &Curve, s: f64| [s - 0.5, s + 0.5].map(|end| curve.end(end));
         for s in [0.5, 3.5, 5.5, 7.5, 30.5] {
-            let found = curve(at).slopes(s);
+            let found = curve(at).slopes(&bin(&curve(at), s));
             for k in 0..4 {
                 let beside = |h: f64| {
                     let mut at = at;
                     at[k] += h;
-                    curve(at).at(s)
+                    curve(at).over(&bin(&curve(at), s))
                 };
                 let expected = (beside(1e-5) - beside(-1e-5)) / 2e-5;
                 assert!((found[k] - expected).abs() < 1e-9, "{s} {k}: {} {expected}", found[k]);

@@ -193,9 +193,9 @@ fn autoregression(x: &[f64]) -> f64 {
     let mut orders: Vec<(f64, f64)> = Vec::with_capacity(highest + 1);
     for order in 0..=highest {
         if order > 0 {
-            let pairs = || forward[order..].iter().zip(&backward[order - 1..count - 1]);
-            let product: f64 = pairs().map(|(f, b)| f * b).sum();
-            let squares: f64 = pairs().map(|(f, b)| f * f + b * b).sum();
+            // The error of sample k forwards stands at k, that of sample k − order backwards at the index of the latter.
+            let (forward, backward) = (&mut forward[order..], &mut backward[..count - order]);
+            let [product, squares] = products(forward, backward);
             let reflection = -2.0 * product / squares;
             // A series that is predicted to the last bit needs no higher order, and its mean is exact.
             if reflection >= 1.0 {
@@ -204,12 +204,13 @@ fn autoregression(x: &[f64]) -> f64 {
             if reflection.is_nan() || reflection <= -1.0 {
                 break;
             }
-            let reversed: Vec<f64> = coefficients.iter().rev().copied().collect();
-            coefficients.iter_mut().zip(reversed).for_each(|(a, b)| *a += reflection * b);
+            for k in 0..order / 2 {
+                let (a, b) = (coefficients[k], coefficients[order - 2 - k]);
+                (coefficients[k], coefficients[order - 2 - k]) = (a + reflection * b, b + reflection * a);
+            }
             coefficients.push(reflection);
-            for k in (order..count).rev() {
-                let (f, b) = (forward[k], backward[k - 1]);
-                (forward[k], backward[k]) = (f + reflection * b, b + reflection * f);
+            for (f, b) in forward.iter_mut().zip(backward) {
+                (*f, *b) = (*f + reflection * *b, *b + reflection * *f);
             }
             residue *= 1.0 - reflection * reflection;
         }
@@ -231,6 +232,18 @@ fn autoregression(x: &[f64]) -> f64 {
         (sum, weights) = (sum + weight * variance, weights + weight);
     }
     (sum / weights).sqrt() * largest
+}
+
+/// The sums of a b and of a² + b² over two series, each in four parts: no addition waits for the one before.
+fn products(a: &[f64], b: &[f64]) -> [f64; 2] {
+    let mut sums = [[0.0; 4]; 2];
+    for (a, b) in a.chunks(4).zip(b.chunks(4)) {
+        for (k, (a, b)) in a.iter().zip(b).enumerate() {
+            sums[0][k] += a * b;
+            sums[1][k] += a * a + b * b;
+        }
+    }
+    sums.map(|parts| parts.iter().sum())
 }
 
 /// The probability P(|T| ≥ z) for z > 0 and a positive number of degrees of freedom.

@@ -37,6 +37,30 @@ fn every_particle_is_in_its_cell() {
     }
 }
 
+/// Profiles of one configuration share positions, but not those along other axes or about other centres.
+#[test]
+fn profiles_have_their_own_axes_and_centres() {
+    let keys = ["axis = \"z\"", "axis = \"x\"", "recentre = true", "recentre = \"A\"", "recentre = true"];
+    let scenes = keys.map(|keys| {
+        let observe = format!("[observe.density_profile]\n{keys}\n");
+        scene(IDEAL_MIXTURE, "[4.0, 4.0, 6.0]", 3.0, 10, &observe).unwrap()
+    });
+    let state = scenes[0].initial_state();
+    let mut simulation = Simulation::new(&scenes[0].model, 1.0, state, 1).unwrap();
+    simulation.prepare(0.01, Want::TOTALS).unwrap();
+    // A lattice has no centre.
+    simulation.step(0.01, scenes[0].stages[0].integrator, Want::TOTALS).unwrap();
+    let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
+    let shared = Frame::new(simulation.view(0.0), &fluid);
+    let found = scenes.each_ref().map(|scene| {
+        let [mut one, mut alone] = [0, 1].map(|_| scene.observe.requests[0].meter.clone());
+        assert!(one.sample(&shared) && alone.sample(&Frame::new(simulation.view(0.0), &fluid)));
+        assert_eq!(one, alone);
+        alone
+    });
+    assert!(found[0] != found[1] && found[2] != found[3] && found[2] == found[4]);
+}
+
 /// The parabola of a known viscosity with noise is fitted within five standard errors, a false alarm in 10^6;
 /// the seed is fixed.
 #[test]

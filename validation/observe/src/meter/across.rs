@@ -1,9 +1,10 @@
 //! The direction of profiles, with its bins.
 
 use super::{Deserialize, FileError, Options, PeriodicBox, Serialize};
-use crate::frame::View;
+use crate::frame::{Frame, View};
 use crate::options::Centre;
 use crate::profile::centre;
+use std::borrow::Cow;
 
 /// Bins along one direction of the box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -109,7 +110,16 @@ impl Across {
     }
 
     /// Positions of the particles as fractions of the height; `None` if the particles have no centre that could be moved to ½.
-    pub fn fractions(&self, view: &View) -> Option<Vec<f64>> {
+    pub fn fractions<'a>(&self, frame: &'a Frame) -> Option<Cow<'a, [f64]>> {
+        let (axis, about, found) =
+            frame.fractions.get_or_init(|| (self.axis, self.centre, self.find(&frame.view)));
+        match (*axis, *about) == (self.axis, self.centre) {
+            true => found.as_deref().map(Cow::Borrowed),
+            false => self.find(&frame.view).map(Cow::Owned),
+        }
+    }
+
+    fn find(&self, view: &View) -> Option<Vec<f64>> {
         let domain = view.domain;
         let mut s: Vec<f64> = view.x.iter().map(|x| domain.fraction(*x)[self.axis]).collect();
         let counts = |k: usize| match self.centre {

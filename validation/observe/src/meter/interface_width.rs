@@ -1,6 +1,6 @@
 use super::across::Across;
 use super::*;
-use crate::profile::{interface, slab_edges};
+use crate::profile::{interface, interface_from, slab_edges};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InterfaceWidth {
@@ -36,7 +36,7 @@ impl Meter for InterfaceWidth {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let Some(fractions) = self.across.fractions(&frame.view) else { return false };
+        let Some(fractions) = self.across.fractions(frame) else { return false };
         let mut counts = vec![0.0; self.across.bins];
         fractions.iter().filter_map(|s| self.across.bin(*s)).for_each(|bin| counts[bin] += 1.0);
         self.series.push(&counts)
@@ -52,10 +52,11 @@ impl Meter for InterfaceWidth {
         let profile = |means: &[f64]| -> Vec<(f64, f64)> {
             centres.iter().zip(means).map(|(z, n)| (*z, n / volume)).collect()
         };
+        let whole = interface(&profile(&self.series.means()));
         let fit = self.series.jackknife(|means| {
             let profile = profile(means);
             let found = slab_edges(&profile)?;
-            let fit = interface(&profile);
+            let fit = interface_from(&profile, whole);
             let (width, place) = fit.map_or((f64::NAN, found.place), |fit| (fit.width, fit.place));
             Some(vec![width, found.liquid, found.vapour, 2.0 * place, found.ten_ninety, found.steepest])
         });

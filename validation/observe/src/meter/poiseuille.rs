@@ -100,7 +100,7 @@ impl Meter for Poiseuille {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let Some(fractions) = self.across.fractions(&frame.view) else { return false };
+        let Some(fractions) = self.across.fractions(frame) else { return false };
         let mut sums = vec![0.0; 2 * self.across.bins];
         for (k, s) in fractions.iter().enumerate() {
             if let Some(bin) = self.across.bin(*s) {

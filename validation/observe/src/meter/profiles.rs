@@ -41,7 +41,7 @@ impl Bins {
 
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
-        let Some(fractions) = self.across.fractions(&view) else { return false };
+        let Some(fractions) = self.across.fractions(frame) else { return false };
         let (width, count) = (self.width(), self.species.len());
         let mut sums = vec![0.0; self.across.bins * width];
         for (k, s) in fractions.iter().enumerate() {

@@ -19,7 +19,7 @@ impl StressProfile {
     /// The pressures of one configuration in every bin.
     fn pressures(&self, frame: &Frame) -> Option<Vec<f64>> {
         let view = frame.view;
-        let fractions = self.across.fractions(&view)?;
+        let fractions = self.across.fractions(frame)?;
         // Lines begin at any position, so they are shifted by as much as the particles.
         let shift = fractions.first()? - view.domain.fraction(*view.x.first()?)[self.across.axis];
         let stresses = Stresses {

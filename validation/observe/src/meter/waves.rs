@@ -17,11 +17,7 @@ pub fn waves(pool: &Pool, fractions: impl Iterator<Item = [f64; 3]>, vectors: &[
     let mut blocks: Vec<_> =
         fractions.chunks(BLOCK).map(|block| (block, vec![[[0.0; LANES]; 2]; vectors.len()])).collect();
     pool.each(&mut blocks, |(block, waves)| {
-        for particles in block.chunks(LANES * GROUPS) {
-            let groups: Vec<Phases> =
-                particles.chunks(LANES).map(|group| Phases::new(group, &axes)).collect();
-            loops::run_best(AddWaves { groups: &groups, vectors: &places, waves });
-        }
+        loops::run_best(AddWaves { particles: block, axes: &axes, vectors: &places, waves });
     });
     let mut sums = vec![[0.0; 2]; vectors.len()];
     for (_, waves) in &blocks {
@@ -36,7 +32,7 @@ pub fn waves(pool: &Pool, fractions: impl Iterator<Item = [f64; 3]>, vectors: &[
 const BLOCK: usize = 1024;
 
 /// The number of particles in a vector.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// The number of vectors whose contributions to a wave are added before they are stored.
 const GROUPS: usize = 8;
@@ -52,7 +48,7 @@ enum Axis {
     Some(Vec<u32>),
 }
 
-/// The index of a phase, and −1 for its conjugate, else 1.
+/// The index of a phase, and −1 for its conjugate, else 1; 0 where the phase is 1.
 type Place = (usize, f32);
 
 /// Largest component for which the phases of all smaller ones are computed.
@@ -76,7 +72,7 @@ impl Axis {
             Axis::UpTo(_) => size as usize,
             Axis::Some(all) => all.partition_point(|other| *other < size),
         };
-        (index, if h < 0 { -1.0 } else { 1.0 })
+        (index, h.signum() as f32)
     }
 }
 
@@ -84,32 +80,42 @@ impl Axis {
 struct Phases([Vec<Complex>; 3]);
 
 impl Phases {
-    fn new(particles: &[[f64; 3]], axes: &[Axis; 3]) -> Phases {
-        Phases([0, 1, 2].map(|c| {
-            let top = match &axes[c] {
-                Axis::UpTo(top) => *top,
-                Axis::Some(all) => {
-                    let phase = |h: &u32| {
-                        let mut phase = [[0.0; LANES]; 2];
-                        for (k, s) in particles.iter().enumerate() {
-                            (phase[1][k], phase[0][k]) = (TAU * (f64::from(*h) * s[c]).fract()).sin_cos();
-                        }
-                        single(&phase)
-                    };
-                    return all.iter().map(phase).collect();
-                }
-            };
-            let [mut first, mut one] = [[[0.0; LANES]; 2]; 2];
-            for (k, s) in particles.iter().enumerate() {
-                (first[1][k], first[0][k]) = (TAU * s[c]).sin_cos();
-                one[0][k] = 1.0;
-            }
-            let powers = std::iter::successors(Some(one), |power| Some(times(power, &first, 1.0)));
-            powers.take(top + 1).map(|power| single(&power)).collect()
-        }))
+    #[inline(always)]
+    fn new(particles: &[[f64; 3]], [a, b, c]: &[Axis; 3]) -> Phases {
+        Phases([along(a, particles, 0), along(b, particles, 1), along(c, particles, 2)])
     }
 }
 
+#[inline(always)]
+fn along(axis: &Axis, particles: &[[f64; 3]], c: usize) -> Vec<Complex> {
+    let top = match axis {
+        Axis::UpTo(top) => *top,
+        Axis::Some(all) => {
+            let phase = |h: &u32| {
+                let mut phase = [[0.0; LANES]; 2];
+                for (k, s) in particles.iter().enumerate() {
+                    (phase[1][k], phase[0][k]) = (TAU * (f64::from(*h) * s[c]).fract()).sin_cos();
+                }
+                single(&phase)
+            };
+            return all.iter().map(phase).collect();
+        }
+    };
+    let [mut first, mut power] = [[[0.0; LANES]; 2]; 2];
+    for (k, s) in particles.iter().enumerate() {
+        (first[1][k], first[0][k]) = (TAU * s[c]).sin_cos();
+        power[0][k] = 1.0;
+    }
+    let mut powers = Vec::with_capacity(top + 1);
+    powers.push(single(&power));
+    for _ in 0..top {
+        power = times(&power, &first, 1.0);
+        powers.push(single(&power));
+    }
+    powers
+}
+
+#[inline(always)]
 fn single(phase: &Complex<f64>) -> Complex {
     phase.map(|part| part.map(|x| x as f32))
 }
@@ -129,9 +135,10 @@ where
     product
 }
 
-/// Adds the contributions of some groups of particles to the wave of each vector.
+/// Adds the contributions of particles to the wave of each vector.
 struct AddWaves<'a> {
-    groups: &'a [Phases],
+    particles: &'a [[f64; 3]],
+    axes: &'a [Axis; 3],
     vectors: &'a [[Place; 3]],
     waves: &'a mut [Complex],
 }
@@ -141,19 +148,29 @@ impl Loop for AddWaves<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let AddWaves { groups, vectors, waves } = self;
-        for ([(a, _), (b, sign_b), (c, sign_c)], wave) in vectors.iter().zip(waves) {
-            let mut sum = *wave;
-            for Phases([first, second, third]) in groups {
-                let product = times(&first[*a], &second[*b], *sign_b);
-                let product = times(&product, &third[*c], *sign_c);
-                for part in 0..2 {
-                    for k in 0..LANES {
-                        sum[part][k] += product[part][k];
+        let AddWaves { particles, axes, vectors, waves } = self;
+        let mut groups: Vec<Phases> = Vec::with_capacity(GROUPS);
+        for particles in particles.chunks(LANES * GROUPS) {
+            groups.clear();
+            for group in particles.chunks(LANES) {
+                groups.push(Phases::new(group, axes));
+            }
+            for ([(a, _), (b, sign_b), (c, sign_c)], wave) in vectors.iter().zip(&mut *waves) {
+                let mut sum = *wave;
+                for Phases([first, second, third]) in &groups {
+                    let mut product = times(&first[*a], &second[*b], *sign_b);
+                    // In the plane there is no third factor.
+                    if *sign_c != 0.0 {
+                        product = times(&product, &third[*c], *sign_c);
+                    }
+                    for part in 0..2 {
+                        for k in 0..LANES {
+                            sum[part][k] += product[part][k];
+                        }
                     }
                 }
+                *wave = sum;
             }
-            *wave = sum;
         }
     }
 }
