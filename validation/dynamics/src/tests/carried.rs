@@ -116,7 +116,41 @@ fn slices_of_stress_add_up_to_the_momentum_flux() {
     }
 }
 
-/// The same where a layer of frozen particles and a reflecting face confine a driven flow, in means over steps with and without an
+/// Where only sums are recorded they are those of the lines, also of drag, for which lines need a search of its own.
+#[test]
+fn recorded_sums_are_those_of_lines() {
+    let domain = PeriodicBox::orthogonal([-1.0, 0.5, 2.0], [3.5, 4.0, 4.5], [true, true, false]).unwrap();
+    let folder = folder(3, domain);
+    for (name, integrator) in Integrator::ALL {
+        let text = format!(
+            "model = \"m.toml\"\nkT = 0.7\nseed = 3\nprecision = \"double\"\n{}dt = 0.04\nsteps = 3\n[box]\n\
+             boundary = [\"periodic\", \"periodic\", \"reflecting\"]\n[initial]\nkind = \"data\"\nfile = \"start.data\"\n\
+             velocities = \"thermal\"\n",
+            steps(name, integrator)
+        );
+        let scene = Scene::parse("s.toml", &text, folder.path()).unwrap();
+        let stage = &scene.stages[0];
+        let evaluator = &Evaluator::new(scene.model.at(scene.kt).unwrap()).unwrap();
+        let [sums, lines] = [Recorded::Sum, Recorded::Lines].map(|what| {
+            let mut simulation = scene.simulation(scene.initial_state()).unwrap();
+            scene.enter(stage, &mut simulation).unwrap();
+            simulation.prepare_for(stage.integrator, stage.dt, Want::FORCES).unwrap();
+            simulation.record_flux(what);
+            (0..3).map(move |_| {
+                simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+                Frame::new(simulation.view(0.0), evaluator).carried_pressure().unwrap()
+            })
+        });
+        for (sum, line) in sums.zip(lines) {
+            let scale = line.iter().fold(1.0f64, |most, p| most.max(p.abs()));
+            for (a, b) in sum.iter().zip(line) {
+                assert!((a - b).abs() < 1e-11 * scale, "{name}: {sum:?} {line:?}");
+            }
+        }
+    }
+}
+
+/// Slices add up where a layer of frozen particles and a reflecting face confine a driven flow, in means over steps with and without an
 /// action of the thermostat.
 #[test]
 fn slices_beside_a_wall_add_up_to_the_momentum_flux() {
