@@ -15,6 +15,13 @@ const PAGE: usize = 2 << 20;
 /// back to the system when they are released; the system's allocator would keep that of lists that grew, a sixth of all.
 pub struct LargePages;
 
+/// Lets the allocator of glibc keep the memory of smaller arrays that are released, some megabytes in all. It gives back what is free at the
+/// end of its heap beyond twice the largest array that had a mapping of its own, at first 256 KiB, and pages that it takes again are
+/// cleared: that of the arrays of each sample took 2 to 7 % of short runs.
+pub fn keep_released() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(PAGE - 1)));
+}
+
 /// The layout of an array that fills large pages; `None` for other arrays.
 fn in_pages(layout: Layout) -> Option<Layout> {
     if layout.size() < PAGE {

@@ -26,6 +26,7 @@ fn median(times: &mut [f64]) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
+    psidpd_core::memory::keep_released();
     let scene = std::env::args().nth(1).ok_or("usage: meter_pace SCENE")?;
     let scene = Scene::open(Path::new(&scene))?;
     let (settle, stage) = (&scene.stages[0], scene.stages.last().ok_or("a scene without stages")?);

@@ -143,7 +143,7 @@ pub fn run(program: &Path, arguments: impl IntoIterator<Item = OsString>) -> u8 
 
 fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     survive_size_limits();
-    keep_released_memory();
+    psidpd_core::memory::keep_released();
     let matches = command().try_get_matches_from(arguments);
     match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => carry_out(arguments),
@@ -158,12 +158,6 @@ fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             }
         }
     }
-}
-
-/// Lets the allocator of glibc keep the memory of scratch arrays. It gives back what is free at the end of its heap beyond twice the
-/// largest array that had a mapping of its own, at first 256 KiB, and pages that it takes again are cleared.
-fn keep_released_memory() {
-    drop(std::hint::black_box(Vec::<u8>::with_capacity((2 << 20) - 1)));
 }
 
 /// Without a handler, a file beyond the size limit of the shell would kill the program, and not fail as on a full disk.
