@@ -589,6 +589,9 @@ range = 1.0
         let found = evaluator.evaluate(&alone(), &[[1.0; 3], [1.7, 1.0, 1.0]], &[0, 0], &domain);
         let forces = found.forces(&alone());
         assert!((forces[0][0] + 7.5).abs() < 1e-12 && forces[1][0] == -forces[0][0]);
+        // φ″ + 2 φ′/r of the soft force.
+        let laplacians = found.laplacians(&alone(), &evaluator.fluid);
+        assert!(laplacians.iter().all(|l| (l - (25.0 - 15.0 / 0.7)).abs() < 1e-12), "{laplacians:?}");
     }
 
     /// Compares the Laplacian of U with differences of forces.

@@ -80,7 +80,8 @@ impl Rows<'_> {
                 let gradient = found[(1 + v) * lanes + lane];
                 self.slopes[k * variables + v] = gradient * first;
                 for u in 0..variables {
-                    let curved = if u == v { gradient * bend } else { 0.0 };
+                    // A slope may be infinite without neighbours.
+                    let curved = if u == v && bend != 0.0 { gradient * bend } else { 0.0 };
                     let entry = found[(1 + variables + v * variables + u) * lanes + lane];
                     let other = corrected[u * lanes + lane][1];
                     self.second[(k * variables + v) * variables + u] = entry * (first * other) + curved;

@@ -45,7 +45,7 @@ impl Evaluation {
             let gradient = |v: usize| &gradients[v / kinds][4 * (k * kinds + v % kinds)..][..3];
             let product = |v: usize, u: usize| -> f64 {
                 let along = gradient(v).iter().zip(gradient(u)).map(|(g, h)| g * h);
-                second[v * variables + u] * along.sum::<f64>()
+                times(second[v * variables + u], along.sum::<f64>())
             };
             let by_psi = (0..variables).map(|v| (0..variables).map(|u| product(v, u)).sum::<f64>());
             let by_weights = gradients.iter().flat_map(|of| &of.as_chunks::<4>().0[k * kinds..][..kinds]);
@@ -94,6 +94,7 @@ struct Sums {
     gradients: Vec<Vec<Row>>,
 }
 
+/// Sums over the pairs of a plane.
 fn second_derivatives(plane: &PlaneList, fluid: &Fluid, psi: &Psi) -> Sums {
     let (kinds, variables, densities) = (fluid.species.len(), fluid.variables(), fluid.densities.len());
     // Of the particles of the plane, one for each species.
@@ -196,7 +197,7 @@ fn add_to_both(rows: &mut [Row], [i, j]: [usize; 2], [x, y, z]: [f64; 3], [to_i,
     rows[j].iter_mut().zip([x, y, z, -to_j]).for_each(|(to, add)| *to -= add);
 }
 
-/// The product of a derivative of ψ, which may be infinite if no particle is in range, with a derivative of the weight of a pair.
+/// The product of a derivative of ψ, which may be infinite if no particle is in range, with one of weights, which then is 0.
 #[inline(always)]
 fn times(of_psi: f64, of_weight: f64) -> f64 {
     let product = of_psi * of_weight;
