@@ -193,7 +193,9 @@ fn every_evaluation_is_the_truth() {
             (evaluator.energy(&pool(), &x, &species, &domain) - truth.energy).abs()
                 < 1e-10 * truth.energy.abs().max(1.0)
         );
-        for (f, g) in found.forces(&pool()).iter().flatten().zip(truth.forces.iter().flatten()) {
+        for (f, g) in
+            found.forces(&pool(), &evaluator.fluid).iter().flatten().zip(truth.forces.iter().flatten())
+        {
             assert!((f - g).abs() < 1e-11 * scale, "{f} {g}");
         }
         // Stretched, it is evaluated anew: what walls add is not among the pairs that are known.
@@ -226,12 +228,14 @@ fn forces_are_gradients() {
             let h = 1e-5;
             for c in 0..=axis {
                 let slope = (moved(c, h).energy - moved(c, -h).energy) / (2.0 * h);
-                let force = here.forces(&pool())[k][c];
+                let force = here.forces(&pool(), &evaluator.fluid)[k][c];
                 assert!((slope + force).abs() < 1e-5 * (1.0 + force.abs()), "{slope} {force}");
             }
             if !jumps {
                 let by = |c: usize| {
-                    (moved(c, h).forces(&pool())[k][c] - moved(c, -h).forces(&pool())[k][c]) / (2.0 * h)
+                    (moved(c, h).forces(&pool(), &evaluator.fluid)[k][c]
+                        - moved(c, -h).forces(&pool(), &evaluator.fluid)[k][c])
+                        / (2.0 * h)
                 };
                 let divergence: f64 = (0..=axis).map(by).sum();
                 assert!(
@@ -315,7 +319,7 @@ fn a_periodic_direction_has_no_wall() {
     let [a, b] = [fluid, without].map(|fluid| {
         let evaluator = Evaluator::new(fluid).unwrap();
         let found = evaluator.evaluate(&pool(), &x, &species, &whole);
-        (found.energy, found.forces(&pool()))
+        (found.energy, found.forces(&pool(), &evaluator.fluid))
     });
     assert_eq!(a, b);
 }

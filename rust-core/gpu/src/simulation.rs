@@ -342,6 +342,7 @@ fn sums_of(partial: &[f32]) -> Totals {
             pair: sum(1),
             virial: std::array::from_fn(|k| sum(2 + k)),
             thermostat_virial: std::array::from_fn(|k| sum(8 + k)),
+            // No step here records it.
             drag_virial: [f64::NAN; 6],
         },
         momentum_flux: std::array::from_fn(|k| sum(14 + k)),

@@ -284,20 +284,6 @@ impl Evaluation {
         pair_energies(pool, &self.planes, fluid)
     }
 
-    /// Conservative forces on the particles.
-    pub fn forces(&self, pool: &Pool) -> Vec<[f64; 3]> {
-        let mut work: Vec<(&PlaneList, Vec<f64>)> =
-            self.planes.iter().map(|plane| (plane, Vec::new())).collect();
-        pool.each(&mut work, |(plane, sums)| *sums = plane.forces());
-        let parts = work.iter().map(|(plane, sums)| (&plane.hosts[..], &sums[..]));
-        let mut forces = merge(parts, self.psi.value.len(), 3).as_chunks().0.to_vec();
-        for near in &self.near_walls {
-            let of_wall = near.force();
-            (0..3).for_each(|c| forces[near.particle][c] += of_wall[c]);
-        }
-        forces
-    }
-
     /// Virial `Σ r_ij ⊗ F_ij` of the conservative forces: xx, yy, zz, xy, xz, yz.
     pub fn virial(&self) -> [f64; 6] {
         COMPONENTS.map(|(a, b)| {
@@ -462,7 +448,9 @@ range = 1.2
             assert!((energies - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
             assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
-            for (f, g) in found.forces(&alone()).iter().flatten().zip(truth.forces.iter().flatten()) {
+            for (f, g) in
+                found.forces(&alone(), &evaluator.fluid).iter().flatten().zip(truth.forces.iter().flatten())
+            {
                 assert!((f - g).abs() < 1e-11 * scale, "{f} {g}");
             }
             for (w, v) in found.virial().iter().zip(truth.virial) {
@@ -503,8 +491,8 @@ range = 1.2
             let found = evaluator.evaluate(&alone(), &x, &species, domain);
             let shared = evaluator.evaluate(&three, &x, &species, domain);
             assert_eq!(
-                (found.forces(&alone()), found.energy, found.virial()),
-                (shared.forces(&three), shared.energy, shared.virial())
+                (found.forces(&alone(), &evaluator.fluid), found.energy, found.virial()),
+                (shared.forces(&three, &evaluator.fluid), shared.energy, shared.virial())
             );
             let laplacians = [&alone(), &three].map(|pool| found.laplacians(pool, &evaluator.fluid));
             assert_eq!(laplacians[0], laplacians[1]);
@@ -512,7 +500,9 @@ range = 1.2
             let truth = crate::truth::conservative(&evaluator.fluid, &inside, &indices, domain).unwrap();
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
             assert!((found.energy - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0), "{domain:?}");
-            for (f, g) in found.forces(&alone()).iter().flatten().zip(truth.forces.iter().flatten()) {
+            for (f, g) in
+                found.forces(&alone(), &evaluator.fluid).iter().flatten().zip(truth.forces.iter().flatten())
+            {
                 assert!((f - g).abs() < 1e-11 * scale, "{domain:?}: {f} {g}");
             }
             for (w, v) in found.virial().iter().zip(truth.virial) {
@@ -587,7 +577,7 @@ range = 1.0
         let (evaluator, ..) = random(model, 13);
         let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
         let found = evaluator.evaluate(&alone(), &[[1.0; 3], [1.7, 1.0, 1.0]], &[0, 0], &domain);
-        let forces = found.forces(&alone());
+        let forces = found.forces(&alone(), &evaluator.fluid);
         assert!((forces[0][0] + 7.5).abs() < 1e-12 && forces[1][0] == -forces[0][0]);
         // φ″ + 2 φ′/r of the soft force.
         let laplacians = found.laplacians(&alone(), &evaluator.fluid);
@@ -609,7 +599,8 @@ range = 1.0
                     let force = |h: f64| {
                         let mut x = x.clone();
                         x[k][c] += h;
-                        evaluator.evaluate(&alone(), &x, &species, &domain).forces(&alone())[k][c]
+                        evaluator.evaluate(&alone(), &x, &species, &domain).forces(&alone(), &evaluator.fluid)
+                            [k][c]
                     };
                     divergence += (force(h) - force(-h)) / (2.0 * h);
                 }

@@ -55,6 +55,11 @@ impl Evaluation {
         (0..count).map(of_particle).unzip()
     }
 
+    /// The first of [`Evaluation::forces_and_laplacians`].
+    pub fn forces(&self, pool: &Pool, fluid: &Fluid) -> Vec<[f64; 3]> {
+        self.forces_and_laplacians(pool, fluid).0
+    }
+
     /// The second of [`Evaluation::forces_and_laplacians`].
     pub fn laplacians(&self, pool: &Pool, fluid: &Fluid) -> Vec<f64> {
         self.forces_and_laplacians(pool, fluid).1

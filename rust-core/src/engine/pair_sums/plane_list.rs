@@ -155,21 +155,6 @@ impl PlaneList {
         })
     }
 
-    /// The sums of the forces on the particles, by local numbers.
-    pub fn forces(&self) -> Vec<f64> {
-        let PlaneList { hosts, list: PairList { i, j, d, .. }, strengths, .. } = self;
-        let mut sums = vec![0.0; 3 * hosts.len()];
-        for (k, strength) in strengths.iter().enumerate() {
-            let (i, j) = (3 * i[k] as usize, 3 * j[k] as usize);
-            for c in 0..3 {
-                let f = strength * d[c][k];
-                sums[i + c] += f;
-                sums[j + c] -= f;
-            }
-        }
-        sums
-    }
-
     /// The pairs within `range`. Particles have the indices of the host.
     pub fn pairs(&self, range: f64) -> impl Iterator<Item = Pair> {
         let PlaneList { hosts, list, .. } = self;

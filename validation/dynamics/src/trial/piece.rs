@@ -290,7 +290,8 @@ fn frequency(run: &Simulation, evaluator: &Evaluator, number: u32) -> f64 {
     }
     to.iter_mut().flatten().for_each(|x| domain.wrap(x, &mut [0; 3]));
     let pool = run.engine().pool();
-    let [before, after] = to.map(|x| evaluator.evaluate(pool, &x, species, domain).forces(pool));
+    let [before, after] =
+        to.map(|x| evaluator.evaluate(pool, &x, species, domain).forces(pool, &evaluator.fluid));
     let mut sums = vec![(0.0, 0usize); mass.len()];
     for k in 0..x.len() {
         let (sum, count) = &mut sums[species[k] as usize];

@@ -54,7 +54,11 @@ fn same(origin: &Origin, fluid: Fluid, other: &Model) -> Result<bool, Experiment
     let evaluate = |fluid: Fluid| {
         let evaluator = Evaluator::new(fluid).ok()?;
         let alone = Pool::new(NonZeroUsize::MIN);
-        Some(evaluator.evaluate(&alone, &state.x, &state.species, &state.domain).forces(&alone))
+        Some(
+            evaluator
+                .evaluate(&alone, &state.x, &state.species, &state.domain)
+                .forces(&alone, &evaluator.fluid),
+        )
     };
     let (Some(ours), Some(theirs)) = (evaluate(fluid), evaluate(other.at(kt)?)) else { return Ok(false) };
     let largest = ours.iter().flatten().fold(0.0, |m: f64, c| m.max(c.abs()));

@@ -242,7 +242,7 @@ fn the_configurational_temperature_knows_walls() {
         let frame = Frame::new(View { x: &x, ..run.view(0.0) }, &evaluator);
         let probability = (-frame.evaluation().energy / kt).exp();
         let terms = psidpd_observe::configurational::sums(&frame);
-        forces += frame.evaluation().forces(frame.view.pool)[0][2].abs();
+        forces += frame.evaluation().forces(frame.view.pool, &frame.evaluator.fluid)[0][2].abs();
         (0..2).for_each(|c| sums[c] += probability * terms[c]);
     }
     assert!((sums[0] / sums[1] / kt - 1.0).abs() < 2e-3 && forces > 1.0, "{}", sums[0] / sums[1]);

@@ -169,7 +169,8 @@ fn the_configurational_temperature_knows_faces() {
             let probability = (-evaluation.energy / kt).exp();
             let terms = psidpd_observe::configurational::sums(&frame);
             let laplacian = evaluation.laplacians(run.engine().pool(), &evaluator.fluid)[1];
-            let square: f64 = evaluation.forces(frame.view.pool)[1].iter().map(|f| f * f).sum();
+            let square: f64 =
+                evaluation.forces(frame.view.pool, &frame.evaluator.fluid)[1].iter().map(|f| f * f).sum();
             (0..2).for_each(|c| sums[c] += probability * terms[c]);
             (plain[0], plain[1]) = (plain[0] + probability * square, plain[1] + probability * laplacian);
         }

@@ -329,7 +329,7 @@ fn the_configurational_temperature_knows_round_walls() {
             let frame = Frame::new(View { x: &x, ..run.view(0.0) }, &evaluator);
             let probability = c.powi(directions - 1) * (-frame.evaluation().energy / kt).exp();
             let terms = psidpd_observe::configurational::sums(&frame);
-            forces += frame.evaluation().forces(frame.view.pool)[0][1].abs();
+            forces += frame.evaluation().forces(frame.view.pool, &frame.evaluator.fluid)[0][1].abs();
             (0..2).for_each(|c| sums[c] += probability * terms[c]);
         }
         let found = sums[0] / sums[1] / kt;
