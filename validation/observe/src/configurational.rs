@@ -1,6 +1,7 @@
 //! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`; between reflecting surfaces with weights.
 
-use super::frame::Frame;
+use super::frame::{Frame, View};
+use psidpd_core::engine::pair_sums::ParticleSums;
 use psidpd_core::engine::{Face, PeriodicBox, Place, faces};
 use psidpd_core::model::Fluid;
 
@@ -60,8 +61,14 @@ fn weight(frame: &Frame, rounds: &[Face], range: f64, x: [f64; 3]) -> (f64, [f64
     (weight, gradient)
 }
 
-/// Visits `w F·F` and `w ∇²U − ∇w·F` of each mobile particle, with its index.
+/// Visits `w F·F` and `w ∇²U − ∇w·F` of each mobile particle, with its index. Where all particles count alike, and pairs of the run are in
+/// single precision, the second are shares of the sum, those of the energies of particles.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
+    if let Some(ParticleSums { forces, shares, .. }) = alike(frame) {
+        let squares = forces.iter().map(|f| f.iter().map(|f| f * f).sum());
+        squares.zip(shares).enumerate().for_each(|(k, (square, share))| visit(k, [square, *share]));
+        return;
+    }
     let evaluation = frame.evaluation();
     let (forces, laplacians) = evaluation.forces_and_laplacians(frame.view.pool, &frame.evaluator.fluid);
     let range = frame.evaluator.fluid.conservative_range().max(f64::MIN_POSITIVE);
@@ -74,6 +81,13 @@ fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
             visit(k, [w * f.iter().map(|f| f * f).sum::<f64>(), w * l - across]);
         }
     }
+}
+
+/// Forces and shares of particles that all have the weight 1; `None` if some do not, or if they have to be in double precision.
+fn alike<'a>(frame: &'a Frame) -> Option<&'a ParticleSums> {
+    let View { domain, dimensions, x, .. } = frame.view;
+    let is_whole = frame.piece.is_none() && domain.periodic()[..dimensions] == [true; 3][..dimensions];
+    (is_whole && (0..x.len()).all(|k| frame.moves(k))).then(|| frame.sums())?
 }
 
 /// The terms of [`sums`] for each block of space. Blocks without particles are left out.

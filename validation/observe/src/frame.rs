@@ -3,17 +3,20 @@
 use super::flux::{BLOCK, Carrier, Flux, Line, Lines, Place, Pull};
 use super::options::Centre;
 use super::piece::{Piece, Whole};
-use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair};
+use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair, ParticleSums};
 use psidpd_core::engine::thermostat::Pulls;
-use psidpd_core::engine::{PeriodicBox, Pool};
+use psidpd_core::engine::{PeriodicBox, Pool, Precision};
 use psidpd_core::model::Model;
 use std::cell::OnceCell;
+use std::sync::Arc;
 
 /// A configuration of particles that its owner lends to the observables.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     /// The threads that share long work; results do not depend on their number.
-    pub pool: &'a Pool,
+    pub pool: &'a Arc<Pool>,
+    /// The precision of the forces of the run.
+    pub precision: Precision,
     pub step: u64,
     /// The time since the start of the run.
     pub time: f64,
@@ -62,6 +65,7 @@ pub struct Frame<'a> {
     /// The piece that the configuration is of a larger one.
     pub piece: Option<&'a Piece>,
     evaluation: OnceCell<Evaluation>,
+    sums: OnceCell<Option<ParticleSums>>,
     /// The evaluations of forces that acted at positions other than the present ones.
     earlier: OnceCell<Vec<Option<Earlier>>>,
     /// Positions along one axis, most likely those of all profiles: the axis, the centre, and what `Across::fractions` found.
@@ -80,8 +84,9 @@ const LINES: usize = 2048;
 
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
-        let (evaluation, earlier, fractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Frame { view, evaluator, piece: None, evaluation, earlier, fractions }
+        let (evaluation, sums) = (OnceCell::new(), OnceCell::new());
+        let (earlier, fractions) = (OnceCell::new(), OnceCell::new());
+        Frame { view, evaluator, piece: None, evaluation, sums, earlier, fractions }
     }
 
     /// A piece of a configuration, or all of it.
@@ -105,6 +110,26 @@ impl<'a> Frame<'a> {
     pub fn evaluation(&self) -> &Evaluation {
         let View { pool, x, species, domain, .. } = self.view;
         self.evaluation.get_or_init(|| self.evaluator.evaluate(pool, x, species, domain))
+    }
+
+    /// Sums over the pairs of each particle, which take less time than [`Frame::evaluation`]; `None` if there is one already, if pairs of the
+    /// run are in double precision, and where [`Evaluator::particle_sums`] has none.
+    pub fn sums(&self) -> Option<&ParticleSums> {
+        let View { pool, precision, x, species, domain, .. } = self.view;
+        if precision == Precision::Double || self.evaluation.get().is_some() {
+            return None;
+        }
+        self.sums.get_or_init(|| self.evaluator.particle_sums(pool, x, species, domain)).as_ref()
+    }
+
+    /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
+    pub fn densities(&self) -> &[f64] {
+        self.sums().map_or_else(|| &self.evaluation().densities[..], |sums| &sums.densities)
+    }
+
+    /// Sum `Σ ψ` over the particles of each species.
+    pub fn excess(&self) -> &[f64] {
+        self.sums().map_or_else(|| &self.evaluation().excess[..], |sums| &sums.excess)
     }
 
     /// Adds up `width` numbers over all lines of momentum transport in the step: over those of particles, and over those of pairs;

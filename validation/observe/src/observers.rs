@@ -112,6 +112,11 @@ impl Observers {
             self.fluid = fluid.map(|fluid| (view.kt, fluid));
         }
         let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(view, fluid));
+        let mut meters = self.observers.iter().filter(|o| due(o)).flat_map(|o| &o.stages);
+        let needs_lines = meters.any(|s| s.stage == stage && s.meter.flux() == Recorded::Lines);
+        if let Some(frame) = frame.as_ref().filter(|_| needs_lines) {
+            frame.expect_lines();
+        }
         for observer in self.observers.iter_mut().filter(|o| due(o)) {
             for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
                 let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));

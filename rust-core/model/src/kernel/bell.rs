@@ -22,7 +22,7 @@ impl Shape for Bell {
     }
 
     #[inline(always)]
-    fn curvature(s: f64) -> f64 {
-        12.0 * s - 6.0
+    fn curvature<R: Real>(s: R) -> R {
+        R::constant(12.0) * s - R::constant(6.0)
     }
 }

@@ -27,7 +27,8 @@ impl Shape for CubicSpline {
     }
 
     #[inline(always)]
-    fn curvature(s: f64) -> f64 {
-        12.0 * (1.0 - s) - 48.0 * (0.5 - s).max(0.0)
+    fn curvature<R: Real>(s: R) -> R {
+        let below = (R::constant(0.5) - s).larger(R::constant(0.0));
+        R::constant(12.0) * (R::constant(1.0) - s) - R::constant(48.0) * below
     }
 }

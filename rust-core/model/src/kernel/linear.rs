@@ -21,7 +21,7 @@ impl Shape for Linear {
     }
 
     #[inline(always)]
-    fn curvature(_: f64) -> f64 {
-        0.0
+    fn curvature<R: Real>(_: R) -> R {
+        R::constant(0.0)
     }
 }

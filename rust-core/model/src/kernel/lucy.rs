@@ -24,7 +24,8 @@ impl Shape for Lucy {
     }
 
     #[inline(always)]
-    fn curvature(s: f64) -> f64 {
-        -12.0 * (1.0 - s) * (1.0 - 3.0 * s)
+    fn curvature<R: Real>(s: R) -> R {
+        let one = R::constant(1.0);
+        R::constant(-12.0) * (one - s) * (one - R::constant(3.0) * s)
     }
 }

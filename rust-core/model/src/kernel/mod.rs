@@ -41,7 +41,7 @@ pub trait Shape: Copy + Default + Send + Sync + 'static {
     /// The slope `W'(s)`.
     fn slope<R: Real>(s: R) -> R;
     /// The curvature `W''(s)`, which only measurements of changing forces need.
-    fn curvature(s: f64) -> f64;
+    fn curvature<R: Real>(s: R) -> R;
 }
 
 /// The one list of kernels, which defines the enum, the names and the dispatch.

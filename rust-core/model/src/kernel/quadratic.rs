@@ -23,7 +23,7 @@ impl Shape for Quadratic {
     }
 
     #[inline(always)]
-    fn curvature(_: f64) -> f64 {
-        2.0
+    fn curvature<R: Real>(_: R) -> R {
+        R::constant(2.0)
     }
 }

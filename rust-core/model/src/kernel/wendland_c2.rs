@@ -24,7 +24,9 @@ impl Shape for WendlandC2 {
     }
 
     #[inline(always)]
-    fn curvature(s: f64) -> f64 {
-        -20.0 * (1.0 - s) * (1.0 - s) * (1.0 - 4.0 * s)
+    fn curvature<R: Real>(s: R) -> R {
+        let one = R::constant(1.0);
+        let t = one - s;
+        R::constant(-20.0) * t * t * (one - R::constant(4.0) * s)
     }
 }

@@ -4,6 +4,7 @@ pub mod buffers;
 pub mod data;
 pub mod distances;
 pub mod first;
+pub mod laplacians;
 pub mod list;
 pub mod listed_noise;
 pub mod pair_sums;

@@ -4,6 +4,7 @@
 use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
 use super::plane_list::{PairBlock, PlaneList, merge};
+use super::shares::Shares;
 use super::sweep_pairs::{Ranges, SweepPairs};
 use crate::engine::components::COMPONENTS;
 use crate::engine::plan::Plan;
@@ -23,11 +24,12 @@ pub struct Evaluator {
     /// The fluid that is evaluated.
     pub fluid: Fluid,
     /// A plan with a pass for every density.
-    plan: Plan,
+    pub(super) plan: Plan,
     /// The ranges of the conservative interactions.
-    ranges: Ranges,
+    pub(super) ranges: Ranges,
     free_energy: FreeEnergy,
     work: Mutex<Work>,
+    shares: Mutex<Option<Shares>>,
 }
 
 /// The search for pairs in wide boxes, and arrays of pairs for reuse.
@@ -99,7 +101,8 @@ impl Evaluator {
         let free_energy = FreeEnergy::new(&fluid, usize::MAX).map_err(|_| TooLarge)?;
         let work = Mutex::new(Work { search: SweepPairs::new(fluid.dimensions), spare: Vec::new() });
         let ranges = Ranges::conservative(&fluid);
-        Ok(Evaluator { plan: Plan::whole(&fluid)?, ranges, free_energy, work, fluid })
+        let shares = Mutex::default();
+        Ok(Evaluator { plan: Plan::whole(&fluid)?, ranges, free_energy, work, shares, fluid })
     }
 
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
@@ -111,8 +114,7 @@ impl Evaluator {
         let faces = walls::faces(&self.fluid.walls, domain, self.fluid.dimensions);
         let (densities, psi) = self.excess(pool, &mut planes, (x, species), &faces);
         pool.each(&mut planes, |plane| plane.find_forces(&self.plan, &psi.slopes));
-        let mut excess = vec![0.0; self.fluid.species.len()];
-        psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
+        let excess = self.excess_of(species, &psi);
         let mut energy = excess.iter().sum::<f64>() + planes.iter().map(PlaneList::energy).sum::<f64>();
         let mut near_walls = Vec::new();
         self.for_each_near_wall(&faces, x, species, &psi, |near, of_wall| {
@@ -207,6 +209,10 @@ impl Evaluator {
         self.work().spare.push(evaluation.planes);
     }
 
+    pub(super) fn shares(&self) -> MutexGuard<'_, Option<Shares>> {
+        self.shares.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn work(&self) -> MutexGuard<'_, Work> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -242,20 +248,38 @@ impl Evaluator {
         (x, species): (&[[f64; 3]], &[i32]),
         faces: &[walls::Face],
     ) -> (Vec<f64>, Psi) {
-        let Evaluator { fluid, plan, free_energy, .. } = self;
+        let Evaluator { fluid, plan, .. } = self;
         let variables = fluid.variables();
         pool.each(planes, |plane| plane.add_densities(plan));
         let mut densities = merge(planes.iter().map(PlaneList::densities), species.len(), variables);
-        for (d, density) in fluid.densities.iter().enumerate().filter(|(_, density)| density.includes_self) {
-            let own = density.kernel.value(0.0);
-            for (k, s) in species.iter().enumerate() {
-                densities[k * variables + d * fluid.species.len() + *s as usize] += own;
-            }
-        }
+        self.add_own(species, &mut densities);
         let column = |d: usize| Some(d * fluid.species.len());
         walls::add_densities(faces, x, |k| species[k], column, variables, &mut densities);
-        let psi = psi(pool, free_energy, fluid, species, &densities);
+        let psi = self.psi_of(pool, species, &densities);
         (densities, psi)
+    }
+
+    /// Adds what each particle is of its own density.
+    pub(super) fn add_own(&self, species: &[i32], densities: &mut [f64]) {
+        let (variables, kinds) = (self.fluid.variables(), self.fluid.species.len());
+        let own = self.fluid.densities.iter().enumerate().filter(|(_, density)| density.includes_self);
+        for (d, own) in own.map(|(d, density)| (d, density.kernel.value(0.0))) {
+            for (k, s) in species.iter().enumerate() {
+                densities[k * variables + d * kinds + *s as usize] += own;
+            }
+        }
+    }
+
+    /// Sum `Σ ψ` over the particles of each species.
+    pub(super) fn excess_of(&self, species: &[i32], psi: &Psi) -> Vec<f64> {
+        let mut excess = vec![0.0; self.fluid.species.len()];
+        psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
+        excess
+    }
+
+    /// ψ of particles at their densities.
+    pub(super) fn psi_of(&self, pool: &Pool, species: &[i32], densities: &[f64]) -> Psi {
+        psi(pool, &self.free_energy, &self.fluid, species, densities)
     }
 }
 

@@ -204,7 +204,7 @@ fn add_to_both(rows: &mut [Row], [i, j]: [usize; 2], [x, y, z]: [f64; 3], [to_i,
 
 /// The product of a derivative of ψ, which may be infinite if no particle is in range, with one of weights, which then is 0.
 #[inline(always)]
-fn times(of_psi: f64, of_weight: f64) -> f64 {
+pub fn times(of_psi: f64, of_weight: f64) -> f64 {
     let product = of_psi * of_weight;
     if of_weight == 0.0 { 0.0 } else { product }
 }

@@ -26,6 +26,7 @@ mod listed;
 mod pairs;
 mod plane_list;
 mod search;
+mod shares;
 mod shells;
 mod single;
 mod special;
@@ -39,6 +40,7 @@ pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
 pub use pairs::BLOCK as PAIR_BLOCK;
 pub use plane_list::PairBlock;
+pub use shares::ParticleSums;
 pub use shells::count_in_shells;
 
 use super::counts::PassCounts;

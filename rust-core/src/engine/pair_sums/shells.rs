@@ -3,6 +3,7 @@
 mod counts;
 mod windows;
 
+use super::in_box::for_each_pair;
 use super::sweep_pairs::is_wide;
 use crate::engine::particles::Particles;
 use crate::engine::sweep::{MARGIN, PairLists, Places, Pool};
@@ -10,12 +11,13 @@ use counts::Counts;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// Pairs in each of `bins` shells of equal thickness up to `range`, which is at most half the height of the box along any period:
+/// Pairs in each of `bins` shells of equal thickness up to `range`:
 /// `bins` numbers for each species `a` of `kinds` and each `b` from `a` on, those of double precision. Particles without a finite
 /// position make no pairs.
 ///
 /// The search of the sweep finds the pairs, and single precision measures them; the few that are so near to the edge of a shell
-/// that rounding may matter are measured once more. Where it does not apply, as at a range of half the box, [`windows`] counts them.
+/// that rounding may matter are measured once more. Where it does not apply, as at a range of half the box, [`windows`] counts them, and
+/// [`for_each_pair`] at longer ranges, where two particles may make several pairs.
 pub fn count_in_shells(
     pool: &Pool,
     x: &[[f64; 3]],
@@ -28,8 +30,13 @@ pub fn count_in_shells(
     let mut counts = Counts::new(kinds, bins, range);
     let is_counted = is_wide(domain, dimensions, range)
         && by_search(&mut counts, InstructionSet::best(), pool, x, species, (domain, dimensions), range);
-    if !is_counted {
+    let is_single = |k: usize| !domain.periodic()[k] || domain.height(k) >= 2.0 * range;
+    if !is_counted && (0..dimensions).all(is_single) {
         windows::count(&mut counts, pool, x, species, (domain, dimensions), range);
+    } else if !is_counted {
+        for_each_pair(x, domain, dimensions, range, |pair| {
+            counts.add([pair.i, pair.j].map(|k| species[k] as usize), pair.r);
+        });
     }
     counts.numbers
 }
@@ -180,6 +187,16 @@ mod tests {
         let x = [[-3e9, 0.0, 0.0], [0.0; 3], [1.34, 0.0, 4.796]];
         let found = count_in_shells(&Pool::new(NonZeroUsize::MIN), &x, &[0; 3], 1, (&domain, 3), 5.0, 1000);
         assert_eq!((found[995], found.iter().sum::<u64>()), (1, 1));
+    }
+
+    /// In a box of edge 2 with a range of 1.5 two particles make a pair by each image in range, and a particle none with its own at 2.
+    #[test]
+    fn images_in_range_make_pairs_of_their_own() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [2.0, 9.0, 9.0], [true; 3]).unwrap();
+        let x = [[0.1, 1.0, 1.0], [0.9, 1.0, 1.0]];
+        let found = count_in_shells(&Pool::new(NonZeroUsize::MIN), &x, &[0, 1], 2, (&domain, 3), 1.5, 3);
+        // At 0.8 and, beyond the face, at 1.2, of particles of two species.
+        assert_eq!(found, [0, 0, 0, 0, 1, 1, 0, 0, 0]);
     }
 
     #[test]

@@ -8,9 +8,11 @@ mod plane_pairs;
 pub use plane_pairs::PlanePairs;
 
 use super::region::region;
+use super::terms::terms;
 use super::workspace::{CellOrder, Input, SharedParticles, SortedParticles};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
+use crate::engine::plan::Plan;
 use crate::engine::surroundings::Around;
 use psidpd_passes::cells::excluded::Excluded;
 use psidpd_passes::cells::sorted::SortedCells;
@@ -19,6 +21,7 @@ use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::distances::{DistanceInputs, ShellCounts, Shells, count_pairs};
+use psidpd_passes::plane::laplacians::{DensitySums, LaplacianBuffers, LaplacianInputs, sum_laplacians};
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
 use psidpd_threads::{Pool, part, take};
 
@@ -43,6 +46,7 @@ pub struct PairLists {
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
+    of_laplacians: Vec<LaplacianBuffers>,
     /// The sorted index of each particle of the host, beyond all for particles that are left out.
     pub place: Vec<u32>,
 }
@@ -165,6 +169,70 @@ impl PairLists {
             }
         });
         Ok(counts.into_iter().map(|(_, counts)| counts).collect())
+    }
+
+    /// Sums of all particles over their pairs, for the Laplacian of the energy: in the order of cells, for each particle and each species of
+    /// the other one for each density of the plan, which has a pass for each and no walls. There are no ghosts, and types are species.
+    ///
+    /// # Errors
+    /// Fails as [`PairLists::find`], and where the box is too long for single precision.
+    pub fn sum_laplacians(
+        &mut self,
+        pool: &Pool,
+        domain: &PeriodicBox,
+        particles: &Particles,
+        plan: &Plan,
+        [range, margin]: [f64; 2],
+    ) -> Result<Vec<DensitySums>, EngineError> {
+        let input =
+            Input { particles: *particles, species_of_type: &plan.species_of_type, ..Input::default() };
+        let (_, is_long) = self.sort(pool, domain, &input, [range, margin])?;
+        if is_long {
+            return Err(FAR_APART);
+        }
+        self.fill(pool, &input, plan.species.len() > 1);
+        let (set, rest, terms) = (self.set, (self.dimensions - 1) as f64, &terms(plan));
+        self.of_laplacians.resize_with(pool.threads(), LaplacianBuffers::default);
+        let PairLists { cells, particles, of_laplacians, .. } = self;
+        let (cells, shared) = (&*cells, particles.share());
+        let cells_of_all = sorted_cells(set, cells, &shared);
+        let inputs = &LaplacianInputs { cells: cells_of_all, packed: shared.packed, terms, rest };
+        let of_each = inputs.width() * terms.species;
+        // Each plane has sums of its own for its particles and for those of the next, so that threads do not matter.
+        let mut planes: Vec<(PlanePairs, Vec<DensitySums>)> = Vec::new();
+        planes.resize_with(cells.grid.planes, Default::default);
+        let (count, threads) = (planes.len(), pool.threads());
+        let mut rest = &mut planes[..];
+        let of_thread = |(t, buffers): (usize, _)| {
+            let numbers = part(count, t, threads);
+            (take(&mut rest, numbers.len()), numbers, buffers)
+        };
+        let mut work: Vec<_> = of_laplacians.iter_mut().enumerate().map(of_thread).collect();
+        pool.each(&mut work, |(planes, numbers, buffers)| {
+            for (number, (plane, sums)) in numbers.clone().zip(planes.iter_mut()) {
+                plane.lie_in(cells, number);
+                sums.resize((plane.own.len() + plane.next.len()) * of_each, DensitySums::default());
+                // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
+                unsafe { sum_laplacians(set, inputs, number, buffers, sums) };
+            }
+        });
+        let mut all = vec![DensitySums::default(); cells.particles() * of_each];
+        let mut rest = &mut all[..];
+        let mut work: Vec<_> = (0..count)
+            .map(|number| {
+                let (plane, own) = &planes[number];
+                let (before, theirs) = &planes[number.checked_sub(1).unwrap_or(count - 1)];
+                let of_own = plane.own.len() * of_each;
+                let of_next =
+                    if before.next == plane.own { &theirs[before.own.len() * of_each..] } else { &[] };
+                (take(&mut rest, of_own), &own[..of_own], of_next)
+            })
+            .collect();
+        pool.each(&mut work, |(to, own, of_next)| {
+            to.copy_from_slice(own);
+            to.iter_mut().zip(of_next.iter()).for_each(|(to, add)| to.add(add));
+        });
+        Ok(all)
     }
 
     /// Sorts particles for a search within `range`, and returns its margin, and whether pairs have to be measured in double precision.

@@ -9,6 +9,7 @@ impl Simulation {
         let State { domain, mass: masses, x, v, species, tag: tags, image: images } = self.state();
         View {
             pool: self.engine().pool(),
+            precision: self.settings().precision,
             step: self.step_number(),
             time,
             kt: self.kt(),

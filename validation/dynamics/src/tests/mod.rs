@@ -15,6 +15,7 @@ mod carried;
 mod crystals;
 mod known;
 mod meters;
+mod particle_sums;
 mod pieces;
 pub mod support;
 

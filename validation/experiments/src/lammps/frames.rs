@@ -1,7 +1,7 @@
 //! Configurations of LAMMPS, shown to observers.
 
 use crate::ExperimentError;
-use psidpd_core::engine::Pool;
+use psidpd_core::engine::{Pool, Precision};
 use psidpd_dynamics::run::State;
 use psidpd_dynamics::scene::Scene;
 use psidpd_formats::dump;
@@ -9,6 +9,7 @@ use psidpd_observe::Observers;
 use psidpd_observe::frame::View;
 use std::num::NonZeroUsize;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Shows the frames of the dump at `path` to observers, which look at positions alone, of particles of one species in the box of
 /// `state`; frames are `every` steps of `dt` apart.
@@ -20,7 +21,7 @@ pub fn show(
     observers: &mut Observers,
 ) -> Result<(), ExperimentError> {
     let missing = || ExperimentError::at(path)("it has no columns of positions");
-    let pool = Pool::new(NonZeroUsize::MIN);
+    let pool = Arc::new(Pool::new(NonZeroUsize::MIN));
     for (k, frame) in dump::read(path)?.iter().enumerate() {
         let x = frame.vectors(["x", "y", "z"]).ok_or_else(missing)?;
         let images = frame.vectors(["ix", "iy", "iz"]).ok_or_else(missing)?;
@@ -29,6 +30,7 @@ pub fn show(
         let (v, species) = (vec![[0.0; 3]; x.len()], vec![0; x.len()]);
         let view = View {
             pool: &pool,
+            precision: Precision::Double,
             step: (k as u64 + 1) * every,
             time: k as f64 * every as f64 * dt,
             kt,

@@ -34,16 +34,17 @@ impl Meter for Energy {
 
     fn sample(&mut self, frame: &Frame) -> bool {
         let (view, fluid) = (frame.view, &frame.evaluator.fluid);
-        let terms = match (fluid.species.len(), fluid.pairs.len()) {
-            // The totals of the step.
-            (1, pairs @ 0..=1) => view.potential[..1 + pairs].to_vec(),
-            _ => {
-                let evaluation = frame.evaluation();
-                [&evaluation.excess[..], &evaluation.pair_energies(view.pool, fluid)].concat()
-            }
+        let excess = if fluid.species.len() > 1 { frame.excess() } else { &view.potential[..1] };
+        // One potential has the total of the step.
+        let pairs = match fluid.pairs.len() {
+            terms @ 0..=1 => view.potential[1..1 + terms].to_vec(),
+            _ => frame.evaluation().pair_energies(view.pool, fluid),
         };
         let count = view.x.len() as f64;
-        let all = std::iter::once(view.kinetic_energy).chain(terms).map(|energy| energy / count);
+        let all = std::iter::once(view.kinetic_energy)
+            .chain(excess.iter().copied())
+            .chain(pairs)
+            .map(|energy| energy / count);
         self.series.push(&all.collect::<Vec<f64>>())
     }
 

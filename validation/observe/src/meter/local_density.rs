@@ -1,5 +1,6 @@
 use super::*;
-use psidpd_core::model::kernel::Kernel;
+use psidpd_core::engine::pair_sums::count_in_shells;
+use psidpd_core::model::WeightedDensity;
 
 /// The number of shells in the integral `[w g]` over the pair distribution.
 const SHELLS: usize = 200;
@@ -15,28 +16,36 @@ pub struct LocalDensity {
     range: Option<f64>,
     /// The highest density of the histogram, as given or as found at the first sample.
     found: Option<f64>,
-    /// The integral `[w]` over each shell of the kernel's range.
-    shells: Vec<f64>,
+    /// The means of `w` and `−r w′` over each shell of the kernel's range.
+    shells: Vec<[f64; 2]>,
     /// For each species the fraction of its particles in each bin and beyond the last; then for each (α, β) ⟨n_β⟩ at α,
     /// ⟨n⟩/ρ, [w g], −[r w′ g]/d.
     series: Series,
 }
 
-/// ∫ w over each of `SHELLS` shells of a kernel's range, by Simpson's rule.
-fn shell_integrals(kernel: &Kernel, dimensions: usize) -> Vec<f64> {
-    let h = kernel.range() / SHELLS as f64;
+/// The longer one of the ranges of the weight function and of its force law.
+fn longest(density: &WeightedDensity) -> f64 {
+    density.kernel.range().max(density.force_kernel.range())
+}
+
+/// The means of w and −r w′ over each of `SHELLS` shells up to the range, by Simpson's rule.
+fn means_in_shells(density: &WeightedDensity, dimensions: usize) -> Vec<[f64; 2]> {
+    let range = longest(density);
+    let h = range / SHELLS as f64;
     let f = |r: f64| {
         let surface = match dimensions {
             2 => std::f64::consts::TAU * r,
             _ => 2.0 * std::f64::consts::TAU * r * r,
         };
         // The range is approached from below, because the slope of the linear kernel jumps there.
-        surface * kernel.value(r.min(kernel.range() * (1.0 - 1e-15)))
+        let r = r.min(range * (1.0 - 1e-15));
+        [density.kernel.value(r), -r * density.force_kernel.slope(r)].map(|of| surface * of)
     };
     (0..SHELLS)
         .map(|k| {
             let a = k as f64 * h;
-            h / 6.0 * (f(a) + 4.0 * f(a + 0.5 * h) + f(a + h))
+            let per_volume = h / 6.0 / super::rdf::shell_volume(dimensions, a, a + h);
+            std::array::from_fn(|c| per_volume * (f(a)[c] + 4.0 * f(a + 0.5 * h)[c] + f(a + h)[c]))
         })
         .collect()
 }
@@ -48,7 +57,7 @@ impl Meter for LocalDensity {
         about: "P(n) of n = Σ_j w(r_ij), of all species, at the particles of each species: `p_SPECIES` (`p` with one), \
                 normalised to 1. `local_density_means`: for species B at A, `mean_A_B` = ⟨n_B⟩; `relative_A_B` = \
                 ⟨n_B⟩/ρ_B with ρ_B the mean density of the box, N_B − 1 of V for A = B; `wg_A_B` = [w g] = ∫ w g \
-                over the sampled g(r) in 200 shells; `rwg_A_B` = −[r w′ g]/d with the force kernel. Without self term \
+                over the sampled g(r) in 200 shells; `rwg_A_B` = −[r w′ g]/d with the force kernel, over the same shells. Without self term \
                 ⟨n⟩/ρ = [w g] (Trofimov et al., J. Chem. Phys. 117, 9383 (2002)), the two differ by the width of the \
                 shells; −[r w′ g]/d multiplies ψ′ in the virial, and all are 1 if g = 1.",
         keys: keys! {
@@ -85,18 +94,16 @@ impl Meter for LocalDensity {
             bins,
             range: options.positive("range")?,
             found: None,
-            shells: shell_integrals(&fluid.densities[density].kernel, fluid.dimensions),
+            shells: means_in_shells(&fluid.densities[density], fluid.dimensions),
             series: Series::new(kinds * (bins + 1) + 4 * kinds * kinds),
         })
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
-        let (evaluation, species) = (frame.evaluation(), view.species);
-        let fluid = &frame.evaluator.fluid;
-        let kinds = self.species.len();
-        let density = &fluid.densities[self.density];
-        let at = |i: usize, beta: usize| evaluation.densities_of(i)[self.density * kinds + beta];
+        let (species, fluid) = (view.species, &frame.evaluator.fluid);
+        let (kinds, densities) = (self.species.len(), frame.densities());
+        let at = |i: usize, beta: usize| densities[i * fluid.variables() + self.density * kinds + beta];
         let totals: Vec<f64> =
             (0..species.len()).map(|i| (0..kinds).map(|b| at(i, b)).sum::<f64>()).collect();
         let largest = totals.iter().copied().fold(0.0, f64::max);
@@ -118,32 +125,18 @@ impl Meter for LocalDensity {
                 rest[4 * (*s as usize * kinds + b)] += at(i, b) / numbers[*s as usize];
             }
         }
-        // The pairs in a shell divided by those at g = 1, times the integral of w over the shell; and r w′ summed over pairs.
-        let width = density.kernel.range() / SHELLS as f64;
-        let per_length = 1.0 / width;
-        let volume_of =
-            |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
-        let means: Vec<f64> = self.shells.iter().enumerate().map(|(k, w)| w / volume_of(k)).collect();
-        let mut parts: Vec<(usize, Vec<f64>)> =
-            (0..evaluation.parts().count()).map(|part| (part, Vec::new())).collect();
-        view.pool.each(&mut parts, |(part, sums)| {
-            sums.resize(2 * kinds * kinds, 0.0);
-            for block in evaluation.blocks_of(*part) {
-                for ([i, j], r) in block.particles().zip(block.r) {
-                    let [a, b] = [i, j].map(|k| species[k] as usize);
-                    let shell = means.get((r * per_length) as usize).copied().unwrap_or(0.0);
-                    let slope = r * density.force_kernel.slope(*r);
-                    for k in [a * kinds + b, b * kinds + a] {
-                        sums[2 * k] += shell;
-                        sums[2 * k + 1] -= slope;
-                    }
-                }
+        let (range, space) = (longest(&fluid.densities[self.density]), (view.domain, view.dimensions));
+        let numbers_of_pairs = count_in_shells(view.pool, view.x, species, kinds, space, range, SHELLS);
+        let kinds_of_pairs = (0..kinds).flat_map(|a| (a..kinds).map(move |b| (a, b)));
+        for ((a, b), counts) in kinds_of_pairs.zip(numbers_of_pairs.chunks_exact(SHELLS)) {
+            let mut sums = [0.0; 2];
+            for (count, means) in counts.iter().zip(&self.shells) {
+                (0..2).for_each(|c| sums[c] += *count as f64 * means[c]);
             }
-        });
-        for (_, sums) in &parts {
-            for (mean, sums) in rest.chunks_exact_mut(4).zip(sums.chunks_exact(2)) {
-                mean[2] += sums[0];
-                mean[3] += sums[1] / self.dimensions as f64;
+            // Two particles of one species make a pair with either of them first.
+            for k in [a * kinds + b, b * kinds + a] {
+                rest[4 * k + 2] += sums[0];
+                rest[4 * k + 3] += sums[1] / self.dimensions as f64;
             }
         }
         for a in 0..kinds {
@@ -207,14 +200,31 @@ impl Meter for LocalDensity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use psidpd_core::model::kernel::KernelKind;
+    use psidpd_core::model::kernel::{Kernel, KernelKind};
 
+    /// The integrals `[w]` and `−[r w′]` over all shells are 1 and d.
     #[test]
     fn shells_add_up_to_the_norm_of_the_kernel() {
         for &kind in KernelKind::ALL {
             for dimensions in [2, 3] {
-                let sum: f64 = shell_integrals(&Kernel::new(kind, 0.75, dimensions), dimensions).iter().sum();
-                assert!((sum - 1.0).abs() < 1e-8, "{} {dimensions}: {sum}", kind.name());
+                let kernel = Kernel::new(kind, 0.75, dimensions);
+                let (name, correction) = ("n".into(), Vec::new());
+                let density = WeightedDensity {
+                    name,
+                    kernel,
+                    force_kernel: kernel,
+                    includes_self: false,
+                    correction,
+                    bounds: None,
+                };
+                let means = means_in_shells(&density, dimensions);
+                let h = 0.75 / SHELLS as f64;
+                let volume =
+                    |k: usize| crate::meter::rdf::shell_volume(dimensions, k as f64 * h, (k + 1) as f64 * h);
+                let sum = |c: usize| (0..SHELLS).map(|k| volume(k) * means[k][c]).sum::<f64>();
+                let [norm, virial] = [sum(0), sum(1)];
+                assert!((norm - 1.0).abs() < 1e-8, "{} {dimensions}: {norm}", kind.name());
+                assert!((virial - dimensions as f64).abs() < 1e-7, "{} {dimensions}: {virial}", kind.name());
             }
         }
     }

@@ -1,0 +1,327 @@
+//! What each particle adds to the Laplacian of the energy, with the forces, by the loops of the sweep.
+
+use super::evaluation::Evaluator;
+use super::free_energy::Psi;
+use super::laplacians::times;
+use crate::engine::facade::Engine;
+use crate::engine::particles::Particles;
+use crate::engine::plan::Plan;
+use crate::engine::request::Request;
+use crate::engine::sweep::{MARGIN, PairLists, Pool};
+use crate::model::Fluid;
+use crate::model::expression::TooLarge;
+use crate::model::pair::PairPotential;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::laplacians::{DensitySums, MOST_DENSITIES};
+use psidpd_passes::settings::{Precision, Settings};
+use psidpd_passes::tally::Want;
+use std::sync::Arc;
+
+/// The forces of a fluid, and sums over pairs for the Laplacian.
+#[derive(Debug)]
+pub struct Shares {
+    engine: Engine,
+    lists: PairLists,
+    tags: Vec<i32>,
+}
+
+/// Sums over the pairs of each particle, with pairs in single precision.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParticleSums {
+    /// The force on each particle.
+    pub forces: Vec<[f64; 3]>,
+    /// What each particle adds to the Laplacian `Σ_k ∇_k² U`.
+    pub shares: Vec<f64>,
+    /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
+    pub densities: Vec<f64>,
+    /// Sum `Σ ψ` over the particles of each species.
+    pub excess: Vec<f64>,
+}
+
+impl Shares {
+    fn new(set: InstructionSet, fluid: &Fluid, pool: &Arc<Pool>) -> Result<Shares, TooLarge> {
+        let (precision, instructions) = (Precision::Mixed, set.instructions());
+        let settings = Settings { precision, instructions, ..Settings::default() };
+        Ok(Shares {
+            engine: Engine::of_plan(Plan::new(fluid)?, settings, Arc::clone(pool)),
+            lists: PairLists::new(set, fluid.dimensions),
+            tags: Vec::new(),
+        })
+    }
+}
+
+/// Whether [`Evaluator::particle_sums`] can do a fluid.
+fn has_loops(fluid: &Fluid) -> bool {
+    let is_closed = |form: &PairPotential| matches!(form, PairPotential::Soft(_) | PairPotential::Spline(_));
+    fluid.walls.is_empty()
+        && fluid.is_conservative()
+        && fluid.densities.len() <= MOST_DENSITIES
+        && fluid.pairs.iter().all(|term| is_closed(&term.potential))
+}
+
+impl Evaluator {
+    /// Sums over the pairs of each particle by the loops of the sweep. The shares `s_i` of particles in `Σ_k ∇_k² U`, which is their sum, are
+    ///
+    /// ```text
+    /// s_i = Σ_v [2 ψ_i,v Σ_j ∇²w + Σ_u ψ_i,vu (g_v·g_u + Σ_j w_v′ w_u′)] + Σ_j ∇²φ,   g_v = ∇_i n_iv
+    /// ```
+    ///
+    /// [`Evaluation::laplacians`](super::Evaluation::laplacians) has the terms by the particle that moves, a share those of the energy of
+    /// one particle. `None` where the loops do not apply: with walls, potentials that are formulas or tables, more than two densities or
+    /// ranges that differ by species, and in boxes less than twice as wide as the range.
+    pub fn particle_sums(
+        &self,
+        pool: &Arc<Pool>,
+        x: &[[f64; 3]],
+        species: &[i32],
+        domain: &PeriodicBox,
+    ) -> Option<ParticleSums> {
+        let fluid = &self.fluid;
+        if !has_loops(fluid) || self.ranges.longest() != self.ranges.shortest() {
+            return None;
+        }
+        let mut kept = self.shares();
+        if kept.as_ref().is_none_or(|shares| !Arc::ptr_eq(shares.engine.pool(), pool)) {
+            *kept = Some(Shares::new(InstructionSet::best(), fluid, pool).ok()?);
+        }
+        let Shares { engine, lists, tags } = kept.as_mut()?;
+        if tags.len() != x.len() {
+            *tags = (1..=i32::try_from(x.len()).ok()?).collect();
+        }
+        let particles = Particles { owned: x.len(), x, tag: tags, kind: species };
+        let range = [self.ranges.longest(), MARGIN];
+        let sums = lists.sum_laplacians(pool, domain, &particles, &self.plan, range).ok()?;
+        let mut forces = vec![[0.0; 3]; x.len()];
+        let request = Request { particles, v: &[], step: None, want: Want::FORCES };
+        engine.forces(domain, &request, &mut forces, false).ok()?;
+        let (sums, place) = (Sums { sums: &sums, fluid }, &lists.place);
+        let mut densities = sums.densities(pool, place);
+        self.add_own(species, &mut densities);
+        let psi = self.psi_of(pool, species, &densities);
+        let excess = self.excess_of(species, &psi);
+        Some(ParticleSums { forces, shares: sums.shares(pool, place, &psi), densities, excess })
+    }
+}
+
+/// The sums of particles in the order of cells.
+struct Sums<'a> {
+    sums: &'a [DensitySums],
+    fluid: &'a Fluid,
+}
+
+impl Sums<'_> {
+    /// Those of a particle with its neighbours of a species, in all densities.
+    fn of(&self, place: usize, species: usize) -> &[DensitySums] {
+        let width = self.fluid.densities.len().max(1);
+        &self.sums[(place * self.fluid.species.len() + species) * width..][..width]
+    }
+
+    /// Those of particle `k` are at `place[k]`.
+    fn densities(&self, pool: &Pool, place: &[u32]) -> Vec<f64> {
+        let (variables, kinds) = (self.fluid.variables(), self.fluid.species.len());
+        let mut densities = vec![0.0; place.len() * variables];
+        pool.parts(&mut densities, |first, densities| {
+            for (at, n) in (first..).zip(densities) {
+                let (k, v) = (at / variables, at % variables);
+                *n = self.of(place[k] as usize, v % kinds)[v / kinds].first[3];
+            }
+        });
+        densities
+    }
+
+    fn shares(&self, pool: &Pool, place: &[u32], psi: &Psi) -> Vec<f64> {
+        let (variables, kinds) = (self.fluid.variables(), self.fluid.species.len());
+        let share = |k: usize| {
+            let of = |v: usize| &self.of(place[k] as usize, v % kinds)[v / kinds];
+            let mut share = 0.0;
+            for v in 0..variables {
+                share += times(psi.slopes[k * variables + v], 2.0 * of(v).second[0]);
+                for u in 0..variables {
+                    let along = (0..3).map(|c| of(v).first[c] * of(u).first[c]).sum::<f64>();
+                    let of_same = match (v % kinds == u % kinds, v / kinds == u / kinds) {
+                        (true, true) => of(v).second[1],
+                        (true, false) => of(v % kinds).second[2],
+                        (false, _) => 0.0,
+                    };
+                    share += times(psi.second[(k * variables + v) * variables + u], along + of_same);
+                }
+            }
+            share + (0..kinds).map(|b| self.of(place[k] as usize, b)[0].second[3]).sum::<f64>()
+        };
+        let mut shares = vec![0.0; place.len()];
+        pool.parts(&mut shares, |first, shares| {
+            (first..).zip(shares).for_each(|(k, to)| *to = share(k));
+        });
+        shares
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use nalgebra::Matrix3;
+    use psidpd_passes::noise::threefry2x32;
+    use psidpd_passes::settings::Instructions;
+    use std::num::NonZeroUsize;
+
+    /// Two densities of two species, one with a self term, and potentials of all forms with loops.
+    const BOTH: &str = r#"
+title = "both"
+species = ["A", "B"]
+[density.n]
+kernel = "wendland-c2"
+range = 1.0
+bounds = [0.2, 9.0]
+correction = [0.1, 1.1, 0.01]
+[density.m]
+kernel = "cubic-spline"
+range = 0.8
+self = true
+[excess_free_energy]
+A = "kT*n_A*n_B + 0.3*m_A^2*n_A + 0.2*m^3"
+B = "n^2*m_A + 0.1*m_B^3"
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = -20.0
+range = 1.0
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = 35.0
+range = 0.6
+[[pair]]
+between = ["A", "B"]
+form = "spline"
+strength = 18.75
+A = 2
+B = 1
+range_A = 0.8
+range_B = 1.0
+"#;
+
+    const TWO_DENSITIES: &str =
+        include_str!("../../../../validation/models/warren2003-set6-two-densities.toml");
+
+    const MODELS: [&str; 12] = [
+        BOTH,
+        TWO_DENSITIES,
+        include_str!("../../../../validation/models/standard-dpd.toml"),
+        include_str!("../../../../validation/models/warren2003-set6.toml"),
+        include_str!("../../../../validation/models/huggins.toml"),
+        include_str!("../../../../validation/models/binary-2d.toml"),
+        include_str!("../../../../validation/models/van-der-waals-2d.toml"),
+        include_str!("../../../../validation/models/spline-attractive.toml"),
+        include_str!("../../../../validation/models/spline-eos.toml"),
+        include_str!("../../../../validation/models/power-law-k3.toml"),
+        include_str!("../../../../validation/models/lennard-jones-corrected.toml"),
+        include_str!("../../../../validation/models/groot-warren-linear.toml"),
+    ];
+
+    fn fluid(model: &str) -> Fluid {
+        Model::parse("m.toml", model).unwrap().at(1.0).unwrap()
+    }
+
+    fn pool(threads: usize) -> Arc<Pool> {
+        Arc::new(Pool::new(NonZeroUsize::new(threads).unwrap()))
+    }
+
+    /// Particles at random in a box, which may be skew and open, at a density of four.
+    fn crowd(fluid: &Fluid, skew: bool, periodic: bool) -> (Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
+        let range = fluid.conservative_range();
+        let (flat, tilt) = (fluid.dimensions == 2, if skew { range } else { 0.0 });
+        let [a, b, c] = [5.3 * range, 3.1 * range, if flat { 1.0 } else { 2.6 * range }];
+        let edges = Matrix3::new(a, tilt, 0.0, 0.0, b, 0.0, 0.0, 0.0, c);
+        let periodic = [true, periodic, true];
+        let domain = PeriodicBox::new([-1.0, 0.5, if flat { -0.5 } else { 2.0 }], edges, periodic).unwrap();
+        let uniform = |k: u32| f64::from(threefry2x32::<20>([k, 17], [5, 9])[0]) / 4_294_967_296.0;
+        let count = (4.0 * domain.volume(fluid.dimensions) / range.powi(fluid.dimensions as i32)) as u32;
+        let place = |k: u32| {
+            let mut x = domain.point([0, 1, 2].map(|c| uniform(3 * k + c)));
+            x[2] = if flat { 0.0 } else { x[2] };
+            x
+        };
+        let species = (0..count as i32).map(|k| k % 7 % fluid.species.len() as i32).collect();
+        ((0..count).map(place).collect(), species, domain)
+    }
+
+    /// Forces are those of the evaluation in double precision, and shares sum up to the Laplacian, on each instruction set; any number of
+    /// threads finds the same bits.
+    #[test]
+    fn shares_sum_up_to_the_laplacian() {
+        for (model, [skew, periodic]) in MODELS
+            .into_iter()
+            .flat_map(|model| [[false, true], [true, true], [false, false]].map(|shape| (model, shape)))
+        {
+            let evaluator = Evaluator::new(fluid(model)).unwrap();
+            let fluid = &evaluator.fluid;
+            let (x, species, domain) = crowd(fluid, skew, periodic);
+            let (alone, three) = (pool(1), pool(3));
+            let found = evaluator.particle_sums(&three, &x, &species, &domain);
+            assert!(found.is_some(), "{}", fluid.title);
+            let evaluation = evaluator.evaluate(&alone, &x, &species, &domain);
+            let (expected, laplacians) = evaluation.forces_and_laplacians(&alone, fluid);
+            let scale = expected.iter().flatten().map(|f| f * f).sum::<f64>() / x.len() as f64;
+            let sizes = laplacians.iter().map(|l| l.abs()).sum::<f64>();
+            for (_, set) in Instructions::ALL {
+                let Some(set) = InstructionSet::new(set) else { continue };
+                for pool in [&alone, &three] {
+                    *evaluator.shares() = Some(Shares::new(set, fluid, pool).unwrap());
+                    let sums = evaluator.particle_sums(pool, &x, &species, &domain).unwrap();
+                    let ParticleSums { forces, shares, densities, excess } = &sums;
+                    for (f, g) in forces.as_flattened().iter().zip(expected.as_flattened()) {
+                        assert!((f - g).abs() < 1e-5 * scale.sqrt(), "{} {f} {g}", fluid.title);
+                    }
+                    let [sum, truth] = [shares, &laplacians].map(|of| of.iter().sum::<f64>());
+                    assert!((sum - truth).abs() < 2e-7 * sizes, "{} {sum} {truth}", fluid.title);
+                    let of_particles = [(densities, &evaluation.densities), (excess, &evaluation.excess)];
+                    for (n, truth) in of_particles.iter().flat_map(|(n, truth)| n.iter().zip(*truth)) {
+                        assert!(
+                            (n - truth).abs() < 1e-6 * truth.abs().max(1.0),
+                            "{} {n} {truth}",
+                            fluid.title
+                        );
+                    }
+                    if set.instructions() == InstructionSet::best().instructions() {
+                        assert_eq!(Some(&sums), found.as_ref(), "{}", fluid.title);
+                    }
+                }
+            }
+        }
+    }
+
+    /// With ranges that differ by species, three densities, a potential that is a formula and in a narrow box.
+    #[test]
+    fn what_has_no_loops_is_said() {
+        let with = |text: &str| format!("title = \"m\"\nspecies = [\"A\", \"B\"]\n{text}");
+        let pair = |form: &str, a: &str, b: &str, range: f64| {
+            let form = match form {
+                "soft" => "form = \"soft\"\nstrength = 25.0".to_owned(),
+                _ => "form = \"expression\"\nphi = \"(1 - r)^2\"".to_owned(),
+            };
+            format!("[[pair]]\nbetween = [\"{a}\", \"{b}\"]\n{form}\nrange = {range:?}\n")
+        };
+        let all = |form: &str, range: f64| {
+            with(&(pair(form, "A", "A", 1.0) + &pair("soft", "A", "B", 1.0) + &pair("soft", "B", "B", range)))
+        };
+        let density = |name: &str| format!("[density.{name}]\nkernel = \"lucy\"\nrange = 1.0\n");
+        let three = with(&(density("l") + &density("m") + &density("n")))
+            + "[excess_free_energy]\nA = \"l^2 + m^2 + n^2\"\nB = \"l^2 + m^2 + n^2\"\n";
+        let wide = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
+        let narrow = PeriodicBox::orthogonal([0.0; 3], [5.0, 5.0, 1.9], [true; 3]).unwrap();
+        let x = [[1.0; 3], [1.5, 1.0, 1.0]];
+        for (model, domain, expected) in [
+            (all("soft", 1.0), &wide, true),
+            (all("soft", 1.0), &narrow, false),
+            (all("soft", 1.2), &wide, false),
+            (all("expression", 1.0), &wide, false),
+            (three, &wide, false),
+        ] {
+            let evaluator = Evaluator::new(fluid(&model)).unwrap();
+            let found = evaluator.particle_sums(&pool(1), &x, &[0, 1], domain);
+            assert_eq!(found.is_some(), expected, "{model}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Observables of runs in single precision, whose pairs the loops of the sweep sum, and in double precision.
+
+use super::support::{self, SET6};
+use crate::run::Simulation;
+use crate::scene::Scene;
+use psidpd_core::engine::Precision;
+use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_observe::Observation;
+use psidpd_observe::configurational::{sums, sums_of_blocks};
+use psidpd_observe::frame::{Frame, View};
+
+const MIXTURE: &str = include_str!("../../../models/huggins.toml");
+const PLANE: &str = include_str!("../../../models/binary-2d.toml");
+const TWO_DENSITIES: &str = include_str!("../../../models/warren2003-set6-two-densities.toml");
+
+fn crowd(model: &str, space: &str) -> (Scene, Simulation, Evaluator) {
+    let text = format!(
+        "model = \"m.toml\"\nkT = 1.0\nseed = 5\n{space}\n[initial]\nkind = \"random\"\ndensity = 5.0\n\
+         [[stage]]\nname = \"a\"\nsteps = 1\ndt = 0.01\nthermostat = false\n[observe]\nlocal_density = true\nenergy = true\n\
+         temperature = true\n"
+    );
+    let scene = support::scene(model, &text).unwrap();
+    let simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    let evaluator = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
+    (scene, simulation, evaluator)
+}
+
+/// Temperatures, in blocks of space too, local densities and energies of species agree. There are no sums of particles in double precision,
+/// beside an evaluation, with walls and in narrow boxes; weights need the forces of the evaluation.
+#[test]
+fn sums_of_particles_are_those_of_an_evaluation() {
+    for (model, space, has_sums) in [
+        (SET6, "box = [6.0, 7.0, 5.0]", true),
+        (MIXTURE, "box = [6.0, 7.0, 5.0]", true),
+        (PLANE, "box = [16.0, 18.0]", true),
+        (TWO_DENSITIES, "box = [6.0, 7.0, 5.0]", true),
+        (
+            SET6,
+            "[box]\nlengths = [6.0, 7.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]",
+            true,
+        ),
+        (SET6, "box = [9.0, 7.0, 1.9]", false),
+    ] {
+        let (scene, simulation, evaluator) = crowd(model, space);
+        let [mixed, double] =
+            [Precision::Mixed, Precision::Double].map(|precision| View { precision, ..simulation.view(0.0) });
+        let frame = |view| Frame::new(view, &evaluator);
+        let (quick, exact) = (frame(mixed), frame(double));
+        assert!(exact.sums().is_none() && quick.sums().is_some() == has_sums, "{space}");
+        let close = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-5 * scale, "{space} {a} {b}");
+        if has_sums {
+            sums(&quick).into_iter().zip(sums(&exact)).for_each(|(a, b)| close(a, b, b.abs()));
+            let (blocks, sums) = (sums_of_blocks(&quick), sums(&quick));
+            assert_eq!(blocks.len(), sums_of_blocks(&exact).len(), "{space}");
+            let sum = |c: usize| blocks.iter().map(|block| block[c]).sum::<f64>();
+            (0..2).for_each(|c| close(sum(c), sums[c], sums[c].abs()));
+        }
+        let found = |frame: &Frame| -> Vec<Observation> {
+            let mut meters: Vec<_> = scene.observe.requests.iter().map(|r| r.meter.clone()).collect();
+            assert!(meters.iter_mut().all(|meter| meter.sample(frame)));
+            meters.iter().flat_map(|meter| meter.finish()).filter(|o| o.name != "local_density").collect()
+        };
+        let mut count = 0;
+        for (a, b) in found(&quick).iter().zip(&found(&exact)) {
+            for (a, b) in a.columns.iter().zip(&b.columns) {
+                let values = a.values.iter().zip(&b.values);
+                values.for_each(|(a, b)| close(*a, *b, b.abs().max(1.0)));
+                count += a.values.len();
+            }
+        }
+        assert!(count >= 8, "{space}: {count}");
+        quick.evaluation();
+        assert!(quick.sums().is_none());
+    }
+}
