@@ -23,7 +23,7 @@ pub struct Evaluator {
     /// The fluid that is evaluated.
     pub fluid: Fluid,
     /// A plan with a pass for every density.
-    plan: Plan,
+    pub(super) plan: Plan,
     /// The ranges of the conservative interactions.
     ranges: Ranges,
     free_energy: FreeEnergy,
