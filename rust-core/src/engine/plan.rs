@@ -69,6 +69,8 @@ pub struct ThermostatPlan {
     pub range: Vec<f64>,
     pub exponent: Vec<f64>,
     pub longest: f64,
+    /// Whether conservative interactions reach as far for any two species.
+    pub is_within_forces: bool,
 }
 
 /// The full pair cache is faster if a density's range exceeds this fraction of the cutoff; otherwise lists are short.
@@ -243,6 +245,11 @@ impl Plan {
         self.thermostat.as_ref().map(|t| t.longest)
     }
 
+    /// Whether pairs with drag are among those with conservative interactions.
+    pub fn drag_is_within_forces(&self) -> bool {
+        self.thermostat.as_ref().is_none_or(|t| t.is_within_forces)
+    }
+
     /// Whether ghosts need velocities.
     pub fn needs_velocities(&self) -> bool {
         self.thermostat.is_some()
@@ -376,7 +383,10 @@ impl ThermostatPlan {
             return None;
         }
         let range = entry(|t| if t.gamma > 0.0 { t.range } else { 0.0 }, 0.0);
+        let count = fluid.species.len();
+        let reach = |k: usize| fluid.conservative_range_between(k / count, k % count);
         Some(ThermostatPlan {
+            is_within_forces: range.iter().enumerate().all(|(k, range)| *range <= reach(k)),
             sigma: gamma.iter().map(|g| (2.0 * g * fluid.kt).sqrt()).collect(),
             longest: range.iter().copied().fold(0.0, f64::max),
             exponent: entry(|t| t.exponent, 1.0),

@@ -161,6 +161,7 @@ impl<'a> Frame<'a> {
                 evaluation: earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation),
                 x: acted.at.as_ref().map_or(self.view.x, |at| &at.x),
                 displacements: earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements),
+                drag: acted.dragged.as_deref().map(|v| (self.evaluator, v)),
             };
             let of_pairs = forces.evaluation.parts().enumerate();
             parts.extend(of_pairs.map(|(part, count)| (Part::Forces(forces, part), Carrier::Pair, count)));
@@ -274,6 +275,8 @@ struct Forces<'a> {
     evaluation: &'a Evaluation,
     x: &'a [[f64; 3]],
     displacements: &'a [[f64; 3]],
+    /// The velocities at which drag acts besides.
+    drag: Option<(&'a Evaluator, &'a [[f64; 3]])>,
 }
 
 impl Part<'_> {
@@ -291,14 +294,17 @@ impl Part<'_> {
                     visit(lines);
                 }
             }
-            Part::Forces(Forces { share, evaluation, x, displacements }, part) => {
+            Part::Forces(Forces { share, evaluation, x, displacements, drag }, part) => {
+                let with_drag = drag.map(|(evaluator, v)| evaluator.strengths_with_drag(evaluation, part, v));
+                let mut with_drag = with_drag.as_ref().map(|strengths| strengths.chunks(BLOCK));
                 for block in evaluation.blocks_of(part) {
-                    let pull = Pull { d: block.d, strengths: block.strengths, share };
+                    let strengths = with_drag.as_mut().and_then(Iterator::next).unwrap_or(block.strengths);
+                    let pull = Pull { d: block.d, strengths, share };
                     lines.join(block.particles(), (x, displacements), pull);
                     visit(lines);
                 }
             }
-            Part::Walls(Forces { share, evaluation, x, displacements }) => {
+            Part::Walls(Forces { share, evaluation, x, displacements, .. }) => {
                 let all = evaluation.near_walls.iter().map(|near| {
                     let mut d = displacements.get(near.particle).map_or([0.0; 3], |by| by.map(|by| -by));
                     d.iter_mut().zip(near.line()).for_each(|(d, line)| *d += line);

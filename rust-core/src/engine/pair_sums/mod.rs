@@ -17,6 +17,7 @@
 
 mod closed_forms;
 mod densities;
+mod drag;
 mod evaluation;
 mod forces;
 mod free_energy;

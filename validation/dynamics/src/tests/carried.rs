@@ -17,13 +17,13 @@ use psidpd_observe::{Observers, Recorded};
 const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
     [excess_free_energy]\nA = \"1.5*n^2\"\nB = \"0.5*n^2 + 0.2*n^3\"\n";
 
-/// The pair force and drag between each two of the species.
-fn mixture(dimensions: usize, gamma: f64) -> String {
+/// The pair force, of range 1, and drag between each two of the species.
+fn mixture(dimensions: usize, gamma: f64, reach: f64) -> String {
     let mut text = PAIR.replace("species", &format!("dimensions = {dimensions}\nspecies"));
     for [a, b] in [["A", "A"], ["A", "B"], ["B", "B"]] {
         text += &format!(
             "[[pair]]\nbetween = [\"{a}\", \"{b}\"]\nform = \"soft\"\nstrength = -8.0\nrange = 1.0\n\
-             [[thermostat]]\nbetween = [\"{a}\", \"{b}\"]\ngamma = {gamma}\nrange = 1.0\n"
+             [[thermostat]]\nbetween = [\"{a}\", \"{b}\"]\ngamma = {gamma}\nrange = {reach}\n"
         );
     }
     text
@@ -41,10 +41,10 @@ fn steps(name: &str, mut integrator: Integrator) -> String {
     text
 }
 
-/// A folder with the model, and a liquid of 150 particles as a data file.
-fn folder(dimensions: usize, domain: PeriodicBox) -> tempfile::TempDir {
+/// A folder with the model, whose drag has the range `reach`, and a liquid of 150 particles as a data file.
+fn folder(dimensions: usize, domain: PeriodicBox, reach: f64) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), mixture(dimensions, 6.0)).unwrap();
+    std::fs::write(folder.path().join("m.toml"), mixture(dimensions, 6.0, reach)).unwrap();
     // Fractional parts of multiples of irrational numbers give points without a pattern.
     let irrational = [2f64.sqrt(), 3f64.sqrt(), 5f64.sqrt()];
     let part = |k: usize, c: usize| if c < dimensions { (k as f64 * irrational[c]).fract() } else { 0.0 };
@@ -75,7 +75,8 @@ fn slices_of_stress_add_up_to_the_momentum_flux() {
         (2, straight([7.0, 8.0, 1.0], [true, false, true]), "[\"periodic\", \"reflecting\"]"),
     ];
     for (dimensions, domain, boundary) in boxes {
-        let folder = folder(dimensions, domain.clone());
+        // Drag that reaches farther than the forces has lines of its own.
+        let folder = folder(dimensions, domain.clone(), if boundary.is_empty() { 1.0 } else { 1.2 });
         let boundary =
             if boundary.is_empty() { String::new() } else { format!("[box]\nboundary = {boundary}\n") };
         for (name, integrator) in Integrator::ALL {
@@ -120,7 +121,7 @@ fn slices_of_stress_add_up_to_the_momentum_flux() {
 #[test]
 fn recorded_sums_are_those_of_lines() {
     let domain = PeriodicBox::orthogonal([-1.0, 0.5, 2.0], [3.5, 4.0, 4.5], [true, true, false]).unwrap();
-    let folder = folder(3, domain);
+    let folder = folder(3, domain, 1.2);
     for (name, integrator) in Integrator::ALL {
         let text = format!(
             "model = \"m.toml\"\nkT = 0.7\nseed = 3\nprecision = \"double\"\n{}dt = 0.04\nsteps = 3\n[box]\n\

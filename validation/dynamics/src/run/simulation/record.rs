@@ -153,9 +153,22 @@ impl Simulation {
         let State { x, species, .. } = self.particles.now();
         let place = || Place { x: x.clone(), species: species.clone(), displaced };
         let on_walls = self.forces_of_fluid_on_walls();
-        let acted = Acted { share: 1.0, virial, on_walls, at: self.records_lines().then(place) };
+        let at = self.records_lines().then(place);
+        let acted = Acted { share: 1.0, virial, on_walls, at, dragged: None };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);
+        }
+    }
+
+    /// Records the drag, at the present velocities, in the forces that were recorded last.
+    pub(super) fn record_drag_in_forces(&mut self) {
+        let drag = Drag { sum: self.tally().drag_virial, ..Drag::default() };
+        let v = self.records_lines().then(|| self.particles.now().v.clone());
+        if let Some(flux) = self.record.as_deref_mut().map(|record| &mut record.flux) {
+            flux.drag.push(Arc::new(drag));
+            if let Some(acted) = flux.forces.last_mut() {
+                acted.dragged = v;
+            }
         }
     }
 

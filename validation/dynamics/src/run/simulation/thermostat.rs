@@ -142,13 +142,12 @@ impl Simulation {
         if !self.is_recording() || !self.has_pair_thermostat() {
             return Ok(());
         }
-        if self.records_lines() {
+        if self.records_lines() && !self.engine().plan().drag_is_within_forces() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
             thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
             self.record_drag_at(1.0, &self.particles.now().v.clone());
         } else {
-            let drag = self.tally().drag_virial;
-            self.record_drag(1.0, |_, _, _| drag);
+            self.record_drag_in_forces();
         }
         Ok(())
     }
