@@ -109,8 +109,7 @@ impl Engine {
         Ok(Engine::of_plan(Plan::new(fluid)?, settings, Arc::new(Pool::new(settings.threads))))
     }
 
-    /// Creates the engine of a given plan, with a thread pool that others may use too.
-    pub(super) fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
+    fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
         Engine {
             on_walls: vec![OnWall::default(); plan.walls.len()],
             always_sums_walls: false,

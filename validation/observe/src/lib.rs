@@ -28,6 +28,7 @@ pub mod young_laplace;
 pub use drift::{Drift, drift};
 pub use error::ObserveError;
 pub use flux::Recorded;
+pub use meter::Pairs;
 pub use observation::{Abscissa, Column, Kind, Observation};
 pub use observers::Observers;
 pub use options::{Centre, Drive, Place, Slab};

@@ -1,7 +1,7 @@
 //! The table `[observe]` of a scene.
 
 use super::keys::{COMMON, Key, Table};
-use super::meter::{AnyMeter, KINDS};
+use super::meter::{AnyMeter, KINDS, Pairs};
 use super::options::{Options, Place};
 use psidpd_core::document::{FileError, Section, Value};
 
@@ -37,9 +37,9 @@ impl Observe {
         self.requests.iter().any(|request| request.meter.of_liquids())
     }
 
-    /// Whether all pairs of a configuration may be listed.
-    pub fn lists_pairs(&self) -> bool {
-        self.requests.iter().any(|request| request.meter.lists_pairs())
+    /// What samples may need of the pairs of a configuration.
+    pub fn pairs(&self) -> Pairs {
+        self.requests.iter().map(|request| request.meter.pairs()).max().unwrap_or_default()
     }
 }
 

@@ -4,7 +4,7 @@
 use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
 use super::plane_list::{PairBlock, PlaneList, merge};
-use super::shares::Shares;
+use super::shares::{PairLoops, ParticleSums, has_particle_sums};
 use super::sweep_pairs::{Ranges, SweepPairs};
 use crate::engine::components::COMPONENTS;
 use crate::engine::plan::Plan;
@@ -14,7 +14,8 @@ use crate::free_energy::FreeEnergy;
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use psidpd_passes::domain::PeriodicBox;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use psidpd_passes::instruction_set::InstructionSet;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Evaluates configurations of one fluid at one temperature.
 ///
@@ -26,10 +27,10 @@ pub struct Evaluator {
     /// A plan with a pass for every density.
     pub(super) plan: Plan,
     /// The ranges of the conservative interactions.
-    pub(super) ranges: Ranges,
+    ranges: Ranges,
     free_energy: FreeEnergy,
     work: Mutex<Work>,
-    shares: Mutex<Option<Shares>>,
+    loops: Mutex<Option<PairLoops>>,
 }
 
 /// The search for pairs in wide boxes, and arrays of pairs for reuse.
@@ -101,8 +102,8 @@ impl Evaluator {
         let free_energy = FreeEnergy::new(&fluid, usize::MAX).map_err(|_| TooLarge)?;
         let work = Mutex::new(Work { search: SweepPairs::new(fluid.dimensions), spare: Vec::new() });
         let ranges = Ranges::conservative(&fluid);
-        let shares = Mutex::default();
-        Ok(Evaluator { plan: Plan::whole(&fluid)?, ranges, free_energy, work, shares, fluid })
+        let loops = Mutex::default();
+        Ok(Evaluator { plan: Plan::whole(&fluid)?, ranges, free_energy, work, loops, fluid })
     }
 
     /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
@@ -122,6 +123,32 @@ impl Evaluator {
             near_walls.push(near);
         });
         Evaluation { energy, densities, psi, excess, planes, near_walls, range, shortest, reach }
+    }
+
+    /// Sums over the pairs of each particle by the loops of the sweep, which take less time than [`Evaluator::evaluate`]. `None` where they
+    /// do not apply: with walls, potentials that are formulas or tables, more than two densities or ranges that differ by species, and in
+    /// boxes less than twice as wide as the range.
+    pub fn particle_sums(
+        &self,
+        pool: &Arc<Pool>,
+        x: &[[f64; 3]],
+        species: &[i32],
+        domain: &PeriodicBox,
+    ) -> Option<ParticleSums> {
+        let fluid = &self.fluid;
+        if !has_particle_sums(fluid) {
+            return None;
+        }
+        let mut kept = self.loops();
+        if kept.as_ref().is_none_or(|loops| !Arc::ptr_eq(loops.pool(), pool)) {
+            *kept = Some(PairLoops::new(InstructionSet::best(), fluid, pool).ok()?);
+        }
+        let (forces, sums) = kept.as_mut()?.find(&self.plan, fluid, (x, species), domain)?;
+        let mut densities = sums.densities(pool);
+        self.add_own(species, &mut densities);
+        let psi = self.psi_of(pool, species, &densities);
+        let (shares, excess) = (sums.shares(pool, &psi), self.excess_of(species, &psi));
+        Some(ParticleSums { forces, shares, densities, excess })
     }
 
     /// Computes the energy `U` only.
@@ -209,8 +236,8 @@ impl Evaluator {
         self.work().spare.push(evaluation.planes);
     }
 
-    pub(super) fn shares(&self) -> MutexGuard<'_, Option<Shares>> {
-        self.shares.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn loops(&self) -> MutexGuard<'_, Option<PairLoops>> {
+        self.loops.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn work(&self) -> MutexGuard<'_, Work> {
@@ -260,7 +287,7 @@ impl Evaluator {
     }
 
     /// Adds what each particle is of its own density.
-    pub(super) fn add_own(&self, species: &[i32], densities: &mut [f64]) {
+    fn add_own(&self, species: &[i32], densities: &mut [f64]) {
         let (variables, kinds) = (self.fluid.variables(), self.fluid.species.len());
         let own = self.fluid.densities.iter().enumerate().filter(|(_, density)| density.includes_self);
         for (d, own) in own.map(|(d, density)| (d, density.kernel.value(0.0))) {
@@ -271,14 +298,14 @@ impl Evaluator {
     }
 
     /// Sum `Σ ψ` over the particles of each species.
-    pub(super) fn excess_of(&self, species: &[i32], psi: &Psi) -> Vec<f64> {
+    fn excess_of(&self, species: &[i32], psi: &Psi) -> Vec<f64> {
         let mut excess = vec![0.0; self.fluid.species.len()];
         psi.value.iter().zip(species).for_each(|(value, s)| excess[*s as usize] += value);
         excess
     }
 
     /// ψ of particles at their densities.
-    pub(super) fn psi_of(&self, pool: &Pool, species: &[i32], densities: &[f64]) -> Psi {
+    fn psi_of(&self, pool: &Pool, species: &[i32], densities: &[f64]) -> Psi {
         psi(pool, &self.free_energy, &self.fluid, species, densities)
     }
 }

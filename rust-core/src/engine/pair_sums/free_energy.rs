@@ -91,6 +91,13 @@ impl Rows<'_> {
     }
 }
 
+/// The product of a derivative of ψ, which may be infinite if no particle is in range, with one of weights, which then is 0.
+#[inline(always)]
+pub fn times(of_psi: f64, of_weight: f64) -> f64 {
+    let product = of_psi * of_weight;
+    if of_weight == 0.0 { 0.0 } else { product }
+}
+
 /// The value and the first two derivatives of a polynomial.
 fn polynomial(coefficients: &[f64], x: f64) -> [f64; 3] {
     coefficients.iter().rev().fold([0.0; 3], |[value, slope, second], c| {

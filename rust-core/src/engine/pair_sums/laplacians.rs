@@ -2,7 +2,7 @@
 
 use super::closed_forms::add_laplacians;
 use super::evaluation::Evaluation;
-use super::free_energy::Psi;
+use super::free_energy::{Psi, times};
 use super::pairs::{BLOCK, in_turns};
 use super::plane_list::{PlaneList, merge};
 use crate::engine::sweep::Pool;
@@ -200,13 +200,6 @@ impl Loop for OfBlock<'_> {
 fn add_to_both(rows: &mut [Row], [i, j]: [usize; 2], [x, y, z]: [f64; 3], [to_i, to_j]: [f64; 2]) {
     rows[i].iter_mut().zip([x, y, z, to_i]).for_each(|(to, add)| *to += add);
     rows[j].iter_mut().zip([x, y, z, -to_j]).for_each(|(to, add)| *to -= add);
-}
-
-/// The product of a derivative of ψ, which may be infinite if no particle is in range, with one of weights, which then is 0.
-#[inline(always)]
-pub fn times(of_psi: f64, of_weight: f64) -> f64 {
-    let product = of_psi * of_weight;
-    if of_weight == 0.0 { 0.0 } else { product }
 }
 
 /// `∇² φ` of the pairs of a block, summed over the pair terms of a fluid.

@@ -41,7 +41,7 @@ pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
 pub use pairs::BLOCK as PAIR_BLOCK;
 pub use plane_list::PairBlock;
-pub use shares::ParticleSums;
+pub use shares::{ParticleSums, has_particle_sums};
 pub use shells::count_in_shells;
 
 use super::counts::PassCounts;

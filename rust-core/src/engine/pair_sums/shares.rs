@@ -1,13 +1,11 @@
 //! What each particle adds to the Laplacian of the energy, with the forces, by the loops of the sweep.
 
-use super::evaluation::Evaluator;
-use super::free_energy::Psi;
-use super::laplacians::times;
-use crate::engine::facade::Engine;
+use super::free_energy::{Psi, times};
+use super::sweep_pairs::Ranges;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::request::Request;
-use crate::engine::sweep::{MARGIN, PairLists, Pool};
+use crate::engine::sweep::{MARGIN, PairLists, Pool, Sweep};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use crate::model::pair::PairPotential;
@@ -18,10 +16,10 @@ use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::Want;
 use std::sync::Arc;
 
-/// The forces of a fluid, and sums over pairs for the Laplacian.
+/// Finds the forces of a fluid, and the sums over pairs that its Laplacian is made of.
 #[derive(Debug)]
-pub struct Shares {
-    engine: Engine,
+pub struct PairLoops {
+    sweep: Sweep,
     lists: PairLists,
     tags: Vec<i32>,
 }
@@ -31,7 +29,14 @@ pub struct Shares {
 pub struct ParticleSums {
     /// The force on each particle.
     pub forces: Vec<[f64; 3]>,
-    /// What each particle adds to the Laplacian `Σ_k ∇_k² U`.
+    /// What each particle adds to the Laplacian `Σ_k ∇_k² U`:
+    ///
+    /// ```text
+    /// s_i = Σ_v [2 ψ_i,v Σ_j ∇²w + Σ_u ψ_i,vu (g_v·g_u + Σ_j w_v′ w_u′)] + Σ_j ∇²φ,   g_v = ∇_i n_iv
+    /// ```
+    ///
+    /// [`Evaluation::laplacians`](super::Evaluation::laplacians) has the terms by the particle that moves, a share those of the energy of
+    /// one particle.
     pub shares: Vec<f64>,
     /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub densities: Vec<f64>,
@@ -39,101 +44,86 @@ pub struct ParticleSums {
     pub excess: Vec<f64>,
 }
 
-impl Shares {
-    fn new(set: InstructionSet, fluid: &Fluid, pool: &Arc<Pool>) -> Result<Shares, TooLarge> {
-        let (precision, instructions) = (Precision::Mixed, set.instructions());
-        let settings = Settings { precision, instructions, ..Settings::default() };
-        Ok(Shares {
-            engine: Engine::of_plan(Plan::new(fluid)?, settings, Arc::clone(pool)),
-            lists: PairLists::new(set, fluid.dimensions),
-            tags: Vec::new(),
-        })
-    }
-}
-
-/// Whether [`Evaluator::particle_sums`] can do a fluid.
-fn has_loops(fluid: &Fluid) -> bool {
+/// Whether [`Evaluator::particle_sums`](super::Evaluator::particle_sums) can do a fluid, in wide boxes.
+pub fn has_particle_sums(fluid: &Fluid) -> bool {
+    let ranges = Ranges::conservative(fluid);
     let is_closed = |form: &PairPotential| matches!(form, PairPotential::Soft(_) | PairPotential::Spline(_));
     fluid.walls.is_empty()
         && fluid.is_conservative()
         && fluid.densities.len() <= MOST_DENSITIES
+        && ranges.longest() == ranges.shortest()
         && fluid.pairs.iter().all(|term| is_closed(&term.potential))
 }
 
-impl Evaluator {
-    /// Sums over the pairs of each particle by the loops of the sweep. The shares `s_i` of particles in `Σ_k ∇_k² U`, which is their sum, are
-    ///
-    /// ```text
-    /// s_i = Σ_v [2 ψ_i,v Σ_j ∇²w + Σ_u ψ_i,vu (g_v·g_u + Σ_j w_v′ w_u′)] + Σ_j ∇²φ,   g_v = ∇_i n_iv
-    /// ```
-    ///
-    /// [`Evaluation::laplacians`](super::Evaluation::laplacians) has the terms by the particle that moves, a share those of the energy of
-    /// one particle. `None` where the loops do not apply: with walls, potentials that are formulas or tables, more than two densities or
-    /// ranges that differ by species, and in boxes less than twice as wide as the range.
-    pub fn particle_sums(
-        &self,
-        pool: &Arc<Pool>,
-        x: &[[f64; 3]],
-        species: &[i32],
+impl PairLoops {
+    pub fn new(set: InstructionSet, fluid: &Fluid, pool: &Arc<Pool>) -> Result<PairLoops, TooLarge> {
+        let (precision, instructions) = (Precision::Mixed, set.instructions());
+        let settings = Settings { precision, instructions, ..Settings::default() };
+        Ok(PairLoops {
+            sweep: Sweep::of_plan(Plan::new(fluid)?, settings, Arc::clone(pool)),
+            lists: PairLists::new(set, fluid.dimensions),
+            tags: Vec::new(),
+        })
+    }
+
+    pub fn pool(&self) -> &Arc<Pool> {
+        self.sweep.pool()
+    }
+
+    /// Forces and sums; `None` if the box is too narrow or too long. `plan` has a pass for every density of the fluid.
+    pub fn find<'a>(
+        &'a mut self,
+        plan: &Plan,
+        fluid: &'a Fluid,
+        (x, species): (&[[f64; 3]], &[i32]),
         domain: &PeriodicBox,
-    ) -> Option<ParticleSums> {
-        let fluid = &self.fluid;
-        if !has_loops(fluid) || self.ranges.longest() != self.ranges.shortest() {
-            return None;
-        }
-        let mut kept = self.shares();
-        if kept.as_ref().is_none_or(|shares| !Arc::ptr_eq(shares.engine.pool(), pool)) {
-            *kept = Some(Shares::new(InstructionSet::best(), fluid, pool).ok()?);
-        }
-        let Shares { engine, lists, tags } = kept.as_mut()?;
+    ) -> Option<(Vec<[f64; 3]>, Sums<'a>)> {
+        let PairLoops { sweep, lists, tags } = self;
         if tags.len() != x.len() {
             *tags = (1..=i32::try_from(x.len()).ok()?).collect();
         }
         let particles = Particles { owned: x.len(), x, tag: tags, kind: species };
-        let range = [self.ranges.longest(), MARGIN];
-        let sums = lists.sum_laplacians(pool, domain, &particles, &self.plan, range).ok()?;
+        let range = [fluid.conservative_range(), MARGIN];
+        let sums = lists.sum_laplacians(&Arc::clone(sweep.pool()), domain, &particles, plan, range).ok()?;
         let mut forces = vec![[0.0; 3]; x.len()];
         let request = Request { particles, v: &[], step: None, want: Want::FORCES };
-        engine.forces(domain, &request, &mut forces, false).ok()?;
-        let (sums, place) = (Sums { sums: &sums, fluid }, &lists.place);
-        let mut densities = sums.densities(pool, place);
-        self.add_own(species, &mut densities);
-        let psi = self.psi_of(pool, species, &densities);
-        let excess = self.excess_of(species, &psi);
-        Some(ParticleSums { forces, shares: sums.shares(pool, place, &psi), densities, excess })
+        sweep.evaluate(domain, &request, &mut forces, false).ok()?;
+        Some((forces, Sums { sums, fluid, place: &lists.place }))
     }
 }
 
-/// The sums of particles in the order of cells.
-struct Sums<'a> {
-    sums: &'a [DensitySums],
+/// The sums of particles in the order of cells, and the place of each particle there.
+pub struct Sums<'a> {
+    sums: Vec<DensitySums>,
     fluid: &'a Fluid,
+    place: &'a [u32],
 }
 
 impl Sums<'_> {
     /// Those of a particle with its neighbours of a species, in all densities.
-    fn of(&self, place: usize, species: usize) -> &[DensitySums] {
-        let width = self.fluid.densities.len().max(1);
+    fn of(&self, particle: usize, species: usize) -> &[DensitySums] {
+        let (place, width) = (self.place[particle] as usize, self.fluid.densities.len().max(1));
         &self.sums[(place * self.fluid.species.len() + species) * width..][..width]
     }
 
-    /// Those of particle `k` are at `place[k]`.
-    fn densities(&self, pool: &Pool, place: &[u32]) -> Vec<f64> {
+    /// Densities without what particles are of their own.
+    pub fn densities(&self, pool: &Pool) -> Vec<f64> {
         let (variables, kinds) = (self.fluid.variables(), self.fluid.species.len());
-        let mut densities = vec![0.0; place.len() * variables];
+        let mut densities = vec![0.0; self.place.len() * variables];
         pool.parts(&mut densities, |first, densities| {
             for (at, n) in (first..).zip(densities) {
                 let (k, v) = (at / variables, at % variables);
-                *n = self.of(place[k] as usize, v % kinds)[v / kinds].first[3];
+                *n = self.of(k, v % kinds)[v / kinds].first[3];
             }
         });
         densities
     }
 
-    fn shares(&self, pool: &Pool, place: &[u32], psi: &Psi) -> Vec<f64> {
+    /// The share of each particle in the Laplacian, see [`ParticleSums::shares`].
+    pub fn shares(&self, pool: &Pool, psi: &Psi) -> Vec<f64> {
         let (variables, kinds) = (self.fluid.variables(), self.fluid.species.len());
         let share = |k: usize| {
-            let of = |v: usize| &self.of(place[k] as usize, v % kinds)[v / kinds];
+            let of = |v: usize| &self.of(k, v % kinds)[v / kinds];
             let mut share = 0.0;
             for v in 0..variables {
                 share += times(psi.slopes[k * variables + v], 2.0 * of(v).second[0]);
@@ -147,9 +137,9 @@ impl Sums<'_> {
                     share += times(psi.second[(k * variables + v) * variables + u], along + of_same);
                 }
             }
-            share + (0..kinds).map(|b| self.of(place[k] as usize, b)[0].second[3]).sum::<f64>()
+            share + (0..kinds).map(|b| self.of(k, b)[0].second[3]).sum::<f64>()
         };
-        let mut shares = vec![0.0; place.len()];
+        let mut shares = vec![0.0; self.place.len()];
         pool.parts(&mut shares, |first, shares| {
             (first..).zip(shares).for_each(|(k, to)| *to = share(k));
         });
@@ -160,6 +150,7 @@ impl Sums<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::pair_sums::Evaluator;
     use crate::model::Model;
     use nalgebra::Matrix3;
     use psidpd_passes::noise::threefry2x32;
@@ -268,7 +259,7 @@ range_B = 1.0
             for (_, set) in Instructions::ALL {
                 let Some(set) = InstructionSet::new(set) else { continue };
                 for pool in [&alone, &three] {
-                    *evaluator.shares() = Some(Shares::new(set, fluid, pool).unwrap());
+                    *evaluator.loops() = Some(PairLoops::new(set, fluid, pool).unwrap());
                     let sums = evaluator.particle_sums(pool, &x, &species, &domain).unwrap();
                     let ParticleSums { forces, shares, densities, excess } = &sums;
                     for (f, g) in forces.as_flattened().iter().zip(expected.as_flattened()) {

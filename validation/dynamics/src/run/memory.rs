@@ -3,14 +3,21 @@
 use super::advice::is_worth_a_trial;
 use super::looks::{FEW, WORTH_A_LOOK};
 use crate::scene::Scene;
+use psidpd_core::engine::Precision;
+use psidpd_core::engine::pair_sums::has_particle_sums;
 use psidpd_formats::memory::{self, MemoryError, PARTICLE};
+use psidpd_observe::Pairs;
 
 /// Bytes per particle of evaluations for configurational temperatures, whose arrays the watch keeps between looks at all particles: 18 444
-/// took 1100 and 1500, with velocity Verlet and force-gradient, and pieces of 20 000, whose arrays are not kept, 900 and 1000.
+/// took 1100 and 1500, with velocity Verlet and force-gradient, where pairs are listed, and 200 and 830 where they are summed; pieces of
+/// 20 000, whose arrays are not kept, 900 and 1000.
 const EVALUATION: f64 = 1200.0;
 
 /// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330.
-const OBSERVED: f64 = 1300.0;
+const LISTED: f64 = 1300.0;
+
+/// Bytes per particle where they sum them: `temperature` of 60 500 and of 282 000 particles took 480 and 390.
+const SUMMED: f64 = 480.0;
 
 /// Bytes per particle of the cells for the test whether a liquid is a crystal: 10⁶ particles took 37 and 42.
 const OF_LIQUIDS: f64 = 45.0;
@@ -59,11 +66,15 @@ fn bytes_per_particle(scene: &Scene) -> f64 {
     let heated = || scene.stages.iter().filter(|stage| stage.thermostat && stage.integrator.has_time());
     let pairs = if heated().any(|stage| !stage.integrator.properties().drag_in_forces) { APART } else { 0.0 };
     let evaluates = heated().any(|stage| stage.steps >= WORTH_A_LOOK || is_worth_a_trial(stage, particles));
-    let evaluated = match (scene.observe.lists_pairs(), evaluates) {
-        (true, _) => OBSERVED,
-        (_, true) => EVALUATION * part,
-        _ => 0.0,
+    let is_periodic = scene.domain.periodic()[..scene.model.dimensions()].iter().all(|periodic| *periodic);
+    let has_sums = || scene.model.at(scene.kt).is_ok_and(|fluid| has_particle_sums(&fluid));
+    let sums = || is_periodic && scene.precision() == Precision::Mixed && has_sums();
+    let observed = match scene.observe.pairs() {
+        Pairs::Nothing => 0.0,
+        Pairs::Sums if sums() => SUMMED,
+        Pairs::Sums | Pairs::List => LISTED,
     };
+    let evaluated = observed.max(if evaluates { EVALUATION * part } else { 0.0 });
     let cells = if scene.observe.of_liquids() { OF_LIQUIDS } else { 0.0 };
     PARTICLE + pairs + evaluated + cells
 }
@@ -89,8 +100,13 @@ mod tests {
         let of = |observe: &str| bytes_per_particle(&of(50.0, &format!("[observe]\n{observe} = true\n")));
         assert_eq!(of("density_profile"), bytes(50.0));
         assert_eq!(of("msd"), bytes(50.0) + OF_LIQUIDS);
-        for (observe, cells) in [("temperature", 0.0), ("clusters", 0.0), ("stress_profile", OF_LIQUIDS)] {
-            let more = OBSERVED - share * EVALUATION + cells;
+        for (observe, pairs, cells) in [
+            ("temperature", SUMMED, 0.0),
+            ("clusters", LISTED, 0.0),
+            ("stress_profile", LISTED, OF_LIQUIDS),
+            ("temperature = true\nclusters", LISTED, 0.0),
+        ] {
+            let more = pairs - share * EVALUATION + cells;
             assert!((of(observe) - bytes(50.0) - more).abs() < 1e-9, "{observe}");
         }
         let once = (1.0 - share) * EVALUATION;

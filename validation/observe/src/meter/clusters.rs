@@ -31,7 +31,7 @@ impl Meter for Clusters {
         ..PLAIN
     };
 
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<Clusters, FileError> {
         Ok(Clusters {

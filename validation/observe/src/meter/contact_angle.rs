@@ -216,7 +216,7 @@ impl Meter for ContactAngle {
     };
 
     const OF_LIQUIDS: bool = true;
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<ContactAngle, FileError> {
         let (domain, fluid) = (options.place.domain, options.place.fluid);

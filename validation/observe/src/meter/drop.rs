@@ -157,7 +157,7 @@ impl Meter for Drop {
 
     const FLUX: Recorded = Recorded::Lines;
     const OF_LIQUIDS: bool = true;
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<Drop, FileError> {
         let range = options.within_half_box("range")?.unwrap_or(options.half_box());
@@ -175,7 +175,6 @@ impl Meter for Drop {
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let (x, domain) = (view.x, view.domain);
-        frame.expect_lines();
         let distance = self.distance.at(x, domain, self.dimensions, |_| true);
         let linked = Linked::of(frame, distance, |_| true);
         let Some(largest) = linked.largest() else { return false };

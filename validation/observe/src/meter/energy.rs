@@ -19,7 +19,7 @@ impl Meter for Energy {
 
     const NEEDS: Want = Want { energy: true, ..Want::FORCES };
 
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<Energy, FileError> {
         let fluid = options.place.fluid;

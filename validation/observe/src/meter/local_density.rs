@@ -74,7 +74,7 @@ impl Meter for LocalDensity {
         ..PLAIN
     };
 
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::Sums;
 
     fn read(options: &Options) -> Result<LocalDensity, FileError> {
         let fluid = options.place.fluid;

@@ -60,8 +60,8 @@ pub trait Meter: Sized {
     /// True if the results mean nothing for a crystal.
     const OF_LIQUIDS: bool = false;
 
-    /// True if all pairs of a configuration may be listed for its samples.
-    const LISTS_PAIRS: bool = false;
+    /// What its samples may need of the pairs of a configuration.
+    const PAIRS: Pairs = Pairs::Nothing;
 
     fn read(options: &Options) -> Result<Self, FileError>;
 
@@ -80,6 +80,16 @@ pub trait Meter: Sized {
     }
 
     fn finish(&self) -> Vec<Observation>;
+}
+
+/// What samples need of the pairs of a configuration, which takes memory; the most last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Pairs {
+    #[default]
+    Nothing,
+    /// Sums over the pairs of each particle, [`Frame::sums`], or a list where there are none.
+    Sums,
+    List,
 }
 
 /// A kind of observable, for the reader.
@@ -113,8 +123,8 @@ macro_rules! meters {
                 match self { $(AnyMeter::$variant(_) => <$meter as Meter>::OF_LIQUIDS),+ }
             }
 
-            pub fn lists_pairs(&self) -> bool {
-                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::LISTS_PAIRS),+ }
+            pub fn pairs(&self) -> Pairs {
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::PAIRS),+ }
             }
 
             pub fn sample(&mut self, frame: &Frame) -> bool {

@@ -138,7 +138,7 @@ impl Meter for Pendant {
     };
 
     const OF_LIQUIDS: bool = true;
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<Pendant, FileError> {
         let (domain, d) = (options.place.domain, options.place.fluid.dimensions);

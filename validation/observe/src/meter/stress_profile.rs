@@ -103,7 +103,7 @@ impl Meter for StressProfile {
 
     const FLUX: Recorded = Recorded::Lines;
     const OF_LIQUIDS: bool = true;
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<StressProfile, FileError> {
         let across = Across::read(options, false)?;

@@ -95,7 +95,7 @@ impl Meter for SurfaceTension {
     const NEEDS: Want = Want::TOTALS;
     const FLUX: Recorded = Recorded::Sum;
     const OF_LIQUIDS: bool = true;
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::List;
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
         let place = options.place;

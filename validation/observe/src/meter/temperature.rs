@@ -24,7 +24,7 @@ impl Meter for Temperature {
         ..PLAIN
     };
 
-    const LISTS_PAIRS: bool = true;
+    const PAIRS: Pairs = Pairs::Sums;
 
     fn read(options: &Options) -> Result<Temperature, FileError> {
         let missing = configurational::missing(options.place.fluid, options.place.domain).unwrap_or("");
