@@ -7,7 +7,7 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// The version grows whenever [`Checkpoint`] or anything that it holds changes.
-pub const VERSION: u32 = 12;
+pub const VERSION: u32 = 13;
 
 const MAGIC: [u8; 8] = *b"psidpdCK";
 const HEADER: usize = 24;
