@@ -306,7 +306,7 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
         }
     }
 
-    /// Adds the quads of the batch to the sums of both particles of each pair.
+    /// Adds the quads of the batch to the sums of both particles of each pair, with several species.
     ///
     /// # Safety
     /// The caller fulfils the contract of `simd`; the buffers have the quads of the batch.
@@ -328,14 +328,11 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
                     continue;
                 }
                 let m = *batch.i_in_batch.get_unchecked(p) as usize;
-                let mut here = batch.first - self.first + m;
-                let mut there = (*batch.j_offsets.get_unchecked(p) >> OFFSET_BITS) as usize - self.first;
-                if MULTISPECIES {
-                    let a = i_particles.species[m % LANES] as usize;
-                    let b = *species_pair.get_unchecked(p) as usize - a * species;
-                    here = here * species + b;
-                    there = there * species + a;
-                }
+                let (here, there) = (batch.first + m, *batch.j_offsets.get_unchecked(p) >> OFFSET_BITS);
+                let a = i_particles.species[m % LANES] as usize;
+                let b = *species_pair.get_unchecked(p) as usize - a * species;
+                let here = (here - self.first) * species + b;
+                let there = (there as usize - self.first) * species + a;
                 let mut d = 0;
                 while d < width {
                     let [here, there] = [self.sums.add(here * width + d), self.sums.add(there * width + d)];

@@ -152,6 +152,7 @@ mod tests {
     use super::*;
     use crate::engine::pair_sums::Evaluator;
     use crate::model::Model;
+    use crate::model::wall::{Surface, Wall};
     use nalgebra::Matrix3;
     use psidpd_passes::noise::threefry2x32;
     use psidpd_passes::settings::Instructions;
@@ -212,7 +213,7 @@ range_B = 1.0
     ];
 
     fn fluid(model: &str) -> Fluid {
-        Model::parse("m.toml", model).unwrap().at(1.0).unwrap()
+        Model::parse("m.toml", model).unwrap().at(0.7).unwrap()
     }
 
     fn pool(threads: usize) -> Arc<Pool> {
@@ -283,7 +284,7 @@ range_B = 1.0
         }
     }
 
-    /// With ranges that differ by species, three densities, a potential that is a formula and in a narrow box.
+    /// With ranges that differ by species, three densities, a potential that is a formula, a wall and in a narrow box.
     #[test]
     fn what_has_no_loops_is_said() {
         let with = |text: &str| format!("title = \"m\"\nspecies = [\"A\", \"B\"]\n{text}");
@@ -314,5 +315,16 @@ range_B = 1.0
             let found = evaluator.particle_sums(&pool(1), &x, &[0, 1], domain);
             assert_eq!(found.is_some(), expected, "{model}");
         }
+        let wall = Wall {
+            surface: Surface::Face { axis: 2, high: false },
+            species: 0,
+            density: 4.0,
+            local_densities: Vec::new(),
+            strength: 1.0,
+            velocity: [0.0; 3],
+            drag: [None; 2],
+        };
+        let model = Model::parse("m.toml", &all("soft", 1.0)).unwrap().with_walls(vec![wall]);
+        assert!(!has_particle_sums(&model.at(0.7).unwrap()));
     }
 }
