@@ -203,9 +203,17 @@ pub struct Acted {
     pub on_walls: Vec<OnWall>,
     /// The positions of the particles, if they differ from those at the end of the step and lines are recorded.
     pub at: Option<Place>,
-    /// The velocities at which drag acts besides, at the same positions and for the same share of the step; none if it does not, or
-    /// if [`Flux::drag`] has its lines.
-    pub dragged: Option<Vec<[f64; 3]>>,
+    /// The drag that acts besides at the same positions; none if it does not, or if [`Flux::drag`] has its lines.
+    pub dragged: Option<Dragged>,
+}
+
+/// Drag along the lines of forces.
+#[derive(Debug, Clone)]
+pub struct Dragged {
+    /// The fraction of the step for which it acts.
+    pub share: f64,
+    /// The velocities at which it acts.
+    pub v: Vec<[f64; 3]>,
 }
 
 /// The positions of the particles at the time when forces acted on them.

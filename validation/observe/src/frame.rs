@@ -1,6 +1,6 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
-use super::flux::{BLOCK, Carrier, Flux, Line, Lines, Place, Pull};
+use super::flux::{BLOCK, Carrier, Dragged, Flux, Line, Lines, Place, Pull};
 use super::options::Centre;
 use super::piece::{Piece, Whole};
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair, ParticleSums};
@@ -161,7 +161,7 @@ impl<'a> Frame<'a> {
                 evaluation: earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation),
                 x: acted.at.as_ref().map_or(self.view.x, |at| &at.x),
                 displacements: earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements),
-                drag: acted.dragged.as_deref().map(|v| (self.evaluator, v)),
+                drag: acted.dragged.as_ref().map(|dragged| (self.evaluator, dragged)),
             };
             let of_pairs = forces.evaluation.parts().enumerate();
             parts.extend(of_pairs.map(|(part, count)| (Part::Forces(forces, part), Carrier::Pair, count)));
@@ -275,8 +275,7 @@ struct Forces<'a> {
     evaluation: &'a Evaluation,
     x: &'a [[f64; 3]],
     displacements: &'a [[f64; 3]],
-    /// The velocities at which drag acts besides.
-    drag: Option<(&'a Evaluator, &'a [[f64; 3]])>,
+    drag: Option<(&'a Evaluator, &'a Dragged)>,
 }
 
 impl Part<'_> {
@@ -295,10 +294,16 @@ impl Part<'_> {
                 }
             }
             Part::Forces(Forces { share, evaluation, x, displacements, drag }, part) => {
-                let with_drag = drag.map(|(evaluator, v)| evaluator.strengths_with_drag(evaluation, part, v));
+                // Both with their shares of the step.
+                let with_drag = drag.map(|(evaluator, Dragged { share: of_drag, v })| {
+                    evaluator.strengths_with_drag(evaluation, part, [share, *of_drag], v)
+                });
                 let mut with_drag = with_drag.as_ref().map(|strengths| strengths.chunks(BLOCK));
                 for block in evaluation.blocks_of(part) {
-                    let strengths = with_drag.as_mut().and_then(Iterator::next).unwrap_or(block.strengths);
+                    let (strengths, share) = match with_drag.as_mut().and_then(Iterator::next) {
+                        Some(strengths) => (strengths, 1.0),
+                        None => (block.strengths, share),
+                    };
                     let pull = Pull { d: block.d, strengths, share };
                     lines.join(block.particles(), (x, displacements), pull);
                     visit(lines);

@@ -6,25 +6,34 @@ use crate::engine::plan::ThermostatPlan;
 use crate::engine::vectors::{Loop, run_best};
 
 impl Evaluator {
-    /// The forces of the pairs of a part with the drag `−γ w_R² (ê·v_ij)` at the velocities `v` of the particles, divided by
-    /// distances as [`PairBlock::strengths`](super::PairBlock::strengths). No pair with drag is missing if
+    /// The forces of the pairs of a part and the drag `−γ w_R² (ê·v_ij)` at the velocities `v` of the particles, with their `shares`, divided
+    /// by distances as [`PairBlock::strengths`](super::PairBlock::strengths). No pair with drag is missing if
     /// [`Plan::drag_is_within_forces`](crate::engine::Plan::drag_is_within_forces).
-    pub fn strengths_with_drag(&self, evaluation: &Evaluation, part: usize, v: &[[f64; 3]]) -> Vec<f64> {
+    pub fn strengths_with_drag(
+        &self,
+        evaluation: &Evaluation,
+        part: usize,
+        shares: [f64; 2],
+        v: &[[f64; 3]],
+    ) -> Vec<f64> {
         let plane = &evaluation.planes[part];
-        let mut strengths = plane.strengths.clone();
+        let [share, of_drag] = shares;
+        let mut strengths: Vec<f64> = plane.strengths.iter().map(|strength| share * strength).collect();
         if let Some(plan) = &self.plan.thermostat {
             let v: Vec<[f64; 3]> = plane.hosts.iter().map(|k| v[*k as usize]).collect();
-            run_best(Drag { plan, kinds: self.fluid.species.len(), plane, v: &v, strengths: &mut strengths });
+            let kinds = self.fluid.species.len();
+            run_best(Drag { plan, kinds, plane, share: of_drag, v: &v, strengths: &mut strengths });
         }
         strengths
     }
 }
 
-/// Adds drag to the forces of the pairs of a plane, whose particles have the velocities `v` by their local numbers.
+/// Adds a share of drag to the forces of the pairs of a plane, whose particles have the velocities `v` by their local numbers.
 struct Drag<'a> {
     plan: &'a ThermostatPlan,
     kinds: usize,
     plane: &'a PlaneList,
+    share: f64,
     v: &'a [[f64; 3]],
     strengths: &'a mut [f64],
 }
@@ -34,7 +43,8 @@ impl Loop for Drag<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Drag { plan: ThermostatPlan { gamma, range, exponent, .. }, kinds, plane, v, strengths } = self;
+        let Drag { plan: ThermostatPlan { gamma, range, exponent, .. }, kinds, plane, share, v, strengths } =
+            self;
         let list = &plane.list;
         let is_linear = exponent.iter().all(|exponent| *exponent == 1.0);
         let [x, y, z] = list.d.each_ref();
@@ -47,7 +57,7 @@ impl Loop for Drag<'_> {
             let dot = x * (v_i[0] - v_j[0]) + y * (v_i[1] - v_j[1]) + z * (v_i[2] - v_j[2]);
             // w_R/r, if w_R is linear in r.
             let weight = (range - r) / (range * r);
-            let mut drag = gamma * weight * weight * dot;
+            let mut drag = share * gamma * weight * weight * dot;
             if !is_linear && *r < range {
                 drag *= (1.0 - r / range).powf(2.0 * exponent[kinds] - 2.0);
             }
@@ -91,7 +101,7 @@ gamma = 0.0
 range = 1.0
 "#;
 
-    /// Each pair has the drag of its species by the definition, besides its conservative force; two at one place have none.
+    /// Each pair has the drag of its species by the definition, besides its conservative force, in their shares; two at one place have none.
     #[test]
     fn pairs_have_their_drag() {
         for (model, exponent) in [(MODEL.to_owned(), 0.5), (MODEL.replace("exponent = 0.5", ""), 1.0)] {
@@ -108,7 +118,7 @@ range = 1.0
             let evaluation = evaluator.evaluate(&pool, &x, &species, &domain);
             let mut slowed = 0;
             for (part, count) in evaluation.parts().enumerate() {
-                let found = evaluator.strengths_with_drag(&evaluation, part, &v);
+                let found = evaluator.strengths_with_drag(&evaluation, part, [0.7, 0.4], &v);
                 let blocks = evaluation.blocks_of(part).flat_map(|block| {
                     let at = |k: usize| ([0, 1, 2].map(|c| block.d[c][k]), block.r[k], block.strengths[k]);
                     block.particles().enumerate().map(|(k, ij)| (ij, at(k))).collect::<Vec<_>>()
@@ -120,10 +130,10 @@ range = 1.0
                         1 => (9.0, 1.0, exponent),
                         _ => (0.0, 0.0, 1.0),
                     };
-                    let mut expected = conservative;
+                    let mut expected = 0.7 * conservative;
                     if r < range && r > 0.0 {
                         let along = (0..3).map(|c| d[c] / r * (v[i][c] - v[j][c])).sum::<f64>();
-                        expected -= gamma * (1.0 - r / range).powf(2.0 * exponent) * along / r;
+                        expected -= 0.4 * gamma * (1.0 - r / range).powf(2.0 * exponent) * along / r;
                         slowed += 1;
                     }
                     let scale = 1.0 + expected.abs() + conservative.abs();

@@ -89,12 +89,12 @@ impl Runner<'_> {
         let period = stage.integrator.thermostat_every();
         let last = if number.is_multiple_of(period) { number + period - 1 } else { number };
         let virial = |step| self.is_row(step) || self.observers.wants(step, &stage.name).virial;
+        let flux = |step| self.observers.wants_flux(step, &stage.name);
+        let held_flux = (number + 1..=last).map(flux).max().unwrap_or_default();
         let task = Task {
             want,
-            flux: (number..=last)
-                .map(|step| self.observers.wants_flux(step, &stage.name))
-                .max()
-                .unwrap_or_default(),
+            flux: held_flux.max(flux(number)),
+            held_flux,
             holds_impulses: (number + 1..=last).any(virial),
             settles: self.scene.settles(self.position.stage, self.position.done),
         };

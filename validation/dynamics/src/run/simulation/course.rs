@@ -27,6 +27,8 @@ pub struct Task {
     pub want: Want,
     /// What is recorded of the transport of momentum.
     pub flux: Recorded,
+    /// What of that steps record before the thermostat acts again.
+    pub held_flux: Recorded,
     /// Whether steps before the thermostat acts again ask for its virial.
     pub holds_impulses: bool,
     /// Whether Monte Carlo tunes the length of its moves.
@@ -40,10 +42,10 @@ impl Course {
 
     /// Makes one step of `dt`.
     pub fn make(&mut self, dt: f64, integrator: Integrator, task: Task) -> Result<(), RunError> {
-        let Task { want, flux, holds_impulses, settles } = task;
+        let Task { want, flux, held_flux, holds_impulses, settles } = task;
         self.want = want;
         self.simulation.hold_impulses(holds_impulses);
-        self.simulation.record_flux(flux);
+        self.simulation.record_and_hold_flux(flux, held_flux);
         self.simulation.set_settling(settles);
         self.simulation.begin_step(dt, integrator, want)
     }

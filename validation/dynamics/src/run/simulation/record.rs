@@ -5,17 +5,21 @@ use crate::integrator::Integrator;
 use crate::run::integrator::reflection::{Hit, Leg, Path};
 use psidpd_core::engine::Pool;
 use psidpd_core::engine::thermostat::{PairThermostat, Pulls};
-use psidpd_observe::flux::{Acted, Drag, Flux, Line, OnWall, Place, Recorded};
+use psidpd_observe::flux::{Acted, Drag, Dragged, Flux, Line, OnWall, Place, Recorded};
 use std::sync::Arc;
 
 /// The transport of momentum in the present step, whose length is `dt`.
 #[derive(Debug, Clone, Default)]
 pub struct Record {
     what: Recorded,
+    /// What of the drag the steps up to the next action of the thermostat need.
+    held: Recorded,
     dt: f64,
     flux: Flux,
     /// Whether operators may add to the record.
     open: bool,
+    /// Of the positions at which the forces acted that were recorded last, [`Particles::moves`]; `None` if they were computed for others.
+    acted_at: Option<u64>,
 }
 
 /// Arrays of earlier records, for reuse: new ones cost more than what fills them.
@@ -41,13 +45,21 @@ impl Spare {
 impl Simulation {
     /// Sets what later steps record of the transport of momentum. Trajectories do not depend on it.
     pub fn record_flux(&mut self, what: Recorded) {
+        self.record_and_hold_flux(what, what);
+    }
+
+    /// As [`Simulation::record_flux`], where steps up to the next action of the thermostat record no more than `held`.
+    pub(super) fn record_and_hold_flux(&mut self, what: Recorded, held: Recorded) {
         match what {
             Recorded::Nothing => {
                 if let Some(record) = self.record.take() {
                     self.spare.keep(record.flux);
                 }
             }
-            _ => self.record.get_or_insert_default().what = what,
+            _ => {
+                let record = self.record.get_or_insert_default();
+                (record.what, record.held) = (what, held);
+            }
         }
     }
 
@@ -64,6 +76,11 @@ impl Simulation {
         self.record.as_ref().is_some_and(|record| record.what == Recorded::Lines)
     }
 
+    /// Whether steps up to the next action of the thermostat need the lines of drag.
+    pub(super) fn holds_lines(&self) -> bool {
+        self.record.as_ref().is_some_and(|record| record.held == Recorded::Lines)
+    }
+
     pub(super) fn open_record(&mut self, dt: f64) {
         let Some(record) = self.record.as_deref_mut() else { return };
         if record.dt > 0.0 {
@@ -73,15 +90,15 @@ impl Simulation {
         ways.clear();
         // Between two actions the drag of the last goes on.
         record.flux = Flux { ways, drag: self.thermostat.held_drag.clone(), ..Flux::default() };
-        (record.dt, record.open) = (dt, true);
+        (record.dt, record.open, record.acted_at) = (dt, true, None);
     }
 
-    /// Keeps the drag of this step for the records of the next ones.
-    pub(super) fn hold_drag(&mut self) {
-        if let Some(record) = &self.record {
-            let before = std::mem::replace(&mut self.thermostat.held_drag, record.flux.drag.clone());
-            self.spare.keep_drag(before);
-        }
+    /// Keeps the drag of this step for the records of the next ones: `drag` with lines of its own, if this step has none.
+    pub(super) fn hold_drag(&mut self, drag: Option<Drag>) {
+        let Some(record) = &self.record else { return };
+        let drag = drag.map_or_else(|| record.flux.drag.clone(), |drag| vec![Arc::new(drag)]);
+        let before = std::mem::replace(&mut self.thermostat.held_drag, drag);
+        self.spare.keep_drag(before);
     }
 
     pub(super) fn close_record(&mut self, integrator: Integrator) {
@@ -150,6 +167,7 @@ impl Simulation {
         if !self.is_recording() {
             return;
         }
+        let acted_at = displaced.is_none().then(|| self.particles.moves());
         let State { x, species, .. } = self.particles.now();
         let place = || Place { x: x.clone(), species: species.clone(), displaced };
         let on_walls = self.forces_of_fluid_on_walls();
@@ -157,19 +175,26 @@ impl Simulation {
         let acted = Acted { share: 1.0, virial, on_walls, at, dragged: None };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);
+            record.acted_at = acted_at;
         }
     }
 
-    /// Records the drag, at the present velocities, in the forces that were recorded last.
-    pub(super) fn record_drag_in_forces(&mut self) {
-        let drag = Drag { sum: self.tally().drag_virial, ..Drag::default() };
-        let v = self.records_lines().then(|| self.particles.now().v.clone());
+    /// Records the drag at velocities `v` during a part `share` of the step, whose lines are those of the forces that were recorded last;
+    /// `sum` is its virial, averaged over the step.
+    pub(super) fn record_drag_in_forces(&mut self, sum: [f64; 6], share: f64, v: &[[f64; 3]]) {
+        let dragged = self.records_lines().then(|| Dragged { share, v: v.to_vec() });
         if let Some(flux) = self.record.as_deref_mut().map(|record| &mut record.flux) {
-            flux.drag.push(Arc::new(drag));
+            flux.drag.push(Arc::new(Drag { sum, ..Drag::default() }));
             if let Some(acted) = flux.forces.last_mut() {
-                acted.dragged = v;
+                acted.dragged = dragged;
             }
         }
+    }
+
+    /// Whether the lines of drag at the present positions are those of the forces that were recorded last.
+    pub(super) fn has_forces_here(&self) -> bool {
+        let acted_at = self.record.as_ref().and_then(|record| record.acted_at);
+        acted_at == Some(self.particles.moves()) && self.engine().plan().drag_is_within_forces()
     }
 
     /// The conservative forces on the walls in the last evaluation.
@@ -211,14 +236,25 @@ impl Simulation {
         }
     }
 
-    /// Records the drag during a part `share` of the step. `find` computes its virial, and its pairs if lines are recorded.
+    /// Records the drag during a part `share` of the step, as [`Simulation::find_drag`] finds it, with lines of its own.
     pub(super) fn record_drag(
         &mut self,
         share: f64,
         find: impl FnOnce(&PairThermostat, &Pool, Option<&mut Vec<Pulls>>) -> [f64; 6],
     ) {
-        let lines = self.records_lines();
-        let Some(mut record) = self.record.take() else { return };
+        let drag = self.find_drag(share, self.records_lines(), find);
+        if let Some(record) = &mut self.record {
+            record.flux.drag.push(Arc::new(drag));
+        }
+    }
+
+    /// The drag during a part `share` of the step. `find` computes its virial, and its pairs for `lines`.
+    pub(super) fn find_drag(
+        &mut self,
+        share: f64,
+        lines: bool,
+        find: impl FnOnce(&PairThermostat, &Pool, Option<&mut Vec<Pulls>>) -> [f64; 6],
+    ) -> Drag {
         let spare = if lines { self.spare.drag.pop() } else { None };
         let mut drag = spare.unwrap_or_default();
         drag.sum = match self.thermostat.pairs() {
@@ -236,8 +272,7 @@ impl Simulation {
                 .flat_map(|pairs| &mut pairs.strengths)
                 .for_each(|strength| *strength *= share);
         }
-        record.flux.drag.push(Arc::new(drag));
-        self.record = Some(record);
+        drag
     }
 }
 

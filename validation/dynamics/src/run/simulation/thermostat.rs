@@ -6,7 +6,7 @@ use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
-use psidpd_core::engine::{Step, Want};
+use psidpd_core::engine::{Pool, Step, Want};
 use psidpd_observe::flux::Drag;
 use psidpd_observe::piece::Piece;
 use std::sync::Arc;
@@ -142,12 +142,13 @@ impl Simulation {
         if !self.is_recording() || !self.has_pair_thermostat() {
             return Ok(());
         }
-        if self.records_lines() && !self.engine().plan().drag_is_within_forces() {
+        let v = self.particles.now().v.clone();
+        if self.records_lines() && !self.has_forces_here() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
             thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
-            self.record_drag_at(1.0, &self.particles.now().v.clone());
+            self.record_drag_at(1.0, &v);
         } else {
-            self.record_drag_in_forces();
+            self.record_drag_in_forces(self.tally().drag_virial, 1.0, &v);
         }
         Ok(())
     }
@@ -255,27 +256,35 @@ impl Simulation {
         // Implicit drag ends a step: that is half of it.
         let part = if heat.update == Update::ImplicitDrag { 0.5 } else { 1.0 };
         let part = part * (heat.time / dt).min(1.0);
+        let mut held = None;
         if let Some(mut acting) = before {
-            let v = &self.particles.now().v;
             match heat.update {
                 // Drag at the velocities in the middle.
                 Update::Midpoint => {
-                    for (b, v) in acting.iter_mut().zip(v) {
+                    for (b, v) in acting.iter_mut().zip(&self.particles.now().v) {
                         (0..3).for_each(|c| b[c] = 0.5 * (b[c] + v[c]));
                     }
-                    self.record_drag_at(part, &acting);
+                    match self.records_lines() && self.has_forces_here() {
+                        true => {
+                            let holds = heat.time > dt && self.holds_lines();
+                            let drags = |pairs: &PairThermostat, pool: &Pool, pulls: Option<&mut _>| {
+                                pairs.drags(pool, &acting, pulls)
+                            };
+                            let drag = self.find_drag(part, holds, drags);
+                            self.record_drag_in_forces(drag.sum, part, &acting);
+                            held = Some(drag);
+                        }
+                        false => self.record_drag_at(part, &acting),
+                    }
                 }
-                Update::ImplicitDrag => {
-                    acting.copy_from_slice(v);
-                    self.record_drag_at(part, &acting);
-                }
+                Update::ImplicitDrag => self.record_drag_at(part, &self.particles.now().v.clone()),
                 Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => {
                     self.record_drag(part, |pairs, pool, pulls| pairs.pulls(pool, pulls));
                 }
             }
         }
         if recording && heat.time > dt {
-            self.hold_drag();
+            self.hold_drag(held);
         }
         Ok(())
     }

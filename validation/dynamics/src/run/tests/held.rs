@@ -3,7 +3,7 @@
 use super::*;
 use crate::integrator::Coupling;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_observe::Recorded;
+use psidpd_observe::{Observers, Recorded};
 
 const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n";
 
@@ -78,5 +78,36 @@ fn rows_do_not_depend_on_other_rows() {
         for row in rows(thermo).lines() {
             assert!(all.lines().any(|line| line == row), "{thermo}: {row}");
         }
+    }
+}
+
+/// A sample has the same bits whether steps around it are recorded or not: at every fifth step, with an action at every fourth, all
+/// phases are sampled, one at a time.
+#[test]
+fn samples_do_not_depend_on_what_other_steps_record() {
+    for (integrator, every) in [("two-stage", 5), ("force-gradient", 5), ("force-gradient", 4), ("aboba", 3)]
+    {
+        let rest = format!(
+            "[[stage]]\nname = \"run\"\nsteps = 40\ndt = 0.02\nintegrator = \"{integrator}\"\nthermostat_every = 4\n\
+             [observe]\nevery = {every}\nstress_profile = {{ axis = \"z\", bins = 5 }}\npressure = true\n"
+        );
+        let scene = scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, &rest).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        run_scene(&scene, &out, &mut |_| {}).unwrap();
+        let found = std::fs::read_to_string(out.join("observables.json")).unwrap();
+        let stage = &scene.stages[0];
+        let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
+        let mut run = scene.simulation_of_run(scene.initial_state(), std::num::NonZeroUsize::MIN).unwrap();
+        scene.enter(stage, &mut run).unwrap();
+        run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
+        run.record_flux(Recorded::Lines);
+        for _ in 0..stage.steps {
+            run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+            observers.sample(run.view(run.step_number() as f64 * stage.dt), &stage.name);
+        }
+        let expected = serde_json::to_value(observers.finish()).unwrap();
+        let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+        assert!(expected == found, "{integrator} {every}: {expected} {found}");
     }
 }
