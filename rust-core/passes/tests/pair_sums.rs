@@ -7,8 +7,8 @@ use psidpd_passes::plane::listed_noise::{Drawn, ListedNoise};
 use psidpd_passes::plane::pair_sums::{Noise, Wide, add_pairs};
 use psidpd_passes::settings::Instructions;
 
-const OWN: usize = 40;
-const ALL: usize = 150;
+const OWN: usize = 80;
+const ALL: usize = 250;
 /// Number of particles before those of the plane.
 const FIRST: usize = 9;
 
@@ -16,6 +16,7 @@ fn uniform(k: usize) -> f64 {
     f64::from(threefry2x32::<20>([k as u32, 0], [7, 7])[0]) / 4_294_967_296.0 - 0.5
 }
 
+/// More pairs than noise is drawn for at once.
 fn list(own: usize, j_from: usize) -> PairList {
     let mut list = PairList::default();
     list.clear(FIRST, j_from);
