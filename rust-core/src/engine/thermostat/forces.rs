@@ -7,7 +7,7 @@ use crate::engine::sweep::Pool;
 
 impl PairThermostat {
     /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their
-    /// virial, if it is wanted.
+    /// virial, if it is requested.
     pub fn add_forces(
         &mut self,
         pool: &Pool,

@@ -26,6 +26,7 @@ mod exchange;
 mod fixed;
 mod forces;
 mod labels;
+mod mass;
 mod measure;
 mod midpoint;
 mod of_forces;
@@ -36,6 +37,7 @@ mod pulls;
 mod rank;
 mod sequential;
 mod solution;
+mod virial;
 mod weights;
 
 #[cfg(test)]
@@ -55,6 +57,7 @@ use distances::Distances;
 use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
 use labels::Labels;
+use mass::Mass;
 use on_fixed::OnFixed;
 use pass::{Sums, fill};
 use psidpd_passes::instruction_set::InstructionSet;
@@ -102,7 +105,7 @@ pub struct PairThermostat {
     labels: Labels,
     sums: Sums,
     solution: Solution,
-    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if the virial is wanted.
+    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if the virial is requested.
     impulses: Vec<Vec<f64>>,
     effort: Effort,
     /// Whether updates compute their virial.
@@ -113,20 +116,6 @@ pub struct PairThermostat {
     exchange: Exchange,
     /// Noise of the pairs, and noise for other random numbers of a rule, once they are drawn.
     noise: Option<([PairNoise; 2], Law)>,
-}
-
-/// The mass of a particle.
-#[derive(Debug, Clone, Copy, Default)]
-struct Mass {
-    /// The mass, or 0 if it is infinite.
-    inertia: f64,
-    inverse: f64,
-}
-
-impl Mass {
-    fn new(mass: f64) -> Mass {
-        Mass { inertia: if mass.is_finite() { mass } else { 0.0 }, inverse: mass.recip() }
-    }
 }
 
 impl PairThermostat {
@@ -261,7 +250,7 @@ impl PairThermostat {
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
-    /// virial of the impulses over Δt, if it is wanted.
+    /// virial of the impulses over Δt, if it is requested.
     pub fn act(&mut self, pool: &Pool, update: Update, v: &mut [[f64; 3]]) -> [f64; 6] {
         self.assert_pairs();
         match update {

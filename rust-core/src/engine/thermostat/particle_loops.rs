@@ -1,6 +1,6 @@
 //! The loops of conjugate gradients over the particles of a plane.
 
-use super::Mass;
+use super::mass::Mass;
 use crate::engine::vectors::Loop;
 use psidpd_passes::plane::pair_sums::Wide;
 use std::hint::black_box;

@@ -29,7 +29,7 @@ pub struct Rank<'a> {
 /// The host's task for the next round.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Need {
-    /// No task: the velocities are final. Contains the virial of this rank, if it is wanted.
+    /// No task: the velocities are final. Contains the virial of this rank, if it is requested.
     Nothing([f64; 6]),
     /// Sum these numbers over all ranks.
     Totals([f64; 3]),

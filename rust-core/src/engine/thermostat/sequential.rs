@@ -4,10 +4,11 @@
 //! in an order of their own: every second plane first. These run at once, as no two of them share
 //! particles. The order depends on positions and tags alone.
 
+use super::PairThermostat;
 use super::distances::Distances;
 use super::encounter::Encounter;
-use super::pass::add_virial;
-use super::{Mass, PairThermostat};
+use super::mass::Mass;
+use super::virial::add_virial;
 use crate::engine::sweep::{PlanePairs, Pool};
 use psidpd_passes::noise::Law;
 use psidpd_passes::plane::list::pairs_of_each;
@@ -32,7 +33,7 @@ struct Share<'a> {
     of_own: &'a [Mass],
     of_next: &'a [Mass],
     virial: [f64; 6],
-    /// Factor of `g` in the impulse of each pair without its noise, if the virial is wanted.
+    /// Factor of `g` in the impulse of each pair without its noise, if the virial is requested.
     impulses: &'a mut Vec<f64>,
 }
 
