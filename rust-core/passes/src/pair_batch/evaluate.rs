@@ -99,7 +99,7 @@ unsafe fn measure_pairs<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
                 A::pair_geometry::<false>(&metric, packed, i_particles, i, j, false)
             };
             (*pairs).geometry = geometry;
-            if constants.with_tags {
+            if constants.noise.is_some() {
                 tags.tags[0].store(p_tags[0].add(k));
                 tags.tags[1].store(p_tags[1].add(k));
             }

@@ -12,8 +12,6 @@ pub struct StepConstants<I: Isa, A: Arithmetic<I>> {
     pub metric: A::Metric,
     /// The noise, if the thermostat acts in this step.
     pub noise: Option<PairNoise>,
-    /// Whether tags of pairs are needed.
-    pub with_tags: bool,
     /// Factor that turns signed random words into `ξ dt^{−1/2}`.
     pub noise_scale: A::Reals,
     /// The numbers 0, 1, 2 … of the lanes.
@@ -21,12 +19,10 @@ pub struct StepConstants<I: Isa, A: Arithmetic<I>> {
 }
 
 impl<I: Isa, A: Arithmetic<I>> StepConstants<I, A> {
-    /// Pairs that are `listed` need tags without noise.
-    ///
     /// # Safety
     /// The caller fulfils the contract of `simd`.
     #[inline(always)]
-    pub unsafe fn new(inputs: &PairInputs<A::Scalar, A::PackedParticle>, listed: bool) -> Self {
+    pub unsafe fn new(inputs: &PairInputs<A::Scalar, A::PackedParticle>) -> Self {
         // SAFETY: no vector has more than sixteen lanes.
         unsafe {
             let thermostat = inputs.thermostat.filter(|_| inputs.terms.thermostat.is_some());
@@ -37,7 +33,7 @@ impl<I: Isa, A: Arithmetic<I>> StepConstants<I, A> {
                 *lane = A::Scalar::of(k as f64);
             }
             let (metric, lane) = (A::metric(inputs.geometry), A::Reals::load(lane.as_ptr()));
-            StepConstants { metric, noise, with_tags: listed || noise.is_some(), noise_scale, lane }
+            StepConstants { metric, noise, noise_scale, lane }
         }
     }
 }

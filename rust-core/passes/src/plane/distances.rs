@@ -120,7 +120,7 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Counter<'_, I, MULTIS
             let sure = I::F32::constant((0.5 - shells.error).powi(2));
             let mut k = 0;
             while k < batch.count {
-                let PairsAt { geometry, species_pair, .. } = computed.at(k);
+                let PairsAt { geometry, species_pair } = computed.at(k);
                 let place = (geometry.r * per_length - half).larger(I::F32::constant(0.0)).smaller(beyond);
                 // Whichever is chosen between two shells, such a pair is unsure.
                 let nearest = place.round();

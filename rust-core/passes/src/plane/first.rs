@@ -16,7 +16,7 @@ use crate::pair_batch::inputs::PairInputs;
 use crate::pair_batch::scatter::{scatter_forces, scatter_weights};
 use crate::pair_batch::step_constants::StepConstants;
 use crate::pair_search::buffers::SearchBuffers;
-use crate::simd::{Isa, Kernel, Reals, Words, run};
+use crate::simd::{Isa, Kernel, Reals, run};
 use crate::tally::Tally;
 use std::ops::Range;
 
@@ -51,7 +51,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
             rim.clear(passes, 0);
         }
         let PairBuffers { search, batch, lists } = buffers;
-        let constants = StepConstants::<I, A>::new(inputs, listed.is_some());
+        let constants = StepConstants::<I, A>::new(inputs);
         let mut pass = FirstPass::<I, A, MULTISPECIES, TALLY> {
             inputs,
             constants,
@@ -93,18 +93,16 @@ struct FirstPass<'a, I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
 struct Computed {
     /// [`PairVector`]s of the instruction set.
     pairs: *const u8,
-    tags: [*const u32; 2],
 }
 
 impl<I: Isa, A: Arithmetic<I>> VectorsOfPairs<I, A> for Computed {
     #[inline(always)]
     unsafe fn at(&self, k: usize) -> PairsAt<A::Reals> {
-        // SAFETY: the caller promises a number of a pair; the arrays have whole vectors.
+        // SAFETY: the caller promises a number of a pair; the array has whole vectors.
         unsafe {
             let pairs = self.pairs.cast::<PairVector<A::Reals>>();
             let PairVector { geometry, species_pair } = *pairs.add(k / A::Reals::LANES);
-            let tags = [Words::load(self.tags[0].add(k)), Words::load(self.tags[1].add(k))];
-            PairsAt { geometry, species_pair, tags }
+            PairsAt { geometry, species_pair }
         }
     }
 }
@@ -157,9 +155,7 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 &mut self.tally,
             );
             if let Some(terms) = self.listed {
-                let [a, b] = &buffers.tags;
-                let computed =
-                    Computed { pairs: buffers.pairs.as_ptr().cast(), tags: [a.as_ptr(), b.as_ptr()] };
+                let computed = Computed { pairs: buffers.pairs.as_ptr().cast() };
                 let list = self.lists.of(batch);
                 let is_double = size_of::<A::Scalar>() == size_of::<f64>();
                 run(self.set, Append::<MULTISPECIES> { list, terms, batch, computed, is_double });

@@ -210,7 +210,7 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
             let zero = I::F32::constant(0.0);
             let mut k = 0;
             while k < batch.count {
-                let PairsAt { geometry, species_pair, .. } = computed.at(k);
+                let PairsAt { geometry, species_pair } = computed.at(k);
                 let mut sum = zero;
                 let mut t = 0;
                 while t < terms.soft.len() {

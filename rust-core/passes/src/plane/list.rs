@@ -10,7 +10,7 @@ use crate::pair_batch::batch::Batch;
 use crate::pair_batch::room::make_room;
 use crate::pair_batch::thermostat::ThermostatWeight;
 use crate::pair_search::buffers::SearchBuffers;
-use crate::simd::{Isa, Kernel, OFFSET_BITS, Reals, Scalar, Words, run};
+use crate::simd::{Isa, Kernel, OFFSET_BITS, Quad, Reals, Words, run};
 use psidpd_model::kernel::Real;
 use psidpd_threads::SharedSlice;
 use std::ops::Range;
@@ -47,6 +47,44 @@ impl ExactPair {
     }
 }
 
+/// A pair in either precision.
+pub trait Entry {
+    /// Index of the second particle, as that of [`Pair`].
+    fn j(&self) -> usize;
+    /// The vector `g`, and 0.
+    ///
+    /// # Safety
+    /// The caller fulfils the contract of `simd`.
+    unsafe fn g<I: Isa>(&self) -> I::Quad;
+}
+
+impl Entry for Pair {
+    #[inline(always)]
+    fn j(&self) -> usize {
+        // SAFETY: it is a reference. The read is volatile: otherwise the compiler loads it together with `g`, and extracts it.
+        unsafe { (&raw const self.j).read_volatile() as usize }
+    }
+
+    #[inline(always)]
+    unsafe fn g<I: Isa>(&self) -> I::Quad {
+        // SAFETY: `j`, which has the same size, follows the three numbers of `g`.
+        unsafe { I::Quad::load_three_f32((&raw const *self).cast()) }
+    }
+}
+
+impl Entry for ExactPair {
+    #[inline(always)]
+    fn j(&self) -> usize {
+        ExactPair::j(self) as usize
+    }
+
+    #[inline(always)]
+    unsafe fn g<I: Isa>(&self) -> I::Quad {
+        // SAFETY: `j` follows the three numbers of `g`, and the size of the structure is that of four numbers.
+        unsafe { I::Quad::load_three((&raw const *self).cast()) }
+    }
+}
+
 /// Pairs whose first particles follow each other in the order of cells, sorted by first particle.
 #[derive(Debug, Clone, Default)]
 pub struct PairList {
@@ -58,15 +96,10 @@ pub struct PairList {
     pub start: Vec<u32>,
     /// The pairs in single precision; empty if they are listed in double precision.
     pub pairs: Vec<Pair>,
-    /// Tags of both particles of each pair.
-    pub tags: [Vec<u32>; 2],
     /// The pairs in double precision, if these have been computed; otherwise empty.
     pub exact: Vec<ExactPair>,
-    /// Ratio `r/|g|` of each pair; empty unless requested.
-    pub stretch: Vec<f64>,
-    /// Noise of each pair; of another list until it is drawn.
-    pub xi: Vec<f32>,
-    scratch: Scratch,
+    /// For each vector of pairs of a batch the mask of those that are kept, and the number of those kept before.
+    kept: Vec<[u32; 2]>,
 }
 
 /// The listed pairs of owned particles of a plane, or of a part of it.
@@ -98,15 +131,6 @@ impl Listed {
     }
 }
 
-/// Scratch arrays of a batch that is listed.
-#[derive(Debug, Clone, Default)]
-struct Scratch {
-    /// For each vector of pairs the mask of those that are kept, and the number of those kept before.
-    kept: Vec<[u32; 2]>,
-    /// Ratio `|g|/r` of each kept pair, if requested.
-    per_distance: Vec<f64>,
-}
-
 /// The particles of a plane, counted from its first, each with the range of its pairs in the list.
 #[inline(always)]
 pub fn pairs_of_each(
@@ -122,9 +146,7 @@ impl PairList {
         self.start.clear();
         self.start.push(0);
         self.pairs.clear();
-        self.tags.iter_mut().for_each(Vec::clear);
         self.exact.clear();
-        self.stretch.clear();
     }
 
     /// Appends a list whose particles follow.
@@ -133,14 +155,17 @@ impl PairList {
         let count = self.count() as u32;
         self.start.extend(next.start.iter().skip(1).map(|start| count + start));
         self.pairs.extend_from_slice(&next.pairs);
-        self.tags.iter_mut().zip(&next.tags).for_each(|(tags, next)| tags.extend_from_slice(next));
         self.exact.extend_from_slice(&next.exact);
-        self.stretch.extend_from_slice(&next.stretch);
     }
 
     /// Number of pairs.
     pub fn count(&self) -> usize {
-        self.tags[0].len()
+        self.pairs.len().max(self.exact.len())
+    }
+
+    /// Number of particles that may be the first of a pair.
+    pub fn particles(&self) -> usize {
+        self.start.len().saturating_sub(1)
     }
 
     /// Gives no pairs to the particles before `place` that are not listed yet.
@@ -180,17 +205,16 @@ impl WeightTables<f64> {
     }
 }
 
-/// The pairs that are listed, and whether `r/|g|` is requested.
+/// The pairs that are listed.
 #[derive(Debug, Clone)]
 pub struct ListTerms {
     mixed: WeightTables<f32>,
     double: WeightTables<f64>,
-    with_stretch: bool,
 }
 
 impl ListTerms {
     /// In single precision all ranges are longer by the fraction `margin`.
-    pub fn new(double: WeightTables<f64>, margin: f64, with_stretch: bool) -> ListTerms {
+    pub fn new(double: WeightTables<f64>, margin: f64) -> ListTerms {
         let table = |table: &SpeciesPairTable<f64>, factor: f64| {
             SpeciesPairTable::new((0..table.count()).map(|k| (table[k] * factor).min(f32::MAX.into()) as f32))
         };
@@ -205,7 +229,7 @@ impl ListTerms {
                 Exponent::Any(exponent) => Exponent::Any(table(exponent, 1.0)),
             },
         };
-        ListTerms { mixed, double, with_stretch }
+        ListTerms { mixed, double }
     }
 
     pub fn species(&self) -> usize {
@@ -218,7 +242,6 @@ pub struct PairsAt<R: Reals> {
     pub geometry: PairGeometry<R>,
     /// Read only with several species.
     pub species_pair: SpeciesPair<R>,
-    pub tags: [R::Words; 2],
 }
 
 /// The pairs of a batch, a vector at a time.
@@ -239,8 +262,6 @@ pub trait ListArithmetic<I: Isa>: Arithmetic<I> {
     fn pairs(list: &mut PairList) -> &mut Vec<Self::Pair>;
     /// Numbers that have the words as bits.
     unsafe fn of_words(words: <Self::Reals as Reals>::Words) -> Self::Reals;
-    /// Writes the words of `mask`, followed by others, a vector in all.
-    unsafe fn store_kept(words: <Self::Reals as Reals>::Words, mask: u32, to: *mut u32);
 }
 
 impl<I: Isa> ListArithmetic<I> for Mixed {
@@ -260,12 +281,6 @@ impl<I: Isa> ListArithmetic<I> for Mixed {
     unsafe fn of_words(words: <I::F32 as Reals>::Words) -> I::F32 {
         // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
         unsafe { I::of_bits(words) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_kept(words: <I::F32 as Reals>::Words, mask: u32, to: *mut u32) {
-        // SAFETY: the caller fulfils the contract of `simd`, and promises room for a vector.
-        unsafe { I::of_bits(words).compress(mask).store(to.cast()) }
     }
 }
 
@@ -287,12 +302,6 @@ impl<I: Isa> ListArithmetic<I> for Double {
         // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
         unsafe { I::F64::encode(words) }
     }
-
-    #[inline(always)]
-    unsafe fn store_kept(words: <I::F64 as Reals>::Words, mask: u32, to: *mut u32) {
-        // SAFETY: the caller fulfils the contract of `simd`, and promises room for a vector.
-        unsafe { I::halves(I::F64::encode(words).compress(mask))[0].store(to) }
-    }
 }
 
 /// Appends the pairs of a batch within their range to a list.
@@ -313,27 +322,20 @@ pub unsafe fn append_batch<I: Isa, A: ListArithmetic<I>, const MULTISPECIES: boo
     // SAFETY: room for more pairs than there are has been made.
     let to_pairs = unsafe { pairs.as_mut_ptr().add(before) };
     let j_from = (list.j_from as u32) << OFFSET_BITS;
-    let PairList { start, tags: [a, b], stretch, scratch: Scratch { kept, per_distance }, .. } = list;
+    let PairList { start, kept, .. } = list;
     let (lanes, tables) = (A::Reals::LANES, A::tables(terms));
     make_room(start, batch.members);
-    make_room(a, room);
-    make_room(b, room);
     kept.resize(kept.len().max(room), [0; 2]);
-    if terms.with_stretch {
-        per_distance.resize(per_distance.len().max(room), 0.0);
-    }
     // SAFETY: the search pads lists of the batch; room for all its pairs and a vector has been reserved, and `found`
     // written pairs are initialised. The caller promises the rest.
     unsafe {
         let weight = ThermostatWeight::<A::Reals>::new(&tables.inverse_range, &tables.exponent);
         let amplitude = TableLookup::<A::Reals>::new(&tables.amplitude);
-        let to_tags = [a.as_mut_ptr().add(before), b.as_mut_ptr().add(before)];
-        let per_distance = per_distance.as_mut_ptr().cast::<A::Scalar>();
         let j_from = <A::Reals as Reals>::Words::splat(j_from);
         let mut found = 0;
         let mut k = 0;
         while k < batch.count {
-            let PairsAt { geometry, species_pair, tags } = vectors.at(k);
+            let PairsAt { geometry, species_pair } = vectors.at(k);
             let w = weight.weight::<MULTISPECIES>(geometry.r, species_pair);
             let factor = amplitude.lookup::<MULTISPECIES>(species_pair) * w * geometry.inverse;
             let mut mask = A::Reals::constant(0.0).mask_below(factor);
@@ -346,11 +348,6 @@ pub unsafe fn append_batch<I: Isa, A: ListArithmetic<I>, const MULTISPECIES: boo
             let j = j.sub(j_from).shift_right::<OFFSET_BITS>();
             let columns = [factor * dx, factor * dy, factor * dz, A::of_words(j)];
             A::Reals::store_rows(columns, mask, to_pairs.add(found).cast());
-            A::store_kept(tags[0], mask, to_tags[0].add(found));
-            A::store_kept(tags[1], mask, to_tags[1].add(found));
-            if terms.with_stretch {
-                factor.compress(mask).store(per_distance.add(found));
-            }
             found += mask.count_ones() as usize;
             k += lanes;
         }
@@ -361,11 +358,6 @@ pub unsafe fn append_batch<I: Isa, A: ListArithmetic<I>, const MULTISPECIES: boo
             let [mask, found] = *kept.get_unchecked(at / lanes);
             let below = mask & !(u32::MAX << (at % lanes));
             start.push(before as u32 + found + below.count_ones());
-        }
-        a.set_len(before + found);
-        b.set_len(before + found);
-        if terms.with_stretch {
-            stretch.extend((0..found).map(|k| (*per_distance.add(k)).wide().recip()));
         }
         A::pairs(list).set_len(before + found);
     }
@@ -493,7 +485,7 @@ impl<I: Isa, const MULTISPECIES: bool> VectorsOfPairs<I, Mixed> for Computed<'_,
             } else {
                 SpeciesPair(i)
             };
-            PairsAt { geometry, species_pair, tags: tags.tags }
+            PairsAt { geometry, species_pair }
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Sums over the listed pairs of a plane.
 
-use super::list::{ExactPair, Listed, Pair, PairList};
+use super::list::{Entry, Listed, PairList};
+use super::listed_noise::{Drawn, ListedNoise};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, prefetch, run};
+use std::ops::Range;
 
 /// A vector in the size of a register, which no line of the cache ends in; the fourth component is 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -29,98 +31,86 @@ impl std::ops::DerefMut for Wide {
     }
 }
 
-/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i` of a plane, without noise if `a = 0`.
+/// The noise of sums over pairs.
+#[derive(Debug, Clone, Copy)]
+pub struct Noise<'a> {
+    pub amplitude: f64,
+    pub of_pairs: ListedNoise<'a>,
+}
+
+/// Computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i` of a plane, perhaps with `noise` of the amplitude `a`.
 ///
 /// A pair of two owned particles adds the opposite to the sum of `j`; ghosts have no sums. `all` has a vector for each sorted
-/// particle; of those from `first` on, `sums` has entries for the particles of the plane, followed by those of the next.
+/// particle; of those from `first` on, `sums` has entries for the particles of the plane, followed by those of the next. `drawn` is
+/// scratch for noise.
 ///
 /// # Safety
-/// The arrays have entries for all particles of the lists.
+/// The arrays have entries for all particles of the lists, those of the noise too.
 ///
 /// # Panics
-/// Panics if there is noise that has not been drawn for all pairs, and if pairs with ghosts are not in double precision.
+/// Panics if pairs with ghosts are not in double precision.
 pub unsafe fn add_pairs(
     set: InstructionSet,
     lists: &Listed,
-    noise: f64,
+    noise: Option<Noise>,
     all: &[Wide],
     first: usize,
     sums: &mut [Wide],
+    drawn: &mut Drawn,
 ) {
     let p = &all[first..];
     let Listed { own, with_ghosts } = lists;
     match own.exact.is_empty() {
-        true => add::<_, true>(set, own, &own.pairs, noise, [p, p], sums),
-        false => add::<_, true>(set, own, &own.exact, noise, [p, p], sums),
+        true => add::<_, true>(set, own, &own.pairs, noise, [p, p], sums, drawn),
+        false => add::<_, true>(set, own, &own.exact, noise, [p, p], sums, drawn),
     }
     if with_ghosts.start.last().is_some_and(|end| *end > 0) {
-        add::<_, false>(set, with_ghosts, &with_ghosts.exact, noise, [p, all], sums);
+        add::<_, false>(set, with_ghosts, &with_ghosts.exact, noise, [p, all], sums, drawn);
     }
 }
 
 /// Sums over the pairs of owned particles, with `BOTH`, or adds those with ghosts; `p` has the vectors of first and of second particles.
 fn add<P: Entry, const BOTH: bool>(
     set: InstructionSet,
-    PairList { start, xi, .. }: &PairList,
+    list: &PairList,
     pairs: &[P],
-    noise: f64,
+    noise: Option<Noise>,
     p: [&[Wide]; 2],
     sums: &mut [Wide],
+    drawn: &mut Drawn,
 ) {
+    let (start, count) = (&list.start[..], list.particles());
     assert!(pairs.len() == start.last().map_or(0, |end| *end as usize), "pairs in this precision");
-    let task = AddPairs { start, pairs, xi, noise, p, sums };
-    // SAFETY: `InstructionSet` guarantees the instructions, the caller of `add_pairs` the particles.
-    unsafe {
-        match noise == 0.0 {
-            true => run(set, WithNoise::<P, BOTH, false>(task)),
-            false => run(set, WithNoise::<P, BOTH, true>(task)),
-        }
+    let Some(Noise { amplitude, of_pairs }) = noise.filter(|_| count > 0) else {
+        let task = AddPairs { start, particles: 0..count, pairs, xi: &[], noise: 0.0, p, sums };
+        // SAFETY: `InstructionSet` guarantees the instructions, the caller of `add_pairs` the particles.
+        return unsafe { run(set, WithNoise::<P, BOTH, false>(task)) };
+    };
+    let mut from = 0;
+    while from < count {
+        let enough = start[from].saturating_add(DRAWN);
+        let to = from + 1 + start[from + 1..count].partition_point(|end| *end < enough);
+        // SAFETY: the caller of `add_pairs` promises tags of the particles.
+        unsafe { of_pairs.draw(list, from..to, drawn) };
+        let (particles, xi, sums) = (from..to, &drawn.xi[..], &mut *sums);
+        let task = AddPairs { start, particles, pairs, xi, noise: amplitude, p, sums };
+        // SAFETY: as above.
+        unsafe { run(set, WithNoise::<P, BOTH, true>(task)) };
+        from = to;
     }
 }
+
+/// Number of pairs whose noise is drawn at once.
+const DRAWN: u32 = 1024;
 
 /// Bytes of the list that are asked for ahead of the present pair. The list of 50 000 particles does not fit into the caches of
 /// a core; there the midpoint rule takes 20 % less time with it, and with 6 000 particles as much as without.
 const AHEAD: usize = 2048;
 
-/// A pair in either precision.
-trait Entry {
-    fn j(&self) -> usize;
-    /// The vector `g`, and 0.
-    ///
-    /// # Safety
-    /// The caller fulfils the contract of `simd`.
-    unsafe fn g<I: Isa>(&self) -> I::Quad;
-}
-
-impl Entry for Pair {
-    #[inline(always)]
-    fn j(&self) -> usize {
-        // SAFETY: it is a reference. The read is volatile: otherwise the compiler loads it together with `g`, and extracts it.
-        unsafe { (&raw const self.j).read_volatile() as usize }
-    }
-
-    #[inline(always)]
-    unsafe fn g<I: Isa>(&self) -> I::Quad {
-        // SAFETY: `j`, which has the same size, follows the three numbers of `g`.
-        unsafe { I::Quad::load_three_f32((&raw const *self).cast()) }
-    }
-}
-
-impl Entry for ExactPair {
-    #[inline(always)]
-    fn j(&self) -> usize {
-        ExactPair::j(self) as usize
-    }
-
-    #[inline(always)]
-    unsafe fn g<I: Isa>(&self) -> I::Quad {
-        // SAFETY: `j` follows the three numbers of `g`, and the size of the structure is that of four numbers.
-        unsafe { I::Quad::load_three((&raw const *self).cast()) }
-    }
-}
-
+/// Pairs of some of the particles of a list; `xi` has their noise.
 struct AddPairs<'a, P> {
     start: &'a [u32],
+    particles: Range<usize>,
     pairs: &'a [P],
     xi: &'a [f32],
     noise: f64,
@@ -128,7 +118,7 @@ struct AddPairs<'a, P> {
     sums: &'a mut [Wide],
 }
 
-/// With `BOTH` the sums begin at zero, and the opposite is added to second particles.
+/// With `BOTH` the sums begin at zero before the first particle, and the opposite is added to second particles.
 struct WithNoise<'a, P, const BOTH: bool, const NOISE: bool>(AddPairs<'a, P>);
 
 impl<P: Entry, const BOTH: bool, const NOISE: bool> Kernel for WithNoise<'_, P, BOTH, NOISE> {
@@ -136,18 +126,20 @@ impl<P: Entry, const BOTH: bool, const NOISE: bool> Kernel for WithNoise<'_, P, 
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let AddPairs { start, pairs, xi, noise, p, sums } = self.0;
-        assert!(p[0].len() >= start.len() - 1 && sums.len() >= start.len() - 1, "particles of the list");
-        assert!(!NOISE || xi.len() >= pairs.len(), "noise of the pairs");
-        if BOTH {
+        let AddPairs { start, particles, pairs, xi, noise, p, sums } = self.0;
+        assert!(p[0].len() >= particles.end && sums.len() >= particles.end, "particles of the list");
+        let ends = &start[particles.start..particles.end + 1];
+        let of_these = (ends[ends.len() - 1] - ends[0]) as usize;
+        assert!(!NOISE || xi.len() >= of_these, "noise of the pairs");
+        if BOTH && particles.start == 0 {
             sums.fill(Wide::ZERO);
         }
         let ([p, second], sums) = (p.map(<[Wide]>::as_ptr), sums.as_mut_ptr());
         // SAFETY: `start` has indices of pairs, and these have particles that the arrays contain.
         unsafe {
             let (minus_noise, first) = (I::Quad::splat(-noise), pairs.as_ptr());
-            let (mut next, mut xi) = (first, xi.as_ptr());
-            for (i, end) in start.iter().skip(1).enumerate() {
+            let (mut next, mut xi) = (first.add(ends[0] as usize), xi.as_ptr());
+            for (i, end) in particles.zip(&ends[1..]) {
                 let end = first.add(*end as usize);
                 let at = I::Quad::load(p.add(i).cast());
                 let mut sum = I::Quad::load(sums.add(i).cast());

@@ -55,7 +55,7 @@ impl Ranges {
             inverse_range: WeightTables::inverse_ranges(&self.table),
             exponent: Exponent::One,
         };
-        ListTerms::new(weights, MARGIN, false)
+        ListTerms::new(weights, MARGIN)
     }
 }
 

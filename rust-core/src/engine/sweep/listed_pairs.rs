@@ -9,14 +9,12 @@ pub struct ListedFor {
     pub plan: ThermostatPlan,
     /// The time that it acts for.
     pub dt: f64,
-    /// Whether distances are stored.
-    pub virial: bool,
 }
 
 impl ListedFor {
-    /// Whether these pairs are those of a thermostat for a time `dt`, perhaps with distances beside.
-    pub fn serves(&self, plan: &ThermostatPlan, dt: f64, virial: bool) -> bool {
-        self.dt == dt && (self.virial || !virial) && self.plan == *plan
+    /// Whether these pairs are those of a thermostat for a time `dt`.
+    pub fn serves(&self, plan: &ThermostatPlan, dt: f64) -> bool {
+        self.dt == dt && self.plan == *plan
     }
 }
 

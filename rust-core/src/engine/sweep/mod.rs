@@ -122,9 +122,9 @@ pub struct ListedPairs<'a> {
 }
 
 impl ListedPairs<'_> {
-    /// Whether the pairs are those of a thermostat for a time `dt` between particles at `x`, perhaps with distances beside.
-    pub fn serve(&self, plan: &ThermostatPlan, dt: f64, virial: bool, x: &[[f64; 3]]) -> bool {
-        self.listed.serves(plan, dt, virial) && self.positions == of_positions(x)
+    /// Whether the pairs are those of a thermostat for a time `dt` between particles at `x`.
+    pub fn serve(&self, plan: &ThermostatPlan, dt: f64, x: &[[f64; 3]]) -> bool {
+        self.listed.serves(plan, dt) && self.positions == of_positions(x)
     }
 
     /// Moves the pairs to `lists` and `planes`. Particles of a cell are in the order of the host.

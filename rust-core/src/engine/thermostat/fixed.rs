@@ -4,7 +4,7 @@
 //! others lost.
 
 use super::PairThermostat;
-use super::pass::Sums;
+use super::noise_of;
 use crate::engine::sweep::Pool;
 
 impl PairThermostat {
@@ -25,19 +25,15 @@ impl PairThermostat {
         if !self.on_fixed.is_asked {
             return;
         }
-        let PairThermostat { planes, lists, sums, masses, set, kt, dt, on_fixed, .. } = self;
-        sums.compute(pool, *set, planes, kt.sqrt());
+        let PairThermostat { planes, lists, labels, sums, masses, set, kt, dt, on_fixed, .. } = self;
+        sums.compute(pool, *set, planes, noise_of(self.noise, labels, *kt));
         on_fixed.force.clear();
         on_fixed.force.resize(owned, [0.0; 3]);
         let order = lists.order();
-        let own: Vec<_> = planes.iter().map(|plane| plane.own.clone()).collect();
-        for (own, (image, below)) in own.into_iter().zip(Sums::halves(&mut sums.of_plane, planes)) {
-            for (k, sorted) in own.enumerate() {
-                let Some(force) = on_fixed.force.get_mut(order[sorted] as usize) else { continue };
-                if masses.inverse[sorted] == 0.0 {
-                    let [a, b] = [image[k].0, below.get(k).map_or([0.0; 4], |b| b.0)];
-                    *force = std::array::from_fn(|c| -2.0 / *dt * (a[c] + b[c]));
-                }
+        for ((host, sum), mass) in order.iter().zip(&sums.all).zip(masses) {
+            let Some(force) = on_fixed.force.get_mut(*host as usize) else { continue };
+            if mass.inverse == 0.0 {
+                *force = std::array::from_fn(|c| -2.0 / *dt * sum[c]);
             }
         }
     }

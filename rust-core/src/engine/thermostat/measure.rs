@@ -33,10 +33,10 @@ impl PairThermostat {
         species_of_kind: &[i32],
         is_exact: bool,
     ) {
-        let PairThermostat { plan, dimensions, dt, set, lists, planes, wants_virial, .. } = self;
+        let PairThermostat { plan, dimensions, dt, set, lists, planes, .. } = self;
         let laws = Laws { weights: weights(plan, *dt), least: if is_exact { 0.0 } else { MARGIN } };
         let places = Places::new(*dimensions, domain, particles.x, lists.order());
-        let (set, with_stretch) = (*set, *wants_virial);
+        let set = *set;
         let law = |i: usize, j: usize| match laws.weights.species {
             1 => 0,
             count => {
@@ -53,10 +53,10 @@ impl PairThermostat {
             if is_exact && list.exact.is_empty() {
                 // Each position is read often.
                 let x: Vec<_> = (own.start..own.end + next.len()).map(|k| places.x(k)).collect();
-                measure(list, |k| x[k - own.start], with_stretch, &mut block, law, weigh);
+                measure(list, |k| x[k - own.start], &mut block, law, weigh);
             }
             if with_ghosts.exact.is_empty() {
-                measure(with_ghosts, |k| places.x(k), with_stretch, &mut block, law, weigh);
+                measure(with_ghosts, |k| places.x(k), &mut block, law, weigh);
             }
         });
     }
@@ -67,14 +67,12 @@ impl PairThermostat {
 fn measure(
     list: &mut PairList,
     position: impl Fn(usize) -> [f64; 3],
-    with_stretch: bool,
     block: &mut Block,
     law: impl Fn(usize, usize) -> usize,
     weigh: impl Fn(&mut Block),
 ) {
-    let PairList { first, j_from, start, pairs, tags, exact, stretch, .. } = list;
+    let PairList { first, j_from, start, pairs, exact, .. } = list;
     exact.reserve(pairs.len());
-    stretch.clear();
     // The row of the next pair, and the number of kept pairs.
     let (mut i, mut kept) = (0, 0);
     for from in (0..pairs.len()).step_by(BLOCK) {
@@ -104,19 +102,14 @@ fn measure(
                 continue;
             }
             pairs[kept] = pair;
-            tags.iter_mut().for_each(|tags| tags[kept] = tags[k]);
             kept += 1;
             exact.push(ExactPair::new([factor * x[n], factor * y[n], factor * z[n]], pair.j));
-            if with_stretch {
-                stretch.push(factor.recip());
-            }
         }
     }
     if let Some(rest) = start.get_mut(i + 1..) {
         rest.fill(kept as u32);
     }
     pairs.truncate(kept);
-    tags.iter_mut().for_each(|tags| tags.truncate(kept));
 }
 
 /// A block of pairs, as parallel arrays.

@@ -25,8 +25,9 @@
 //! known from the coefficients of the iterations; they then go on until it is below 1 %.
 
 use super::PairThermostat;
+use super::noise_of;
 use super::particle_loops::{Advance, Finish, Multiply, Share, Start};
-use super::pass::{Sums, Wide, add_to_host, virial};
+use super::pass::{Sums, Wide, add_to_host, close};
 use super::solution::{End, Move, Progress, Solution, TOLERANCE, TOLERANCE_OF_DRAG};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
@@ -41,15 +42,14 @@ impl PairThermostat {
         work: impl Fn(&mut Share, InstructionSet) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
         let PairThermostat { planes, set, masses, sums, solution, .. } = self;
-        let (Sums { p, of_plane }, Solution { change, residual, .. }) = (sums, solution);
-        let mut rest = [&mut p[..], residual, change];
-        let mut shares: Vec<(Share, [f64; 2])> = Sums::halves(of_plane, planes)
-            .zip(planes.iter())
-            .map(|((image, below), plane)| {
+        let (Sums { p, all, .. }, Solution { change, residual, .. }) = (sums, solution);
+        let mut rest = [&mut p[..], all, residual, change];
+        let mut shares: Vec<(Share, [f64; 2])> = planes
+            .iter()
+            .map(|plane| {
                 let own = plane.own.clone();
-                let [p, residual, solution] = rest.each_mut().map(|rest| take(rest, own.len()));
-                let (inertia, inverse_mass) = (&masses.inertia[own.clone()], &masses.inverse[own]);
-                (Share { p, image, below, inertia, inverse_mass, residual, solution }, [0.0; 2])
+                let [p, image, residual, solution] = rest.each_mut().map(|rest| take(rest, own.len()));
+                (Share { p, image, masses: &masses[own], residual, solution }, [0.0; 2])
             })
             .collect();
         pool.each(&mut shares, |(share, sums)| *sums = work(share, *set));
@@ -70,10 +70,9 @@ impl PairThermostat {
         let factor = if noise { 2.0 } else { 1.0 };
         let mut virial = [0.0; 6];
         if self.wants_middle() {
-            let mut at = v.to_vec();
             // After the last iteration, `p` is δ without its residual.
-            add_to_host(pool, &self.lists.place, &self.sums.p, 1.0, &mut at);
-            virial = self.virial_at(pool, &at, v.len(), noise);
+            self.sums.add_of_host(pool, self.lists.order(), v);
+            virial = self.virial_of_vectors(pool, v.len(), noise);
         }
         add_to_host(pool, &self.lists.place, &self.solution.change, factor, v);
         virial
@@ -82,14 +81,15 @@ impl PairThermostat {
     /// Computes the first residual and direction from the velocities `v` of the host, and returns the
     /// square of the residual's norm. On several ranks all sums here are those of one rank.
     pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
-        let PairThermostat { planes, lists, set, sums, solution, kt, .. } = self;
+        let PairThermostat { planes, lists, labels, set, sums, solution, kt, .. } = self;
         let tolerance = if noise { TOLERANCE } else { TOLERANCE_OF_DRAG };
         solution.progress = Progress::new(tolerance);
         for vectors in [&mut solution.residual, &mut solution.change] {
             vectors.resize(lists.order().len(), Wide::ZERO);
         }
         sums.gather(pool, lists.order(), v);
-        sums.compute(pool, *set, planes, if noise { kt.sqrt() } else { 0.0 });
+        let noise = if noise { noise_of(self.noise, labels, *kt) } else { None };
+        sums.compute(pool, *set, planes, noise);
         let [first, _] = self.on_planes(pool, |share, set| [vectors::run(set, Start(share)), 0.0]);
         first
     }
@@ -97,7 +97,7 @@ impl PairThermostat {
     /// Computes the image of the direction, `A p` with `A = M + K`, and returns `p · A p` and
     /// `A p · M⁻¹ A p`.
     pub(super) fn curvature(&mut self, pool: &Pool) -> [f64; 2] {
-        self.sums.compute(pool, self.set, &self.planes, 0.0);
+        self.sums.compute(pool, self.set, &self.planes, None);
         self.on_planes(pool, |share, set| vectors::run(set, Multiply(share)))
     }
 
@@ -127,16 +127,12 @@ impl PairThermostat {
         self.wants_virial || self.on_fixed.is_asked
     }
 
-    /// The virial of drag at the velocities `v`, and of noise; finds the forces on those of the first `owned` particles that have
+    /// The virial of drag at the velocities that `p` has, and of noise; finds the forces on those of the first `owned` particles that have
     /// infinite mass too, if these are asked for.
-    pub(super) fn virial_at(&mut self, pool: &Pool, v: &[[f64; 3]], owned: usize, noise: bool) -> [f64; 6] {
-        let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
-        let with_noise = noise;
-        let noise = if noise { kt.sqrt() } else { 0.0 };
-        sums.gather(pool, lists.order(), v);
-        sums.close(planes);
-        let virial = virial(pool, planes, sums, noise, 2.0 / *dt);
-        if with_noise {
+    pub(super) fn virial_of_vectors(&mut self, pool: &Pool, owned: usize, noise: bool) -> [f64; 6] {
+        close(&self.planes, &mut self.sums.p);
+        let virial = self.virial(pool, noise);
+        if noise {
             self.sum_forces_on_fixed(pool, owned);
         }
         virial

@@ -19,11 +19,14 @@
 //! [`Update`] and its rule in one of these files.
 
 mod bodies;
+mod distances;
 mod effort;
 mod encounter;
 mod exchange;
 mod fixed;
 mod forces;
+mod labels;
+mod mass;
 mod measure;
 mod midpoint;
 mod of_forces;
@@ -34,6 +37,7 @@ mod pulls;
 mod rank;
 mod sequential;
 mod solution;
+mod virial;
 mod weights;
 
 #[cfg(test)]
@@ -49,13 +53,18 @@ use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
 use super::sweep::{ListedPairs, MARGIN, PairLists, PlanePairs, Pool};
+use distances::Distances;
 use encounter::{lowe_andersen, ornstein_uhlenbeck, shardlow};
 use exchange::Exchange;
+use labels::Labels;
+use mass::Mass;
 use on_fixed::OnFixed;
 use pass::{Sums, fill};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::plane::list::ListTerms;
+use psidpd_passes::plane::listed_noise::ListedNoise;
+use psidpd_passes::plane::pair_sums::Noise;
 use psidpd_passes::settings::{Precision, Settings};
 use solution::Solution;
 
@@ -91,28 +100,22 @@ pub struct PairThermostat {
     has_pairs: bool,
     /// Whether pairs are computed in double precision.
     is_exact: bool,
-    masses: Masses,
+    /// Of the sorted particles.
+    masses: Vec<Mass>,
+    labels: Labels,
     sums: Sums,
     solution: Solution,
-    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
+    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if the virial is requested.
     impulses: Vec<Vec<f64>>,
     effort: Effort,
-    /// Whether distances are stored.
+    /// Whether updates compute their virial.
     wants_virial: bool,
     /// Whether the present pairs are those that an evaluation of forces has listed.
     are_of_forces: bool,
     on_fixed: OnFixed,
     exchange: Exchange,
-    /// Noise of the pairs, and noise for other random numbers of a rule.
-    noise: [PairNoise; 2],
-}
-
-/// Masses of the sorted particles.
-#[derive(Debug, Default)]
-struct Masses {
-    /// Mass of each; 0 where it is infinite.
-    inertia: Vec<f64>,
-    inverse: Vec<f64>,
+    /// Noise of the pairs, and noise for other random numbers of a rule, once they are drawn.
+    noise: Option<([PairNoise; 2], Law)>,
 }
 
 impl PairThermostat {
@@ -130,7 +133,8 @@ impl PairThermostat {
             planes: Vec::new(),
             has_pairs: true,
             is_exact: settings.precision == Precision::Double,
-            masses: Masses::default(),
+            masses: Vec::new(),
+            labels: Labels::default(),
             sums: Sums::default(),
             solution: Solution::default(),
             impulses: Vec::new(),
@@ -139,12 +143,11 @@ impl PairThermostat {
             are_of_forces: false,
             on_fixed: OnFixed::default(),
             exchange: Exchange::default(),
-            noise: [PairNoise::default(); 2],
+            noise: None,
         })
     }
 
-    /// Finds the pairs in range, and their `g` for a time `dt`. With `virial` it stores their
-    /// distances, from which [`PairThermostat::act`] computes its virial.
+    /// Finds the pairs in range, and their `g` for a time `dt`. With `virial` [`PairThermostat::act`] computes its virial.
     ///
     /// # Errors
     /// Fails for a position that is not finite, for arrays of different lengths, a species or tag out of range, and for a
@@ -199,20 +202,19 @@ impl PairThermostat {
         particles.check_images(around.images)?;
         (self.dt, self.wants_virial, self.exchange) = (dt, virial, Exchange::default());
         let mut is_long = false;
-        self.take(listed, particles.x, dt, virial);
+        self.noise = None;
+        self.take(listed, particles.x, dt);
         if !self.are_of_forces {
             let range = [self.plan.longest, self.margin()];
             let PairThermostat { plan, lists, planes, .. } = self;
-            let terms = |margin| ListTerms::new(weights::weights(plan, dt), margin, virial);
+            let terms = |margin| ListTerms::new(weights::weights(plan, dt), margin);
             is_long = lists.find(pool, around, particles, species_of_kind, terms, range, planes)?;
         }
         self.measure(pool, around.domain, particles, species_of_kind, self.is_exact || is_long);
+        let PairThermostat { plan, lists, planes, labels, .. } = self;
+        labels.gather(pool, lists.order(), planes, particles, species_of_kind, plan.gamma.len().isqrt());
         let order = self.lists.order();
-        fill(pool, &mut self.masses.inverse, order, |k| mass(k).recip());
-        fill(pool, &mut self.masses.inertia, order, |k| {
-            let m = mass(k);
-            if m.is_finite() { m } else { 0.0 }
-        });
+        fill(pool, &mut self.masses, order, |k| Mass::new(mass(k)));
         self.has_pairs = true;
         Ok(())
     }
@@ -227,27 +229,28 @@ impl PairThermostat {
         if self.is_exact { MARGIN } else { 0.0 }
     }
 
-    /// The pairs for a time `dt`, with or without their distances.
-    fn terms(&self, dt: f64, virial: bool) -> ListTerms {
-        ListTerms::new(weights::weights(&self.plan, dt), self.margin(), virial)
+    /// The pairs for a time `dt`.
+    fn terms(&self, dt: f64) -> ListTerms {
+        ListTerms::new(weights::weights(&self.plan, dt), self.margin())
     }
 
-    /// Draws the noise of the pairs of the last search.
+    /// The distances of the pairs.
+    fn distances(&self) -> Distances<'_> {
+        Distances::new(&self.plan, self.dt, &self.labels.species)
+    }
+
+    /// Draws the noise of the pairs of the last search: sets what it follows from, as each pass over pairs computes it anew.
     ///
     /// # Panics
     /// Panics if the last search has failed, as all that follow here.
-    pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
+    pub fn draw(&mut self, _: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         self.assert_pairs();
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * u16::from(stream.0) + k));
-        self.noise = noise;
-        pool.each(&mut self.planes, |plane| {
-            plane.lists.own.draw(noise[0], law);
-            plane.lists.with_ghosts.draw(noise[0], law);
-        });
+        self.noise = Some((noise, law));
     }
 
     /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
-    /// virial of the impulses over Δt, if distances were stored.
+    /// virial of the impulses over Δt, if it is requested.
     pub fn act(&mut self, pool: &Pool, update: Update, v: &mut [[f64; 3]]) -> [f64; 6] {
         self.assert_pairs();
         match update {
@@ -266,15 +269,15 @@ impl PairThermostat {
         let order = self.lists.order();
         let counts: Vec<f64> = order.iter().map(|k| weight(*k as usize)).collect();
         let moving: f64 =
-            self.masses.inertia.iter().zip(&counts).filter(|(m, _)| **m > 0.0).map(|(_, w)| w).sum();
+            self.masses.iter().zip(&counts).filter(|(mass, _)| mass.inertia > 0.0).map(|(_, w)| w).sum();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
             for [i, j, k] in plane.pairs() {
                 let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                 let g = plane.lists.own.g(k);
                 let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
-                let [of_i, of_j] = [i, j].map(|k| counts[k] * self.masses.inverse[k]);
-                let inverse = self.masses.inverse[i] + self.masses.inverse[j];
+                let [of_i, of_j] = [i, j].map(|k| counts[k] * self.masses[k].inverse);
+                let inverse = self.masses[i].inverse + self.masses[j].inverse;
                 let square: f64 = g.iter().map(|g| g * g).sum();
                 if inverse > 0.0 {
                     let count = 0.5 * (counts[i] + counts[j]);
@@ -315,3 +318,14 @@ pub struct Warmth {
 /// The noise in the forces is independent of all of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stream(pub u8);
+
+/// The noise of the pairs of these particles, with the amplitude `√kT`; `None` at kT = 0.
+///
+/// # Panics
+/// Panics if it has not been drawn.
+fn noise_of(drawn: Option<([PairNoise; 2], Law)>, labels: &Labels, kt: f64) -> Option<Noise<'_>> {
+    (kt > 0.0).then(|| {
+        let ([noise, _], law) = drawn.expect("the noise of the pairs has been drawn");
+        Noise { amplitude: kt.sqrt(), of_pairs: ListedNoise { noise, law, tags: &labels.tags } }
+    })
+}

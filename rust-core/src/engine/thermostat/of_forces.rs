@@ -14,14 +14,15 @@ use crate::engine::sweep::{ListedFor, ListedPairs};
 use std::sync::Arc;
 
 impl PairThermostat {
-    /// Asks the next evaluation of `engine` to list the pairs for a time `dt`, if it can: if it computes the same fluid.
-    pub fn ask(&mut self, engine: &mut Engine, dt: f64, virial: bool) {
+    /// Asks the next evaluation of `engine` to list the pairs for a time `dt`, if it can: if it computes the same fluid. Pairs are the same
+    /// with and without a virial.
+    pub fn ask(&mut self, engine: &mut Engine, dt: f64, _virial: bool) {
         if !self.is_of(engine.plan()) {
             return;
         }
-        let terms = self.terms(dt, virial);
+        let terms = self.terms(dt);
         let sweep = engine.sweep_mut();
-        sweep.ask_for_pairs(Some((terms, ListedFor { plan: self.plan.clone(), dt, virial })));
+        sweep.ask_for_pairs(Some((terms, ListedFor { plan: self.plan.clone(), dt })));
         // The memory of lists goes to and fro, so that there is one list of all pairs, not two.
         if self.are_of_forces {
             self.has_pairs = false;
@@ -66,8 +67,8 @@ impl PairThermostat {
     }
 
     /// Takes listed pairs, if they are those of this thermostat for a time `dt` between particles at `x`.
-    pub(super) fn take(&mut self, listed: Option<ListedPairs>, x: &[[f64; 3]], dt: f64, virial: bool) {
-        let listed = listed.filter(|listed| listed.serve(&self.plan, dt, virial, x));
+    pub(super) fn take(&mut self, listed: Option<ListedPairs>, x: &[[f64; 3]], dt: f64) {
+        let listed = listed.filter(|listed| listed.serve(&self.plan, dt, x));
         self.are_of_forces = listed.is_some();
         if let Some(listed) = listed {
             listed.give(&mut self.lists, &mut self.planes);

@@ -1,23 +1,21 @@
 //! The loops of conjugate gradients over the particles of a plane.
 
-use super::pass::Wide;
+use super::mass::Mass;
 use crate::engine::vectors::Loop;
+use psidpd_passes::plane::pair_sums::Wide;
+use std::hint::black_box;
 
 /// The data of one plane during a step of the solver.
 pub struct Share<'a> {
     pub p: &'a mut [Wide],
-    /// Sums over the pairs of the plane itself.
+    /// Sums over the pairs.
     pub image: &'a mut [Wide],
-    /// Contributions of the plane below; empty if it has no pairs with these particles.
-    pub below: &'a [Wide],
-    /// Mass of each particle; 0 if it is frozen.
-    pub inertia: &'a [f64],
-    pub inverse_mass: &'a [f64],
+    pub masses: &'a [Mass],
     pub residual: &'a mut [Wide],
     pub solution: &'a mut [Wide],
 }
 
-/// Sets the residual to the negative sum of `image` and `below`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
+/// Sets the residual to the negative of `image`, and `p` to `M⁻¹ r`; returns `r · M⁻¹ r`.
 pub struct Start<'s, 'a>(pub &'s mut Share<'a>);
 
 impl Loop for Start<'_, '_> {
@@ -25,20 +23,19 @@ impl Loop for Start<'_, '_> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Share { p, image, below, inverse_mass, residual, .. } = self.0;
+        let Share { p, image, masses, residual, .. } = self.0;
         let mut sum = Wide::ZERO;
-        let particles = residual.iter_mut().zip(p.iter_mut()).zip(image.iter()).zip(*inverse_mass);
-        let each = |(((r, p), image), inverse): (((&mut Wide, &mut Wide), &Wide), &f64), below: Wide| {
-            *r = times(Wide([-1.0; 4]), plus(*image, 1.0, below));
+        let particles = residual.iter_mut().zip(p.iter_mut()).zip(image.iter()).zip(*masses);
+        for (((r, p), image), Mass { inverse, .. }) in particles {
+            *r = times(Wide([-1.0; 4]), *image);
             *p = times(Wide([*inverse; 4]), *r);
             sum = plus(sum, 1.0, times(*p, *r));
-        };
-        with_below(particles, below, each);
+        }
         total(sum)
     }
 }
 
-/// Adds `m p` and the contributions of the plane below to the sums of the particles of a plane, which become the
+/// Adds `m p` to the sums of the particles of a plane, which become the
 /// image `(M + K) p`; returns `p · image` and `image · M⁻¹ image` of the particles that are not frozen.
 pub struct Multiply<'s, 'a>(pub &'s mut Share<'a>);
 
@@ -47,27 +44,17 @@ impl Loop for Multiply<'_, '_> {
 
     #[inline(always)]
     fn run(self) -> [f64; 2] {
-        let Share { p, image, below, inertia, inverse_mass, .. } = self.0;
+        let Share { p, image, masses, .. } = self.0;
         let (mut curvature, mut square) = (Wide::ZERO, Wide::ZERO);
-        let particles = image.iter_mut().zip(p.iter()).zip(*inertia).zip(*inverse_mass);
-        let each = |(((image, p), inertia), inverse): (((&mut Wide, &Wide), &f64), &f64), below: Wide| {
+        let particles = image.iter_mut().zip(p.iter()).zip(*masses);
+        for ((image, p), Mass { inertia, inverse }) in particles {
             let momentum = times(Wide([*inertia; 4]), *p);
-            *image = plus(plus(*image, 1.0, below), 1.0, momentum);
+            *image = plus(*image, 1.0, momentum);
             let change = times(Wide([*inverse; 4]), *image);
             curvature = plus(curvature, 1.0, times(momentum, change));
             square = plus(square, 1.0, times(*image, change));
-        };
-        with_below(particles, below, each);
+        }
         [total(curvature), total(square)]
-    }
-}
-
-/// Calls `each` for all particles, with the contribution of the plane below or zero.
-#[inline(always)]
-fn with_below<P>(particles: impl Iterator<Item = P>, below: &[Wide], mut each: impl FnMut(P, Wide)) {
-    match below.is_empty() {
-        true => particles.for_each(|particle| each(particle, Wide::ZERO)),
-        false => particles.zip(below).for_each(|(particle, below)| each(particle, *below)),
     }
 }
 
@@ -86,9 +73,9 @@ impl Loop for Advance<'_, '_> {
     #[inline(always)]
     fn run(self) {
         let Advance { share, is_first, alpha, beta } = self;
-        let Share { p, image, inverse_mass, residual, solution, .. } = share;
+        let Share { p, image, masses, residual, solution, .. } = share;
         let particles = solution.iter_mut().zip(residual.iter_mut()).zip(p.iter_mut()).zip(image.iter());
-        for ((((s, r), p), image), inverse) in particles.zip(*inverse_mass) {
+        for ((((s, r), p), image), Mass { inverse, .. }) in particles.zip(*masses) {
             *s = plus(if is_first { Wide::ZERO } else { *s }, alpha, *p);
             *r = plus(*r, -alpha, *image);
             *p = plus(times(Wide([beta; 4]), *p), *inverse, *r);
@@ -111,9 +98,9 @@ impl Loop for Finish<'_, '_> {
     #[inline(always)]
     fn run(self) {
         let Finish { share, is_first, alpha, rest } = self;
-        let Share { p, image, inverse_mass, residual, solution, .. } = share;
+        let Share { p, image, masses, residual, solution, .. } = share;
         let particles = solution.iter_mut().zip(residual.iter()).zip(p.iter_mut()).zip(image.iter());
-        for ((((s, r), p), image), inverse) in particles.zip(*inverse_mass) {
+        for ((((s, r), p), image), Mass { inverse, .. }) in particles.zip(*masses) {
             *p = plus(if is_first { Wide::ZERO } else { *s }, alpha, *p);
             *s = plus(*p, rest * *inverse, plus(*r, -alpha, *image));
         }
@@ -134,5 +121,30 @@ fn times(a: Wide, b: Wide) -> Wide {
 /// The sum of all four components, the last of which is 0.
 #[inline(always)]
 fn total(sum: Wide) -> f64 {
+    // A compiler that sees the order of these additions splits the vectors of the loop before.
+    let sum = black_box(sum);
     (sum[0] + sum[2]) + (sum[1] + sum[3])
+}
+
+/// Writes the sums over the pairs of a plane and those over pairs of the plane before, if there are any, added up.
+pub struct Join<'a> {
+    pub to: &'a mut [Wide],
+    pub own: &'a [Wide],
+    pub before: &'a [Wide],
+}
+
+impl Loop for Join<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Join { to, own, before } = self;
+        match before.is_empty() {
+            true => to.iter_mut().zip(own).for_each(|(to, own)| *to = *own),
+            false => {
+                let vectors = own.iter().zip(before);
+                to.iter_mut().zip(vectors).for_each(|(to, (own, before))| *to = plus(*own, 1.0, *before));
+            }
+        }
+    }
 }

@@ -1,21 +1,36 @@
 //! A pass over the pairs, which computes `Σ_j g (g·(p_i − p_j) − a ξ)` for every particle `i`.
 //!
-//! Each plane adds to its own particles and to those of the next in a buffer of its own, so that the
-//! order of each sum is fixed, whichever thread computes it.
+//! Each plane adds to its own particles and to those of the next in a buffer, and a sum is that of its own plane and that of the plane
+//! before, so that its order is fixed, whichever thread computes it.
 
+use super::particle_loops::Join;
 use crate::engine::sweep::{PlanePairs, Pool};
+use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
-use psidpd_passes::plane::list::{PairList, pairs_of_each};
+use psidpd_passes::plane::listed_noise::Drawn;
 pub use psidpd_passes::plane::pair_sums::Wide;
-use psidpd_passes::plane::pair_sums::add_pairs;
+use psidpd_passes::plane::pair_sums::{Noise, add_pairs};
+use psidpd_threads::{part, take};
 
 /// The vectors of the particles, and the sums over their pairs.
 #[derive(Debug, Clone, Default)]
 pub struct Sums {
     /// Vector of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     pub p: Vec<Wide>,
-    /// Sums by plane: of its own particles, then of those of the next.
-    pub of_plane: Vec<Vec<Wide>>,
+    /// Sum of each sorted particle.
+    pub all: Vec<Wide>,
+    /// Scratch arrays of each thread.
+    of_threads: Vec<OfPlanes>,
+}
+
+/// Sums over the pairs of a plane, of its own particles and then of those of the next: the present plane, and the one before.
+#[derive(Debug, Clone, Default)]
+struct OfPlanes {
+    now: Vec<Wide>,
+    before: Vec<Wide>,
+    /// Number of own particles of the plane before.
+    own: usize,
+    drawn: Drawn,
 }
 
 impl Sums {
@@ -27,89 +42,60 @@ impl Sums {
         });
     }
 
-    /// Copies the vectors of the first plane to the end, for the pairs of the last plane.
-    pub fn close(&mut self, planes: &[PlanePairs]) {
-        let Some(last) = planes.last() else { return };
-        self.p.truncate(last.own.end);
-        self.p.extend_from_within(last.next.clone());
+    /// Adds the vectors `v` of the host to those of the particles.
+    pub fn add_of_host(&mut self, pool: &Pool, order: &[u32], v: &[[f64; 3]]) {
+        each_with(pool, &mut self.p[..order.len()], order, |p, k| (0..3).for_each(|c| p[c] += v[k][c]));
     }
 
-    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[PlanePairs], noise: f64) {
+    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[PlanePairs], noise: Option<Noise>) {
         let particles = planes.last().map_or(0, |last| last.own.end);
         assert!(self.p.len() >= particles, "a vector for each particle of the pairs");
-        self.close(planes);
-        let Sums { p, of_plane } = self;
-        of_plane.resize_with(planes.len(), Vec::new);
-        let mut work: Vec<_> = planes.iter().zip(of_plane).collect();
-        let p = &p[..];
-        pool.each(&mut work, |(plane, sums)| {
-            let PlanePairs { own, next, lists } = plane;
-            sums.resize(own.len() + next.len(), Wide::ZERO);
-            // SAFETY: the pairs of a plane are those of its own particles with each other, with the next and with ghosts,
-            // as a search that has not failed has listed them; `p` has a vector for each, as asserted.
-            unsafe { add_pairs(set, lists, noise, p, own.start, sums) };
-        });
-    }
-
-    /// The sums of the particles of each plane over the pairs of that plane, and over those of the plane
-    /// below; the latter are empty if that has no pairs with them.
-    pub fn halves<'a>(
-        of_plane: &'a mut [Vec<Wide>],
-        planes: &[PlanePairs],
-    ) -> impl Iterator<Item = (&'a mut [Wide], &'a [Wide])> {
-        let (own, next): (Vec<_>, Vec<_>) = of_plane
+        close(planes, &mut self.p);
+        assert!(noise.is_none_or(|noise| noise.of_pairs.tags.len() >= self.p.len()), "a tag for each vector");
+        let Sums { p, all, of_threads } = self;
+        all.resize(particles, Wide::ZERO);
+        let (p, count) = (&p[..], planes.len());
+        let threads = pool.threads().min(count);
+        of_threads.resize_with(threads, OfPlanes::default);
+        let mut rest = &mut all[..];
+        let mut work: Vec<_> = of_threads
             .iter_mut()
-            .zip(planes)
-            .map(|(sums, plane)| {
-                let (own, next) = sums.split_at_mut(plane.own.len());
-                (own, &*next)
+            .enumerate()
+            .map(|(t, scratch)| {
+                let planes = &planes[part(count, t, threads)];
+                let particles = planes.iter().map(|plane| plane.own.len()).sum();
+                (scratch, planes, take(&mut rest, particles))
             })
-            .unzip();
-        let below = move |number: usize| {
-            let below = number.checked_sub(1).unwrap_or(planes.len() - 1);
-            if planes[below].next == planes[number].own { next[below] } else { &[] }
-        };
-        own.into_iter().zip((0..planes.len()).map(below))
-    }
-}
-
-/// Virial `Σ r_ij ⊗ F_ij` of the opposite, `g (a ξ − g·(p_i − p_j))`: xx, yy, zz, xy, xz, yz; half of it for pairs with
-/// ghosts.
-fn virial_of_plane(PlanePairs { own, lists, .. }: &PlanePairs, p: &[Wide], noise: f64) -> [f64; 6] {
-    let mut virial = [0.0; 6];
-    for (list, share) in [(&lists.own, 1.0), (&lists.with_ghosts, 0.5)] {
-        let PairList { start, stretch, xi, j_from, .. } = list;
-        if stretch.is_empty() {
-            continue;
-        }
-        for (i, of_i) in pairs_of_each(start) {
-            for k in of_i {
-                let (g, a, b) = (list.g(k), p[own.start + i], p[j_from + list.second(k)]);
-                let along: f64 = (0..3).map(|c| (a[c] - b[c]) * g[c]).sum();
-                let xi = xi.get(k).map_or(0.0, |xi| f64::from(*xi));
-                add_virial(&mut virial, g, (noise * xi - along) * share * stretch[k]);
+            .collect();
+        pool.each(&mut work, |(OfPlanes { now, before, own: of_before, drawn }, planes, sums)| {
+            let mut rest = &mut sums[..];
+            before.clear();
+            *of_before = 0;
+            for PlanePairs { own, next, lists } in *planes {
+                now.resize(own.len() + next.len(), Wide::ZERO);
+                // SAFETY: the pairs of a plane are those of its own particles with each other, with the next and with ghosts,
+                // as a search that has not failed has listed them; `p` has a vector for each, and a tag, as asserted.
+                unsafe { add_pairs(set, lists, noise, p, own.start, now, drawn) };
+                let to = take(&mut rest, own.len());
+                vectors::run(set, Join { to, own: now, before: &before[*of_before..] });
+                std::mem::swap(before, now);
+                *of_before = own.len();
+            }
+        });
+        for (t, OfPlanes { before, own, .. }) in of_threads.iter().enumerate() {
+            let Some(last) = planes[part(count, t, threads)].last() else { continue };
+            for (to, vector) in all[last.next.clone()].iter_mut().zip(&before[*own..]) {
+                (0..3).for_each(|c| to[c] += vector[c]);
             }
         }
     }
-    virial
 }
 
-/// Adds `factor g ⊗ g` to a virial.
-pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
-    for (w, (a, b)) in virial.iter_mut().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]) {
-        *w += factor * g[a] * g[b];
-    }
-}
-
-/// The virial of all planes, in their order, times `factor`.
-pub fn virial(pool: &Pool, planes: &[PlanePairs], sums: &Sums, noise: f64, factor: f64) -> [f64; 6] {
-    let mut parts: Vec<_> = planes.iter().map(|plane| (plane, [0.0; 6])).collect();
-    pool.each(&mut parts, |(plane, virial)| *virial = virial_of_plane(plane, &sums.p, noise));
-    let mut sum = [0.0; 6];
-    for (_, virial) in parts {
-        (0..6).for_each(|c| sum[c] += factor * virial[c]);
-    }
-    sum
+/// Copies what the particles of the first plane have to the end, for the pairs of the last plane.
+pub fn close<T: Copy>(planes: &[PlanePairs], of_particles: &mut Vec<T>) {
+    let Some(last) = planes.last().filter(|_| !of_particles.is_empty()) else { return };
+    of_particles.truncate(last.own.end);
+    of_particles.extend_from_within(last.next.clone());
 }
 
 /// Fills an array in the order of cells with the values of the host's particles.

@@ -4,6 +4,7 @@
 //! contributes only scatter to a mean.
 
 use super::PairThermostat;
+use super::distances::Distances;
 use crate::engine::sweep::{PlanePairs, Pool};
 use crate::engine::vectors::{Loop, run_best};
 
@@ -32,7 +33,7 @@ impl Pulls {
 
 impl PairThermostat {
     /// The virial `Σ r_ij ⊗ F_ij` of the drag at the velocities `v`: xx, yy, zz, xy, xz, yz. It is that of the pairs that were found
-    /// last, and zero if distances were not stored. `pulls` get the pairs, plane by plane. Results do not depend on the number of
+    /// last. `pulls` get the pairs, plane by plane. Results do not depend on the number of
     /// threads.
     pub fn drags(&self, pool: &Pool, v: &[[f64; 3]], pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
         let v: Vec<[f64; 3]> = self.lists.order().iter().map(|k| v[*k as usize]).collect();
@@ -43,10 +44,12 @@ impl PairThermostat {
         self.pulls_by(pool, factor, pulls)
     }
 
-    /// The virial of the impulses of the last sequential update, without the noise of each pair itself, as forces over its time.
+    /// The virial of the impulses of the last sequential update, without the noise of each pair itself, as forces over its time; zero if its virial
+    /// was not wanted.
     /// Otherwise as [`PairThermostat::drags`].
     pub fn pulls(&self, pool: &Pool, pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
-        self.pulls_by(pool, |[_, _, k], plane, _| self.impulses[plane][k] / self.dt, pulls)
+        let impulse = |plane: usize, k: usize| self.impulses.get(plane)?.get(k).copied();
+        self.pulls_by(pool, |[_, _, k], plane, _| impulse(plane, k).unwrap_or(0.0) / self.dt, pulls)
     }
 
     /// Computes pulls from the `factor` of `g`, which takes the two sorted particles and the pair, the plane, and `g`.
@@ -57,7 +60,7 @@ impl PairThermostat {
         pulls: Option<&mut Vec<Pulls>>,
     ) -> [f64; 6] {
         self.assert_pairs();
-        let mut none = Vec::new();
+        let (mut none, distances) = (Vec::new(), &self.distances());
         let is_asked = pulls.is_some();
         let pulls = pulls.unwrap_or(&mut none);
         pulls.resize_with(self.planes.len(), Pulls::default);
@@ -65,7 +68,8 @@ impl PairThermostat {
             self.planes.iter().zip(pulls).enumerate().map(|plane| (plane, [0.0; 6])).collect();
         pool.each(&mut work, |((number, (plane, pulls)), virial)| {
             let pulls = is_asked.then_some(&mut **pulls);
-            *virial = of_plane(plane, self.lists.order(), |pair, g| factor(pair, *number, g), pulls);
+            let factor = |pair: [usize; 3], g| factor(pair, *number, g);
+            *virial = of_plane(plane, self.lists.order(), distances, factor, pulls);
         });
         let mut sum = [0.0; 6];
         work.iter().for_each(|(_, virial)| (0..6).for_each(|c| sum[c] += virial[c]));
@@ -77,11 +81,12 @@ impl PairThermostat {
 fn of_plane(
     plane: &PlanePairs,
     order: &[u32],
+    distances: &Distances,
     factor: impl Fn([usize; 3], [f64; 3]) -> f64,
     mut pulls: Option<&mut Pulls>,
 ) -> [f64; 6] {
     let list = &plane.lists.own;
-    let count = list.stretch.len();
+    let count = list.count();
     if let Some(pulls) = &mut pulls {
         pulls.begin(count);
     }
@@ -89,16 +94,17 @@ fn of_plane(
     if count == 0 {
         return virial;
     }
-    let mut block = Block { d: [[0.0; BLOCK]; 3], strengths: [0.0; BLOCK] };
+    let mut block = Block { d: [[0.0; BLOCK]; 3], strengths: [0.0; BLOCK], per_length: [0.0; BLOCK] };
     plane.for_each_pair(|[i, j, k]| {
         let (at, g) = (k % BLOCK, list.g(k));
         (0..3).for_each(|c| block.d[c][at] = g[c]);
         block.strengths[at] = factor([i, j, k], g);
+        block.per_length[at] = distances.per_length(i, j, g);
         if let Some(pulls) = &mut pulls {
             pulls.i.push(order[i]);
         }
         if at + 1 == BLOCK || k + 1 == count {
-            let of_block = run_best(Stretch { block: &mut block, stretch: &list.stretch[k - at..=k] });
+            let of_block = run_best(Lengthen { block: &mut block, count: at + 1 });
             (0..6).for_each(|c| virial[c] += of_block[c]);
             if let Some(pulls) = &mut pulls {
                 (0..3).for_each(|c| pulls.d[c].extend_from_slice(&block.d[c][..=at]));
@@ -117,29 +123,31 @@ const LANES: usize = 8;
 struct Block {
     d: [[f64; BLOCK]; 3],
     strengths: [f64; BLOCK],
+    /// Ratios `r/|g|`.
+    per_length: [f64; BLOCK],
 }
 
-/// Stretches the vectors of a block to separations; returns their virial.
-struct Stretch<'a> {
+/// Makes separations of the vectors of a block; returns their virial.
+struct Lengthen<'a> {
     block: &'a mut Block,
-    stretch: &'a [f64],
+    count: usize,
 }
 
-impl Loop for Stretch<'_> {
+impl Loop for Lengthen<'_> {
     type Out = [f64; 6];
 
     #[inline(always)]
     fn run(self) -> [f64; 6] {
-        let Stretch { block: Block { d: [x, y, z], strengths }, stretch } = self;
-        for (k, stretch) in stretch.iter().enumerate() {
-            (x[k], y[k], z[k]) = (stretch * x[k], stretch * y[k], stretch * z[k]);
-            strengths[k] /= stretch;
+        let Lengthen { block: Block { d: [x, y, z], strengths, per_length }, count } = self;
+        for (k, ratio) in per_length[..count].iter().enumerate() {
+            (x[k], y[k], z[k]) = (ratio * x[k], ratio * y[k], ratio * z[k]);
+            strengths[k] /= ratio;
         }
         let mut sums = [[0.0; LANES]; 6];
-        for k in stretch.len()..stretch.len().next_multiple_of(LANES) {
+        for k in count..count.next_multiple_of(LANES) {
             strengths[k] = 0.0;
         }
-        for k in (0..stretch.len()).step_by(LANES) {
+        for k in (0..count).step_by(LANES) {
             for lane in 0..LANES {
                 let (s, x, y, z) = (strengths[k + lane], x[k + lane], y[k + lane], z[k + lane]);
                 let dyad = [x * x, y * y, z * z, x * y, x * z, y * z];

@@ -29,7 +29,7 @@ pub struct Rank<'a> {
 /// The host's task for the next round.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Need {
-    /// No task: the velocities are final. Contains the virial of this rank, if distances were stored.
+    /// No task: the velocities are final. Contains the virial of this rank, if it is requested.
     Nothing([f64; 6]),
     /// Sum these numbers over all ranks.
     Totals([f64; 3]),
@@ -123,7 +123,8 @@ impl PairThermostat {
                 false => Ok(self.end(pool, v, [0.0; 6])),
             },
             Round::Middle => {
-                let virial = self.virial_at(pool, vectors, v.len(), true);
+                self.sums.gather(pool, self.lists.order(), vectors);
+                let virial = self.virial_of_vectors(pool, v.len(), true);
                 Ok(self.end(pool, v, virial))
             }
         }

@@ -5,11 +5,14 @@
 //! particles. The order depends on positions and tags alone.
 
 use super::PairThermostat;
+use super::distances::Distances;
 use super::encounter::Encounter;
-use super::pass::add_virial;
+use super::mass::Mass;
+use super::virial::add_virial;
 use crate::engine::sweep::{PlanePairs, Pool};
 use psidpd_passes::noise::Law;
 use psidpd_passes::plane::list::pairs_of_each;
+use psidpd_passes::plane::listed_noise::ListedNoise;
 
 /// Sets of planes that are updated at once, one set after the other: no two planes of a set are neighbours.
 fn sets(planes: &[PlanePairs]) -> [Vec<usize>; 3] {
@@ -26,12 +29,19 @@ struct Share<'a> {
     plane: &'a PlanePairs,
     own: &'a mut [[f64; 3]],
     next: &'a mut [[f64; 3]],
-    /// Inverse masses.
-    of_own: &'a [f64],
-    of_next: &'a [f64],
-    chances: Vec<f32>,
+    /// Masses.
+    of_own: &'a [Mass],
+    of_next: &'a [Mass],
     virial: [f64; 6],
+    /// Factor of `g` in the impulse of each pair without its noise, if the virial is requested.
     impulses: &'a mut Vec<f64>,
+}
+
+/// Random numbers of the pairs of a plane.
+struct Draws {
+    xi: Vec<f32>,
+    /// Empty if a rule does not ask for them.
+    chances: Vec<f32>,
 }
 
 impl PairThermostat {
@@ -44,9 +54,16 @@ impl PairThermostat {
         reversed: bool,
         draws: bool,
     ) -> [f64; 6] {
-        let PairThermostat { planes, lists, masses, kt, dt, noise, impulses, .. } = self;
+        let PairThermostat {
+            plan, planes, lists, labels, masses, kt, dt, noise, impulses, wants_virial, ..
+        } = self;
+        let distances = &Distances::new(plan, *dt, &labels.species);
         impulses.resize_with(planes.len(), Vec::new);
-        let (planes, inverse_mass, kt) = (&planes[..], &masses.inverse[..], *kt);
+        let (planes, kt) = (&planes[..], *kt);
+        let distances = wants_virial.then_some(distances);
+        let (noise, law) = noise.expect("the noise of the pairs has been drawn");
+        let [noise, of_chances] = noise.map(|noise| ListedNoise { noise, law, tags: &labels.tags });
+        let of_chances = ListedNoise { law: Law::Uniform, ..of_chances };
         let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
         let mut sets = sets(planes);
@@ -66,25 +83,22 @@ impl PairThermostat {
                 let next = if plane.next.is_empty() { None } else { slices[above].take() };
                 let Some(impulses) = records[number].take() else { continue };
                 impulses.clear();
-                impulses.resize(plane.lists.own.stretch.len(), 0.0);
+                impulses.resize(if *wants_virial { plane.lists.own.count() } else { 0 }, 0.0);
                 shares.push(Share {
                     plane,
                     own,
                     next: next.unwrap_or_default(),
-                    of_own: &inverse_mass[plane.own.clone()],
-                    of_next: &inverse_mass[plane.next.clone()],
-                    chances: Vec::new(),
+                    of_own: &masses[plane.own.clone()],
+                    of_next: &masses[plane.next.clone()],
                     virial: [0.0; 6],
                     impulses,
                 });
             }
             pool.each(&mut shares, |share| {
-                if draws {
-                    let [a, b] = &share.plane.lists.own.tags;
-                    share.chances.resize(a.len(), 0.0);
-                    noise[1].fill(Law::Uniform, a, b, &mut share.chances);
-                }
-                share.update(kt, reversed, rule);
+                let list = &share.plane.lists.own;
+                let chances = if draws { of_chances.of_list(list) } else { Vec::new() };
+                let draws = Draws { xi: noise.of_list(list), chances };
+                share.update(kt, reversed, &draws, distances, rule);
             });
             for share in shares {
                 (0..6).for_each(|c| virial[c] += share.virial[c] / *dt);
@@ -98,10 +112,17 @@ impl PairThermostat {
 }
 
 impl Share<'_> {
-    fn update(&mut self, kt: f64, reversed: bool, rule: impl Fn(&Encounter) -> f64) {
+    fn update(
+        &mut self,
+        kt: f64,
+        reversed: bool,
+        draws: &Draws,
+        distances: Option<&Distances>,
+        rule: impl Fn(&Encounter) -> f64,
+    ) {
         let plane = self.plane;
         let particles = pairs_of_each(&plane.lists.own.start);
-        let mut meet = |i, k| self.encounter(i, k, kt, &rule);
+        let mut meet = |i, k| self.encounter([i, k], kt, draws, distances, &rule);
         match reversed {
             true => particles.rev().for_each(|(i, of_i)| of_i.rev().for_each(|k| meet(i, k))),
             false => particles.for_each(|(i, of_i)| of_i.for_each(|k| meet(i, k))),
@@ -109,7 +130,14 @@ impl Share<'_> {
     }
 
     #[inline(always)]
-    fn encounter(&mut self, i: usize, k: usize, kt: f64, rule: &impl Fn(&Encounter) -> f64) {
+    fn encounter(
+        &mut self,
+        [i, k]: [usize; 2],
+        kt: f64,
+        draws: &Draws,
+        distances: Option<&Distances>,
+        rule: &impl Fn(&Encounter) -> f64,
+    ) {
         let list = &self.plane.lists.own;
         let (j, g) = (list.second(k), list.g(k));
         let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
@@ -117,7 +145,7 @@ impl Share<'_> {
             true => (self.own[j], self.of_own[j]),
             false => (self.next[beyond], self.of_next[beyond]),
         };
-        let inverse = [self.of_own[i], inverse];
+        let inverse = [self.of_own[i], inverse].map(|mass| mass.inverse);
         let sum = inverse[0] + inverse[1];
         // A pair of frozen particles does not move.
         if sum == 0.0 {
@@ -128,14 +156,14 @@ impl Share<'_> {
         if square == 0.0 {
             return;
         }
-        let chance = self.chances.get(k).map_or(0.0, |xi| 0.5 + f64::from(*xi) / 12f64.sqrt());
+        let chance = draws.chances.get(k).map_or(0.0, |xi| 0.5 + f64::from(*xi) / 12f64.sqrt());
         let encounter = Encounter {
             along: (v[0] - other[0]) * g[0] + (v[1] - other[1]) * g[1] + (v[2] - other[2]) * g[2],
             a: square * sum,
             square,
             mu: 1.0 / sum,
             kt,
-            xi: f64::from(self.plane.lists.own.xi[k]),
+            xi: f64::from(draws.xi[k]),
             chance,
         };
         let impulse = rule(&encounter);
@@ -146,8 +174,9 @@ impl Share<'_> {
         for c in 0..3 {
             other[c] -= impulse * inverse[1] * g[c];
         }
-        if let Some(stretch) = self.plane.lists.own.stretch.get(k) {
-            add_virial(&mut self.virial, g, impulse * *stretch);
+        if let Some(distances) = distances {
+            let ratio = distances.per_length(self.plane.own.start + i, list.j_from + j, g);
+            add_virial(&mut self.virial, g, impulse * ratio);
             self.impulses[k] = rule(&Encounter { xi: 0.0, ..encounter });
         }
     }

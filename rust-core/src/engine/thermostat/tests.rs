@@ -5,6 +5,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::noise::threefry2x32;
 use std::num::NonZeroUsize;
 
+mod distances;
 mod listed;
 mod ranks;
 
@@ -258,7 +259,7 @@ fn streams_share_no_noise() {
             keys.push(PairNoise::new(seed, step).key());
             for stream in [0, 1, 2, 3, 4, 127, 254, 255] {
                 thermostat.draw(&pool, seed, step, Stream(stream), Law::Gaussian);
-                keys.extend(thermostat.noise.map(|noise| noise.key()));
+                keys.extend(thermostat.noise.unwrap().0.map(|noise| noise.key()));
             }
         }
     }

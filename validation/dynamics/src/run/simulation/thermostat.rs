@@ -17,7 +17,8 @@ pub(super) struct Thermostat {
     pairs: Option<PairThermostat>,
     /// Iterations at earlier temperatures and settings.
     effort_before: Effort,
-    /// The positions of which the pairs are known, by their number, the time that drag and noise act for, and whether distances are kept.
+    /// The positions of which the pairs are known, by their number, the time that drag and noise act for, and whether their virial was
+    /// requested.
     found: Option<(u64, f64, bool)>,
     /// Virial of the mean force of drag and noise since they last acted, where they are apart from the forces.
     pub impulse_virial: [f64; 6],
