@@ -286,7 +286,7 @@ bool FixSplitting::is_due() const
 // The forces of the step are computed where the thermostat acts.
 void FixSplitting::expect()
 {
-  if (is_due()) pair->expect_heat(static_cast<double>(every) * update->dt, wants_virial());
+  if (is_due()) pair->expect_heat(static_cast<double>(every) * update->dt);
 }
 
 void FixSplitting::act()

@@ -53,7 +53,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Why the fix that applies drag and noise apart from the forces cannot act; empty if it can.
   std::string why_not_apart() const;
   // Announces that the thermostat will act, for a time, where the next forces are computed.
-  void expect_heat(double time, bool wants_virial);
+  void expect_heat(double time);
   // What drag and noise do.
   struct Action {
     // Time for which they act.

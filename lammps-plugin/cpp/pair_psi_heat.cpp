@@ -34,10 +34,10 @@ void PairPsi::forward_vectors()
   exchange.carry(GhostExchange::Carries::vectors, [this] { forward_values(comm, this, 0); });
 }
 
-void PairPsi::expect_heat(double time, bool wants_virial)
+void PairPsi::expect_heat(double time)
 {
   refresh();
-  attempt([&] { (*style)->expect_thermostat(time, wants_virial); });
+  attempt([&] { (*style)->expect_thermostat(time); });
 }
 
 std::array<double, 6> PairPsi::heat(const std::vector<double> &masses, const Action &action)

@@ -346,7 +346,7 @@ mod ffi {
         fn mirror(self: &Style, extent: &Extent, x: &mut [f64]) -> Result<()>;
 
         /// Announces that the thermostat will act for a time where the next forces are computed.
-        fn expect_thermostat(self: &mut Style, time: f64, virial: bool) -> Result<()>;
+        fn expect_thermostat(self: &mut Style, time: f64) -> Result<()>;
         /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat. All is in
         /// the units of LAMMPS, with masses in energy over squared velocity; the rounds take velocities of the model.
         fn thermostat_pairs(

@@ -11,10 +11,10 @@ use psidpd_core::engine::{Around, Particles};
 impl Style {
     /// Announces that the thermostat will act for a time where the next forces are computed: these then list its pairs, if
     /// they can.
-    pub fn expect_thermostat(&mut self, time: f64, virial: bool) -> Result<(), StyleError> {
+    pub fn expect_thermostat(&mut self, time: f64) -> Result<(), StyleError> {
         guard(|| {
             if let Some(thermostat) = &mut self.thermostat {
-                thermostat.ask(&mut self.engine, time / self.scale.time, virial);
+                thermostat.ask(&mut self.engine, time / self.scale.time);
             }
             Ok(())
         })
@@ -22,7 +22,7 @@ impl Style {
 
     /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no
     /// thermostat. `mass` has the masses of owned atoms, infinite for atoms that keep their velocities.
-    /// With `virial` pair distances are stored.
+    /// With `virial` its action computes a virial.
     pub fn thermostat_pairs(
         &mut self,
         extent: &Extent,
@@ -44,7 +44,7 @@ impl Style {
             let rank = Rank { around, particles, species_of_kind: &kinds, mass };
             thermostat.find_pairs_of_rank_with(engine, &rank, heat.time / scale.time, heat.virial)?;
             let law = if heat.uniform { Law::Uniform } else { Law::Gaussian };
-            thermostat.draw(engine.pool(), heat.seed, heat.step, Stream(0), law);
+            thermostat.draw(heat.seed, heat.step, Stream(0), law);
             Ok(true)
         })
     }

@@ -69,14 +69,14 @@ fn run(arguments: &[String]) -> Result<(), String> {
             cloud.drift();
             let Cloud { domain, x, v, tag, kind, force, .. } = &mut cloud;
             if word == "listed" {
-                thermostat.ask(&mut engine, dt, false);
+                thermostat.ask(&mut engine, dt);
                 let particles = Particles { owned: count, x, tag, kind };
                 let request = Request { particles, v: &[], step: None, want: Want::FORCES };
                 engine.forces(domain, &request, force, false).map_err(|e| e.to_string())?;
             }
             let bodies = Bodies { domain, x, tag, species: kind, mass: &[1.0; 2], frozen: &[] };
             thermostat.find_pairs_with(&mut engine, &bodies, dt, false).map_err(|e| e.to_string())?;
-            thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);
+            thermostat.draw(1, number.into(), Stream(0), Law::Gaussian);
             thermostat.act(&pool, Update::Midpoint, v);
         }
         println!("{count} {}", cloud.v.iter().map(|v| v[0].abs()).sum::<f64>());
@@ -124,7 +124,7 @@ fn on_rank(mut rank: Rank, fluid: &Fluid, settings: Settings, evaluations: u32) 
     let (mass, kinds): (_, Vec<i32>) = (vec![1.0; owned], (0..fluid.species.len() as i32).collect());
     for number in 0..evaluations {
         rank.drift();
-        thermostat.ask(&mut engine, dt, false);
+        thermostat.ask(&mut engine, dt);
         let particles = Particles { owned, x: &rank.x, tag: &rank.tag, kind: &rank.kind };
         let around = Around { domain: &rank.around, images: &[] };
         let request = Request { particles, v: &[], step: None, want: Want::FORCES };
@@ -132,7 +132,7 @@ fn on_rank(mut rank: Rank, fluid: &Fluid, settings: Settings, evaluations: u32) 
         drop(engine.first(surroundings, &request, &mut rank.cloud.force).map_err(|e| e.to_string())?);
         let of_rank = thermostat::Rank { around, particles, species_of_kind: &kinds, mass: &mass };
         thermostat.find_pairs_of_rank_with(&mut engine, &of_rank, dt, false).map_err(|e| e.to_string())?;
-        thermostat.draw(&pool, 1, number.into(), Stream(0), Law::Gaussian);
+        thermostat.draw(1, number.into(), Stream(0), Law::Gaussian);
         let mut vectors = rank.v.clone();
         let mut need = thermostat.begin_midpoint(&pool, &mut vectors).map_err(|e| e.to_string())?;
         while need != Need::Nothing([0.0; 6]) {

@@ -178,7 +178,7 @@ fn time_thermostat(cloud: &mut Cloud, mut thermostat: PairThermostat, pool: &Poo
             let start = Instant::now();
             thermostat.find_pairs(pool, &bodies, dt, false).map_err(|e| e.to_string())?;
             let found = Instant::now();
-            thermostat.draw(pool, 1, number, Stream(0), Law::Gaussian);
+            thermostat.draw(1, number, Stream(0), Law::Gaussian);
             let drawn = Instant::now();
             thermostat.act(pool, Update::Midpoint, v);
             let end = Instant::now();

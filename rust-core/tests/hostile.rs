@@ -104,13 +104,13 @@ fn heated(settings: Settings, fluid: &Fluid, cloud: &Cloud, ask: Option<&mut Eng
     let mass = vec![1.0; fluid.species.len()];
     let bodies = cloud.bodies(&mass);
     if let Some(engine) = ask {
-        thermostat.ask(engine, DT, true);
+        thermostat.ask(engine, DT);
         cloud.energy(engine).unwrap();
         thermostat.find_pairs_with(engine, &bodies, DT, true).unwrap();
     } else {
         thermostat.find_pairs(&pool, &bodies, DT, true).unwrap();
     }
-    thermostat.draw(&pool, 1, 1, Stream(0), noise::Law::Gaussian);
+    thermostat.draw(1, 1, Stream(0), noise::Law::Gaussian);
     thermostat.act(&pool, Update::Midpoint, &mut v);
     v
 }
@@ -144,12 +144,12 @@ fn a_thermostat_takes_the_pairs_of_another() {
         let mut engine = Engine::new(&fluid, settings).unwrap();
         let pool = Pool::new(settings.threads);
         let [mut a, mut b] = [(); 2].map(|()| PairThermostat::new(engine.plan(), &settings).unwrap());
-        a.ask(&mut engine, DT, false);
-        b.ask(&mut engine, 4.0 * DT, false);
+        a.ask(&mut engine, DT);
+        b.ask(&mut engine, 4.0 * DT);
         cloud.energy(&mut engine).unwrap();
         let mut v = cloud.v.clone();
         a.find_pairs_with(&mut engine, &cloud.bodies(&[1.0]), DT, false).unwrap();
-        a.draw(&pool, 1, 1, Stream(0), noise::Law::Gaussian);
+        a.draw(1, 1, Stream(0), noise::Law::Gaussian);
         a.act(&pool, Update::Midpoint, &mut v);
         assert!(furthest(&v, &heated(settings, &fluid, &cloud, None)) < 1e-6);
     }
@@ -191,7 +191,7 @@ fn a_thermostat_has_no_pairs_after_a_search_that_failed() {
         }
         thermostat.find_pairs(&pool, &cloud.bodies(&[]), DT, true).unwrap_err();
         thermostat.find_pairs(&pool, &cloud.bodies(&[1.0]), DT, true).unwrap();
-        thermostat.draw(&pool, 1, 1, Stream(0), noise::Law::Gaussian);
+        thermostat.draw(1, 1, Stream(0), noise::Law::Gaussian);
         // Fewer velocities than particles, then the right number.
         let mut few = cloud.v[..100].to_vec();
         catch_unwind(AssertUnwindSafe(|| thermostat.act(&pool, Update::Midpoint, &mut few))).unwrap_err();
@@ -216,10 +216,10 @@ fn rounds_of_the_thermostat_in_a_wrong_order() {
         let mass = vec![1.0; 300];
         let rank = Rank { around, particles: half.particles(), species_of_kind: &[0, -1], mass: &mass };
         thermostat.find_pairs_of_rank(&pool, &rank, DT, false).unwrap();
-        thermostat.draw(&pool, 1, 1, Stream(0), noise::Law::Gaussian);
+        thermostat.draw(1, 1, Stream(0), noise::Law::Gaussian);
         let (mut vectors, mut v) = (cloud.v.clone(), cloud.v.clone());
         thermostat.begin_midpoint(&pool, &mut vectors).unwrap();
-        thermostat.ask(&mut engine, DT, false);
+        thermostat.ask(&mut engine, DT);
         cloud.energy(&mut engine).unwrap();
         thermostat.find_pairs_of_rank_with(&mut engine, &rank, DT, false).unwrap();
         thermostat.go_on(&pool, [0.0; 3], &mut vectors, &mut v).unwrap_err();
@@ -466,7 +466,7 @@ fn streams_of_noise() {
     let mut seen: Vec<Vec<u64>> = (0..=255)
         .map(|stream| {
             let mut v = cloud.v.clone();
-            thermostat.draw(&pool, 1, 1, Stream(stream), noise::Law::Gaussian);
+            thermostat.draw(1, 1, Stream(stream), noise::Law::Gaussian);
             thermostat.act(&pool, Update::OrnsteinUhlenbeck, &mut v);
             v.as_flattened().iter().map(|v| v.to_bits()).collect()
         })

@@ -127,7 +127,7 @@ pub unsafe extern "C" fn psidpd_thermostat_act(
         });
         let bodies = thermostat::Bodies { domain: &domain, x: &x, tag, species, mass, frozen: &frozen };
         this.thermostat.find_pairs(&this.pool, &bodies, step.dt, !virial.is_null())?;
-        this.thermostat.draw(&this.pool, step.seed, step.number, Stream::default(), Law::Gaussian);
+        this.thermostat.draw(step.seed, step.number, Stream::default(), Law::Gaussian);
         let of_impulses = this.thermostat.act(&this.pool, update, v);
         if !virial.is_null() {
             // SAFETY: the caller promises six numbers at `virial`, which is not null here.

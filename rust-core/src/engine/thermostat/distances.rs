@@ -38,20 +38,53 @@ impl Distances<'_> {
         Distances { weights, species: plan.gamma.len().isqrt(), of_particles }
     }
 
+    /// The number of the pair of species of two sorted particles.
+    #[inline(always)]
+    pub fn kind(&self, i: usize, j: usize) -> u16 {
+        match self.species {
+            1 => 0,
+            count => u16::from(self.of_particles[i]) * count as u16 + u16::from(self.of_particles[j]),
+        }
+    }
+
     /// The ratio `r/|g|` of a pair of sorted particles; 1 of a pair at one point.
     #[inline(always)]
-    pub fn per_length(&self, i: usize, j: usize, g: [f64; 3]) -> f64 {
-        let pair = match self.species {
-            1 => 0,
-            count => usize::from(self.of_particles[i]) * count + usize::from(self.of_particles[j]),
-        };
-        let Weight { inverse_amplitude, range, exponent } = self.weights[pair];
-        let length = (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt();
-        if length == 0.0 {
-            return 1.0;
+    pub fn per_length(&self, i: usize, j: usize, [x, y, z]: [f64; 3]) -> f64 {
+        let length = (x * x + y * y + z * z).sqrt();
+        self.weights[usize::from(self.kind(i, j))].per_length::<false>(length)
+    }
+
+    /// The same of pairs with vectors of the components `x`, `y` and `z`, by their pairs of species, to as many `ratios`.
+    #[inline(always)]
+    pub fn per_lengths<const N: usize>(
+        &self,
+        [x, y, z]: &[[f64; N]; 3],
+        kinds: &[u16],
+        ratios: &mut [f64; N],
+    ) {
+        let lengths =
+            x.iter().zip(y).zip(z).map(|((x, y), z)| (x * x + y * y + z * z).sqrt()).zip(&mut *ratios);
+        match &self.weights[..] {
+            [weight] if weight.exponent == 1.0 => {
+                lengths.take(kinds.len()).for_each(|(length, to)| *to = weight.per_length::<true>(length));
+            }
+            weights => lengths.zip(kinds).for_each(|((length, to), kind)| {
+                *to = weights[usize::from(*kind)].per_length::<false>(length);
+            }),
         }
-        let weight = length * inverse_amplitude;
-        let left = if exponent == 1.0 { weight } else { weight.powf(exponent.recip()) };
-        range * (1.0 - left).max(LEAST) / length
+    }
+}
+
+impl Weight {
+    /// The ratio `r/|g|` at a length `|g|`.
+    #[inline(always)]
+    fn per_length<const LINEAR: bool>(&self, length: f64) -> f64 {
+        let weight = length * self.inverse_amplitude;
+        let left = match LINEAR || self.exponent == 1.0 {
+            true => weight,
+            false => weight.powf(self.exponent.recip()),
+        };
+        let ratio = self.range * (1.0 - left).max(LEAST) / length;
+        if length > 0.0 { ratio } else { 1.0 }
     }
 }

@@ -18,6 +18,7 @@
 //! ghosts the midpoint rule exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of
 //! [`Update`] and its rule in one of these files.
 
+mod block;
 mod bodies;
 mod distances;
 mod effort;
@@ -243,7 +244,7 @@ impl PairThermostat {
     ///
     /// # Panics
     /// Panics if the last search has failed, as all that follow here.
-    pub fn draw(&mut self, _: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
+    pub fn draw(&mut self, seed: u64, step: u64, stream: Stream, law: Law) {
         self.assert_pairs();
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * u16::from(stream.0) + k));
         self.noise = Some((noise, law));

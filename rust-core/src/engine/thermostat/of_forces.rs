@@ -14,9 +14,8 @@ use crate::engine::sweep::{ListedFor, ListedPairs};
 use std::sync::Arc;
 
 impl PairThermostat {
-    /// Asks the next evaluation of `engine` to list the pairs for a time `dt`, if it can: if it computes the same fluid. Pairs are the same
-    /// with and without a virial.
-    pub fn ask(&mut self, engine: &mut Engine, dt: f64, _virial: bool) {
+    /// Asks the next evaluation of `engine` to list the pairs for a time `dt`, if it can: if it computes the same fluid.
+    pub fn ask(&mut self, engine: &mut Engine, dt: f64) {
         if !self.is_of(engine.plan()) {
             return;
         }

@@ -4,9 +4,9 @@
 //! contributes only scatter to a mean.
 
 use super::PairThermostat;
+use super::block::Block;
 use super::distances::Distances;
 use crate::engine::sweep::{PlanePairs, Pool};
-use crate::engine::vectors::{Loop, run_best};
 
 /// Pairs of a plane of cells and the mean forces of drag on them, as parallel arrays.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -90,70 +90,22 @@ fn of_plane(
     if let Some(pulls) = &mut pulls {
         pulls.begin(count);
     }
-    let mut virial = [0.0; 6];
-    if count == 0 {
-        return virial;
-    }
-    let mut block = Block { d: [[0.0; BLOCK]; 3], strengths: [0.0; BLOCK], per_length: [0.0; BLOCK] };
+    let (mut virial, mut block) = ([0.0; 6], Block::default());
     plane.for_each_pair(|[i, j, k]| {
-        let (at, g) = (k % BLOCK, list.g(k));
-        (0..3).for_each(|c| block.d[c][at] = g[c]);
-        block.strengths[at] = factor([i, j, k], g);
-        block.per_length[at] = distances.per_length(i, j, g);
+        let g = list.g(k);
+        let is_full = block.push(g, factor([i, j, k], g), distances.kind(i, j));
         if let Some(pulls) = &mut pulls {
             pulls.i.push(order[i]);
         }
-        if at + 1 == BLOCK || k + 1 == count {
-            let of_block = run_best(Lengthen { block: &mut block, count: at + 1 });
+        if is_full || k + 1 == count {
+            let of_block = block.lengthen(distances);
             (0..6).for_each(|c| virial[c] += of_block[c]);
             if let Some(pulls) = &mut pulls {
-                (0..3).for_each(|c| pulls.d[c].extend_from_slice(&block.d[c][..=at]));
-                pulls.strengths.extend_from_slice(&block.strengths[..=at]);
+                (0..3).for_each(|c| pulls.d[c].extend_from_slice(&block.d[c][..block.count]));
+                pulls.strengths.extend_from_slice(&block.strengths[..block.count]);
             }
+            block.count = 0;
         }
     });
     virial
-}
-
-/// Number of pairs in a block, and in a vector.
-const BLOCK: usize = 128;
-const LANES: usize = 8;
-
-/// Vectors `g` and factors of them, which become separations and the factors of these.
-struct Block {
-    d: [[f64; BLOCK]; 3],
-    strengths: [f64; BLOCK],
-    /// Ratios `r/|g|`.
-    per_length: [f64; BLOCK],
-}
-
-/// Makes separations of the vectors of a block; returns their virial.
-struct Lengthen<'a> {
-    block: &'a mut Block,
-    count: usize,
-}
-
-impl Loop for Lengthen<'_> {
-    type Out = [f64; 6];
-
-    #[inline(always)]
-    fn run(self) -> [f64; 6] {
-        let Lengthen { block: Block { d: [x, y, z], strengths, per_length }, count } = self;
-        for (k, ratio) in per_length[..count].iter().enumerate() {
-            (x[k], y[k], z[k]) = (ratio * x[k], ratio * y[k], ratio * z[k]);
-            strengths[k] /= ratio;
-        }
-        let mut sums = [[0.0; LANES]; 6];
-        for k in count..count.next_multiple_of(LANES) {
-            strengths[k] = 0.0;
-        }
-        for k in (0..count).step_by(LANES) {
-            for lane in 0..LANES {
-                let (s, x, y, z) = (strengths[k + lane], x[k + lane], y[k + lane], z[k + lane]);
-                let dyad = [x * x, y * y, z * z, x * y, x * z, y * z];
-                (0..6).for_each(|c| sums[c][lane] += s * dyad[c]);
-            }
-        }
-        sums.map(|lanes| lanes.iter().sum())
-    }
 }

@@ -159,7 +159,7 @@ fn pool(threads: usize) -> Pool {
 fn ready(model: &str, kt: f64, cloud: &Cloud, pool: &Pool) -> PairThermostat {
     let mut thermostat = thermostat(model, kt, cloud.precision);
     thermostat.find_pairs(pool, &cloud.bodies(), DT, true).unwrap();
-    thermostat.draw(pool, 11, 5, Stream(0), Law::Gaussian);
+    thermostat.draw(11, 5, Stream(0), Law::Gaussian);
     thermostat
 }
 
@@ -258,7 +258,7 @@ fn streams_share_no_noise() {
         for step in [1, 2, 3, 1 << 33] {
             keys.push(PairNoise::new(seed, step).key());
             for stream in [0, 1, 2, 3, 4, 127, 254, 255] {
-                thermostat.draw(&pool, seed, step, Stream(stream), Law::Gaussian);
+                thermostat.draw(seed, step, Stream(stream), Law::Gaussian);
                 keys.extend(thermostat.noise.unwrap().0.map(|noise| noise.key()));
             }
         }
@@ -319,7 +319,7 @@ fn the_temperature_is_right() {
         let (mut all, mut of_pairs, mut iterations) = (Vec::new(), Vec::new(), 0);
         let mut v = cloud.v.clone();
         for step in 0..8500 {
-            thermostat.draw(&pool, 3, step, Stream(0), Law::Gaussian);
+            thermostat.draw(3, step, Stream(0), Law::Gaussian);
             thermostat.act(&pool, Update::Midpoint, &mut v);
             if step >= 500 {
                 all.push(v.as_flattened().iter().map(|v| v * v).sum::<f64>() / freedom);
@@ -356,7 +356,7 @@ fn slow_flow_beside_strong_drag_is_right() {
         let mut thermostat = thermostat(&model, 1.0, precision);
         let pool = pool(1);
         thermostat.find_pairs(&pool, &cloud.bodies(), 0.06, false).unwrap();
-        thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
+        thermostat.draw(11, 5, Stream(0), Law::Gaussian);
         let mut v = cloud.v.clone();
         thermostat.act(&pool, Update::Midpoint, &mut v);
         let middle: Vec<[f64; 3]> =
@@ -498,7 +498,7 @@ fn weak_and_strong_drag_converge() {
         let pool = pool(1);
         let mut thermostat = thermostat(ONE, 1.0, Precision::Mixed);
         thermostat.find_pairs(&pool, &cloud.bodies(), dt, false).unwrap();
-        thermostat.draw(&pool, 11, 5, Stream(0), Law::Uniform);
+        thermostat.draw(11, 5, Stream(0), Law::Uniform);
         let mut v = cloud.v.clone();
         thermostat.act(&pool, Update::Midpoint, &mut v);
         assert!(thermostat.iterations() < 200, "dt = {dt}: {}", thermostat.iterations());

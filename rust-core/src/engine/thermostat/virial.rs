@@ -1,5 +1,6 @@
 //! The virial of drag and noise.
 
+use super::block::Block;
 use super::distances::Distances;
 use super::{PairThermostat, noise_of};
 use crate::engine::sweep::{PlanePairs, Pool};
@@ -14,7 +15,12 @@ fn virial_of_plane(
     noise: Option<Noise>,
     distances: &Distances,
 ) -> [f64; 6] {
-    let mut virial = [0.0; 6];
+    let (mut virial, mut block) = ([0.0; 6], Block::default());
+    let mut add = |block: &mut Block| {
+        let of_block = block.lengthen(distances);
+        (0..6).for_each(|c| virial[c] += of_block[c]);
+        block.count = 0;
+    };
     for (list, share) in [(&lists.own, 1.0), (&lists.with_ghosts, 0.5)] {
         let xi = noise.map_or_else(Vec::new, |noise| noise.of_pairs.of_list(list));
         let amplitude = noise.map_or(0.0, |noise| noise.amplitude);
@@ -24,10 +30,13 @@ fn virial_of_plane(
                 let (g, a, b) = (list.g(k), p[i], p[j]);
                 let along: f64 = (0..3).map(|c| (a[c] - b[c]) * g[c]).sum();
                 let along = xi.get(k).map_or(0.0, |xi| amplitude * f64::from(*xi)) - along;
-                add_virial(&mut virial, g, along * share * distances.per_length(i, j, g));
+                if block.push(g, along * share, distances.kind(i, j)) {
+                    add(&mut block);
+                }
             }
         }
     }
+    add(&mut block);
     virial
 }
 

@@ -32,11 +32,11 @@ fn act_again(
     engine: &mut Engine,
 ) -> (Vec<[f64; 3]>, [f64; 6], bool) {
     let pool = engine.pool().clone();
-    thermostat.ask(engine, DT, true);
+    thermostat.ask(engine, DT);
     compute_forces(engine, cloud);
     thermostat.find_pairs_with(engine, &cloud.bodies(), DT, true).unwrap();
     let listed = thermostat.are_of_forces;
-    thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
+    thermostat.draw(11, 5, Stream(0), Law::Gaussian);
     let mut v = cloud.v.clone();
     let virial = thermostat.act(&pool, Update::Midpoint, &mut v);
     (v, virial, listed)
@@ -107,21 +107,21 @@ fn only_the_pairs_that_were_asked_for_are_taken() {
     };
     compute_forces(&mut engine, &cloud);
     assert!(!takes(&mut thermostat, &mut engine, &cloud, DT, false), "nobody asked");
-    thermostat.ask(&mut engine, DT, false);
+    thermostat.ask(&mut engine, DT);
     compute_forces(&mut engine, &cloud);
     compute_forces(&mut engine, &cloud);
     assert!(!takes(&mut thermostat, &mut engine, &cloud, DT, false), "another evaluation has followed");
     for (dt, virial, expected) in [(DT, false, true), (2.0 * DT, false, false), (DT, true, true)] {
-        thermostat.ask(&mut engine, DT, false);
+        thermostat.ask(&mut engine, DT);
         compute_forces(&mut engine, &cloud);
         assert_eq!(takes(&mut thermostat, &mut engine, &cloud, dt, virial), expected, "{dt} {virial}");
         assert!(!takes(&mut thermostat, &mut engine, &cloud, DT, false), "they are taken once");
     }
     // Of another thermostat, of the fluid at another temperature, and of particles that have moved or changed places.
-    other.ask(&mut engine, DT, false);
+    other.ask(&mut engine, DT);
     compute_forces(&mut engine, &cloud);
     assert!(!takes(&mut other, &mut engine, &cloud, DT, false), "it has asked an engine of another kT");
-    thermostat.ask(&mut engine, DT, false);
+    thermostat.ask(&mut engine, DT);
     compute_forces(&mut engine, &cloud);
     assert!(!takes(&mut other, &mut engine, &cloud, DT, false), "another thermostat has asked");
     let mut moved = cloud.clone();
@@ -129,7 +129,7 @@ fn only_the_pairs_that_were_asked_for_are_taken() {
     let mut exchanged = cloud.clone();
     exchanged.x.swap(3, 4);
     for other in [moved, exchanged] {
-        thermostat.ask(&mut engine, DT, false);
+        thermostat.ask(&mut engine, DT);
         compute_forces(&mut engine, &cloud);
         assert!(!takes(&mut thermostat, &mut engine, &other, DT, false));
     }

@@ -89,7 +89,7 @@ fn by_ranks(
             if listed {
                 let mut engine = engine(model, cloud.precision, 2);
                 engine.map_kinds(rank.species_of_kind).unwrap();
-                thermostat.ask(&mut engine, DT, virial);
+                thermostat.ask(&mut engine, DT);
                 let surroundings = Surroundings::Ghosts(rank.around, Newton::On);
                 let mut force = vec![[0.0; 3]; x.len()];
                 drop(engine.first(surroundings, &request(rank.particles), &mut force).unwrap());
@@ -98,7 +98,7 @@ fn by_ranks(
             } else {
                 thermostat.find_pairs_of_rank(&pool, &rank, DT, virial).unwrap();
             }
-            thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
+            thermostat.draw(11, 5, Stream(0), Law::Gaussian);
             let mut vectors: Vec<[f64; 3]> = all().map(|(k, _)| cloud.v[k]).collect();
             let v = piece.owned.iter().map(|k| cloud.v[*k]).collect();
             let need = thermostat.begin_midpoint(&pool, &mut vectors).unwrap();
@@ -212,7 +212,7 @@ fn ranks_refuse_what_does_not_fit() {
     ];
     assert!(wrong.iter().all(|rank| thermostat.find_pairs_of_rank(&pool, rank, DT, false).is_err()));
     thermostat.find_pairs_of_rank(&pool, &whole, DT, false).unwrap();
-    thermostat.draw(&pool, 1, 1, Stream(0), Law::Gaussian);
+    thermostat.draw(1, 1, Stream(0), Law::Gaussian);
     assert!(thermostat.begin_midpoint(&pool, &mut vectors[1..]).is_err());
     thermostat.begin_midpoint(&pool, &mut vectors).unwrap();
     assert!(thermostat.go_on(&pool, [1.0; 3], &mut vectors[1..], &mut v).is_err());

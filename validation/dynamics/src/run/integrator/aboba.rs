@@ -14,7 +14,7 @@ use super::{Coupling, Path, RunError, Simulation, Want};
 
 pub fn step(system: &mut Simulation, dt: f64, want: Want, coupling: Coupling) -> Result<(), RunError> {
     system.drift(Path::first_half(dt, 0.0))?;
-    coupling.announce(system, dt, want);
+    coupling.announce(system, dt);
     system.conservative_forces(Want::FORCES)?;
     system.kick(0.5 * dt)?;
     coupling.act(system, dt, want)?;

@@ -21,9 +21,9 @@ impl Coupling {
     }
 
     /// Announces that it will act, if it is its turn, where the next forces are computed.
-    pub(in crate::run) fn announce(self, system: &mut Simulation, dt: f64, want: Want) {
+    pub(in crate::run) fn announce(self, system: &mut Simulation, dt: f64) {
         if let Some(heat) = self.heat(system, dt) {
-            system.expect_heat(heat, system.wants_of_heat(want));
+            system.expect_heat(heat);
         }
     }
 

@@ -23,7 +23,7 @@ pub fn step(
     system.kick_and_drift(lambda * dt, Path::first_half(dt, lambda * dt))?;
     system.conservative_forces(Want::FORCES)?;
     system.kick_and_drift((1.0 - 2.0 * lambda) * dt, Path::second_half(dt, (0.5 - lambda) * dt))?;
-    coupling.announce(system, dt, want);
+    coupling.announce(system, dt);
     system.conservative_forces(want)?;
     system.defer_kick(lambda * dt);
     coupling.act(system, dt, want)

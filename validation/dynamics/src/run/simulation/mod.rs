@@ -167,7 +167,7 @@ impl Simulation {
         }
         let coupling = integrator.at_setup(self, want);
         if let Some(coupling) = coupling {
-            coupling.announce(self, dt, want);
+            coupling.announce(self, dt);
         }
         match integrator.properties().drag_in_forces {
             true => self.forces_with_thermostat(dt, want),

@@ -194,7 +194,7 @@ impl Simulation {
         let want = self.wants(want);
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
         if let Some(pairs) = thermostat.find_pairs(particles, external, forces, (dt, want.virial, *number))? {
-            pairs.draw(forces.engine.pool(), *seed, *number, Stream(0), noise);
+            pairs.draw(*seed, *number, Stream(0), noise);
             thermostat.add_pair_forces(particles, external, forces, false);
         }
         thermostat.in_forces = Some(true);
@@ -217,14 +217,13 @@ impl Simulation {
     }
 
     /// Announces that the thermostat will act where the next forces are computed.
-    pub(in crate::run) fn expect_heat(&mut self, heat: Heat, want: Want) {
-        let want = self.wants(want);
+    pub(in crate::run) fn expect_heat(&mut self, heat: Heat) {
         let Simulation { forces, thermostat, .. } = self;
         // Updates pair by pair need the order of tags.
         if heat.update == Update::Midpoint
             && let Some(pairs) = thermostat.pairs.as_mut().filter(|_| thermostat.on)
         {
-            pairs.ask(&mut forces.engine, heat.time, want.virial);
+            pairs.ask(&mut forces.engine, heat.time);
             thermostat.found = None;
         }
     }
@@ -237,7 +236,7 @@ impl Simulation {
         let what = (heat.time, want.virial, *number);
         let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
         let pool = forces.engine.pool();
-        pairs.draw(pool, *seed, *number, heat.stream, heat.noise);
+        pairs.draw(*seed, *number, heat.stream, heat.noise);
         let v = particles.velocities_mut();
         let before = recording.then(|| v.to_vec());
         let virial = pairs.act(pool, heat.update, v);
