@@ -33,8 +33,7 @@ impl Pulls {
 
 impl PairThermostat {
     /// The virial `Σ r_ij ⊗ F_ij` of the drag at the velocities `v`: xx, yy, zz, xy, xz, yz. It is that of the pairs that were found
-    /// last. `pulls` get the pairs, plane by plane. Results do not depend on the number of
-    /// threads.
+    /// last. `pulls` get the pairs, plane by plane. Results do not depend on the number of threads.
     pub fn drags(&self, pool: &Pool, v: &[[f64; 3]], pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
         let v: Vec<[f64; 3]> = self.lists.order().iter().map(|k| v[*k as usize]).collect();
         let factor = |[i, j, _]: [usize; 3], _: usize, g: [f64; 3]| {
@@ -44,9 +43,8 @@ impl PairThermostat {
         self.pulls_by(pool, factor, pulls)
     }
 
-    /// The virial of the impulses of the last sequential update, without the noise of each pair itself, as forces over its time; zero if its virial
-    /// was not wanted.
-    /// Otherwise as [`PairThermostat::drags`].
+    /// The virial of the impulses of the last sequential update, without the noise of each pair itself, as forces over its time; zero if its
+    /// virial was not requested. Otherwise as [`PairThermostat::drags`].
     pub fn pulls(&self, pool: &Pool, pulls: Option<&mut Vec<Pulls>>) -> [f64; 6] {
         let impulse = |plane: usize, k: usize| self.impulses.get(plane)?.get(k).copied();
         self.pulls_by(pool, |[_, _, k], plane, _| impulse(plane, k).unwrap_or(0.0) / self.dt, pulls)
