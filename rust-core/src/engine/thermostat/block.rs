@@ -4,7 +4,7 @@ use super::distances::Distances;
 use crate::engine::vectors::{Loop, run_best};
 
 /// Number of pairs in a block, and in a vector.
-pub const BLOCK: usize = 128;
+const BLOCK: usize = 128;
 const LANES: usize = 8;
 
 /// Vectors `g` and factors of them, which become separations and the factors of these.

@@ -9,7 +9,7 @@ use psidpd_core::document::Document;
 use psidpd_core::engine::Want;
 use psidpd_dynamics::run::{RunError, Simulation};
 use psidpd_observe::meter::AnyMeter;
-use psidpd_observe::{Observe, Observers, Place, Recorded, Request, Series, read};
+use psidpd_observe::{Observe, Observers, Place, Request, Series, read};
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
@@ -166,12 +166,8 @@ impl<'a> Sampler<'a> {
         while self.stopped.is_none()
             && (self.sampled.samples() < FEWEST || !effort.is_used(1.0 - SETTLE, begin, samples))
         {
-            self.run.record_flux(Recorded::Nothing);
-            let made = self.run.advance(every - 1, dt, integrator).and_then(|()| {
-                let wants = self.observers.wants_flux(self.run.step_number() + 1, stage);
-                self.run.record_flux(wants);
-                self.run.step(dt, integrator, Want::TOTALS)
-            });
+            let wants = self.observers.wants_flux(self.run.step_number() + every, stage);
+            let made = self.run.advance_to_sample(every, dt, integrator, wants);
             self.note(made);
             if self.stopped.is_none() {
                 self.time += dt * every as f64;

@@ -32,6 +32,7 @@ use motion::Motion;
 use particles::Particles;
 use psidpd_core::engine::{Step, Want, check_reach};
 use psidpd_core::model::Model;
+use psidpd_observe::flux::Recorded;
 use record::{Record, Spare};
 use thermostat::Thermostat;
 
@@ -198,6 +199,25 @@ impl Simulation {
         self.end_step()?;
         self.refresh(Want::FORCES)?;
         self.fetch()
+    }
+
+    /// Makes `steps` steps, or one if that is 0, the last with totals and `flux`. What the thermostat does in steps up to its next
+    /// action belongs to these: its last action before a sample is recorded too.
+    pub fn advance_to_sample(
+        &mut self,
+        steps: u64,
+        dt: f64,
+        integrator: Integrator,
+        flux: Recorded,
+    ) -> Result<(), RunError> {
+        let recorded = integrator.thermostat_every().min(steps);
+        self.record_flux(Recorded::Nothing);
+        self.hold_impulses(false);
+        self.advance(steps - recorded, dt, integrator)?;
+        self.record_flux(flux);
+        self.hold_impulses(true);
+        self.advance(recorded.saturating_sub(1), dt, integrator)?;
+        self.step(dt, integrator, Want::TOTALS)
     }
 
     /// Makes a step except for its last kick, which the next step can include with the same bits. Until then,

@@ -111,3 +111,27 @@ fn samples_do_not_depend_on_what_other_steps_record() {
         assert!(expected == found, "{integrator} {every}: {expected} {found}");
     }
 }
+
+/// Steps that nobody samples record nothing, and the sample has the thermostat's last action all the same.
+#[test]
+fn a_sample_has_the_last_action() {
+    let state = state_of(SET6, "[3.0, 3.0, 3.0]", 6.05);
+    for every in [1, 2, 4, 7] {
+        let coupling = Coupling { every, ..Coupling::DEFAULT };
+        let integrator = Integrator::TwoStage { lambda: 0.21, coupling };
+        let [mut all, mut sampled] = [0, 1].map(|_| {
+            let mut run = simulation(SET6, state.clone());
+            run.prepare_for(integrator, 0.02, Want::TOTALS).unwrap();
+            run
+        });
+        all.record_flux(Recorded::Sum);
+        for number in 1..=30 {
+            all.step(0.02, integrator, Want::TOTALS).unwrap();
+            if number % 5 == 0 {
+                sampled.advance_to_sample(5, 0.02, integrator, Recorded::Sum).unwrap();
+                assert_eq!(all.flux().unwrap().sum(), sampled.flux().unwrap().sum(), "{every} {number}");
+                assert_eq!(all.pressure_tensor(), sampled.pressure_tensor(), "{every} {number}");
+            }
+        }
+    }
+}
