@@ -27,7 +27,7 @@
 use super::PairThermostat;
 use super::noise_of;
 use super::particle_loops::{Advance, Finish, Multiply, Share, Start};
-use super::pass::{Sums, Wide, add_to_host, close};
+use super::pass::{Sums, Wide, add_to_host, close, each_of_host};
 use super::solution::{End, Move, Progress, Solution, TOLERANCE, TOLERANCE_OF_DRAG};
 use crate::engine::sweep::Pool;
 use crate::engine::vectors;
@@ -131,10 +131,22 @@ impl PairThermostat {
     /// infinite mass too, if these are asked for.
     pub(super) fn virial_of_vectors(&mut self, pool: &Pool, owned: usize, noise: bool) -> [f64; 6] {
         close(&self.planes, &mut self.sums.p);
-        let virial = self.virial(pool, noise);
+        let [drag, random] = self.virials(pool, noise);
+        self.drag = drag;
         if noise {
             self.sum_forces_on_fixed(pool, owned);
         }
-        virial
+        std::array::from_fn(|c| drag[c] + random[c])
+    }
+
+    /// The virial of drag alone in the last midpoint update, if its virial was requested.
+    pub fn drag_of_midpoint(&self) -> [f64; 6] {
+        self.drag
+    }
+
+    /// Sets `v`, in the order of the host, to the velocities at which drag acted in the last midpoint update, whose virial was requested;
+    /// those of particles that it left out stay.
+    pub fn velocities_of_midpoint(&self, pool: &Pool, v: &mut [[f64; 3]]) {
+        each_of_host(pool, &self.lists.place, &self.sums.p, v, |v, p| *v = [p[0], p[1], p[2]]);
     }
 }

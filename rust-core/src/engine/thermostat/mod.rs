@@ -108,6 +108,8 @@ pub struct PairThermostat {
     solution: Solution,
     /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if the virial is requested.
     impulses: Vec<Vec<f64>>,
+    /// See [`PairThermostat::drag_of_midpoint`].
+    drag: [f64; 6],
     effort: Effort,
     /// Whether updates compute their virial.
     wants_virial: bool,
@@ -139,6 +141,7 @@ impl PairThermostat {
             sums: Sums::default(),
             solution: Solution::default(),
             impulses: Vec::new(),
+            drag: [0.0; 6],
             effort: Effort::default(),
             wants_virial: false,
             are_of_forces: false,

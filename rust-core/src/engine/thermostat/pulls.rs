@@ -91,16 +91,17 @@ fn of_plane(
     let (mut virial, mut block) = ([0.0; 6], Block::default());
     plane.for_each_pair(|[i, j, k]| {
         let g = list.g(k);
-        let is_full = block.push(g, factor([i, j, k], g), distances.kind(i, j));
+        let is_full = block.push(g, [factor([i, j, k], g)], distances.kind(i, j));
         if let Some(pulls) = &mut pulls {
             pulls.i.push(order[i]);
         }
         if is_full || k + 1 == count {
-            let of_block = block.lengthen(distances);
+            let [of_block] = block.virials(distances);
             (0..6).for_each(|c| virial[c] += of_block[c]);
             if let Some(pulls) = &mut pulls {
+                block.lengthen();
                 (0..3).for_each(|c| pulls.d[c].extend_from_slice(&block.d[c][..block.count]));
-                pulls.strengths.extend_from_slice(&block.strengths[..block.count]);
+                pulls.strengths.extend_from_slice(&block.strengths[0][..block.count]);
             }
             block.count = 0;
         }

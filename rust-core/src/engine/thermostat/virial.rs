@@ -7,18 +7,18 @@ use crate::engine::sweep::{PlanePairs, Pool};
 use psidpd_passes::plane::list::pairs_of_each;
 use psidpd_passes::plane::pair_sums::{Noise, Wide};
 
-/// Virial `Σ r_ij ⊗ F_ij` of the opposite, `g (a ξ − g·(p_i − p_j))`: xx, yy, zz, xy, xz, yz; half of it for pairs with
-/// ghosts.
-fn virial_of_plane(
+/// Virials `Σ r_ij ⊗ F_ij` of drag, of the opposite of `g (g·(p_i − p_j))`, and of noise, `g a ξ`: xx, yy, zz, xy, xz, yz; half of them for
+/// pairs with ghosts.
+fn virials_of_plane(
     PlanePairs { own, lists, .. }: &PlanePairs,
     p: &[Wide],
     noise: Option<Noise>,
     distances: &Distances,
-) -> [f64; 6] {
-    let (mut virial, mut block) = ([0.0; 6], Block::default());
-    let mut add = |block: &mut Block| {
-        let of_block = block.lengthen(distances);
-        (0..6).for_each(|c| virial[c] += of_block[c]);
+) -> [[f64; 6]; 2] {
+    let (mut virials, mut block) = ([[0.0; 6]; 2], Block::default());
+    let mut add = |block: &mut Block<2>| {
+        let of_block = block.virials(distances);
+        virials.as_flattened_mut().iter_mut().zip(of_block.as_flattened()).for_each(|(sum, add)| *sum += add);
         block.count = 0;
     };
     for (list, share) in [(&lists.own, 1.0), (&lists.with_ghosts, 0.5)] {
@@ -29,15 +29,15 @@ fn virial_of_plane(
                 let [i, j] = [own.start + i, list.j_from + list.second(k)];
                 let (g, a, b) = (list.g(k), p[i], p[j]);
                 let along: f64 = (0..3).map(|c| (a[c] - b[c]) * g[c]).sum();
-                let along = xi.get(k).map_or(0.0, |xi| amplitude * f64::from(*xi)) - along;
-                if block.push(g, along * share, distances.kind(i, j)) {
+                let random = xi.get(k).map_or(0.0, |xi| amplitude * f64::from(*xi));
+                if block.push(g, [-along * share, random * share], distances.kind(i, j)) {
                     add(&mut block);
                 }
             }
         }
     }
     add(&mut block);
-    virial
+    virials
 }
 
 /// Adds `factor g ⊗ g` to a virial.
@@ -48,18 +48,19 @@ pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
 }
 
 impl PairThermostat {
-    /// The virial of drag at the velocities that were gathered, and perhaps of noise, as mean forces over Δt.
-    pub(super) fn virial(&self, pool: &Pool, noise: bool) -> [f64; 6] {
+    /// The virials of drag at the velocities that were gathered, and of noise, if there is any, as mean forces over Δt.
+    pub(super) fn virials(&self, pool: &Pool, noise: bool) -> [[f64; 6]; 2] {
         let noise = if noise { noise_of(self.noise, &self.labels, self.kt) } else { None };
         let distances = &self.distances();
-        let mut parts: Vec<_> = self.planes.iter().map(|plane| (plane, [0.0; 6])).collect();
-        pool.each(&mut parts, |(plane, virial)| {
-            *virial = virial_of_plane(plane, &self.sums.p, noise, distances);
+        let mut parts: Vec<_> = self.planes.iter().map(|plane| (plane, [[0.0; 6]; 2])).collect();
+        pool.each(&mut parts, |(plane, virials)| {
+            *virials = virials_of_plane(plane, &self.sums.p, noise, distances);
         });
-        let mut sum = [0.0; 6];
-        for (_, virial) in parts {
-            (0..6).for_each(|c| sum[c] += 2.0 / self.dt * virial[c]);
+        let mut sums = [[0.0; 6]; 2];
+        for (_, virials) in parts {
+            let of_plane = sums.as_flattened_mut().iter_mut().zip(virials.as_flattened());
+            of_plane.for_each(|(sum, virial)| *sum += 2.0 / self.dt * virial);
         }
-        sum
+        sums
     }
 }

@@ -180,9 +180,9 @@ impl Simulation {
     }
 
     /// Records the drag at velocities `v` during a part `share` of the step, whose lines are those of the forces that were recorded last;
-    /// `sum` is its virial, averaged over the step.
-    pub(super) fn record_drag_in_forces(&mut self, sum: [f64; 6], share: f64, v: &[[f64; 3]]) {
-        let dragged = self.records_lines().then(|| Dragged { share, v: v.to_vec() });
+    /// `sum` is its virial, averaged over the step. Without lines nobody needs the velocities.
+    pub(super) fn record_drag_in_forces(&mut self, sum: [f64; 6], share: f64, v: Option<Vec<[f64; 3]>>) {
+        let dragged = v.map(|v| Dragged { share, v });
         if let Some(flux) = self.record.as_deref_mut().map(|record| &mut record.flux) {
             flux.drag.push(Arc::new(Drag { sum, ..Drag::default() }));
             if let Some(acted) = flux.forces.last_mut() {

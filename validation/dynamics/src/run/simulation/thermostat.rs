@@ -5,7 +5,7 @@ use super::forces::Forces;
 use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Stream, Update, Warmth};
+use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Pulls, Stream, Update, Warmth};
 use psidpd_core::engine::{Pool, Step, Want};
 use psidpd_observe::flux::Drag;
 use psidpd_observe::piece::Piece;
@@ -143,13 +143,14 @@ impl Simulation {
         if !self.is_recording() || !self.has_pair_thermostat() {
             return Ok(());
         }
-        let v = self.particles.now().v.clone();
-        if self.records_lines() && !self.has_forces_here() {
+        let lines = self.records_lines();
+        if lines && !self.has_forces_here() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
             thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
-            self.record_drag_at(1.0, &v);
+            self.record_drag_at(1.0, &self.particles.now().v.clone());
         } else {
-            self.record_drag_in_forces(self.tally().drag_virial, 1.0, &v);
+            let v = lines.then(|| self.particles.now().v.clone());
+            self.record_drag_in_forces(self.tally().drag_virial, 1.0, v);
         }
         Ok(())
     }
@@ -238,7 +239,6 @@ impl Simulation {
         let pool = forces.engine.pool();
         pairs.draw(*seed, *number, heat.stream, heat.noise);
         let v = particles.velocities_mut();
-        let before = recording.then(|| v.to_vec());
         let virial = pairs.act(pool, heat.update, v);
         if !virial.iter().all(|w| w.is_finite()) {
             return Err(RunError::Impulses { step: *number });
@@ -253,40 +253,49 @@ impl Simulation {
         if let Some(k) = not_finite(v) {
             return Err(RunError::Velocity { step: *number, tag: particles.now().tag[k] });
         }
-        // Implicit drag ends a step: that is half of it.
-        let part = if heat.update == Update::ImplicitDrag { 0.5 } else { 1.0 };
-        let part = part * (heat.time / dt).min(1.0);
-        let mut held = None;
-        if let Some(mut acting) = before {
-            match heat.update {
-                // Drag at the velocities in the middle.
-                Update::Midpoint => {
-                    for (b, v) in acting.iter_mut().zip(&self.particles.now().v) {
-                        (0..3).for_each(|c| b[c] = 0.5 * (b[c] + v[c]));
-                    }
-                    match self.records_lines() && self.has_forces_here() {
-                        true => {
-                            let holds = heat.time > dt && self.holds_lines();
-                            let drags = |pairs: &PairThermostat, pool: &Pool, pulls: Option<&mut _>| {
-                                pairs.drags(pool, &acting, pulls)
-                            };
-                            let drag = self.find_drag(part, holds, drags);
-                            self.record_drag_in_forces(drag.sum, part, &acting);
-                            held = Some(drag);
-                        }
-                        false => self.record_drag_at(part, &acting),
-                    }
-                }
-                Update::ImplicitDrag => self.record_drag_at(part, &self.particles.now().v.clone()),
-                Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => {
-                    self.record_drag(part, |pairs, pool, pulls| pairs.pulls(pool, pulls));
-                }
-            }
-        }
-        if recording && heat.time > dt {
-            self.hold_drag(held);
+        if recording {
+            self.record_heat(heat, dt);
         }
         Ok(())
+    }
+
+    /// Records the drag of an action of the thermostat in a step of `dt`.
+    fn record_heat(&mut self, heat: Heat, dt: f64) {
+        let (share, is_held) = ((heat.time / dt).min(1.0), heat.time > dt);
+        let mut held = None;
+        match heat.update {
+            Update::Midpoint => held = self.record_midpoint(share, is_held),
+            // It ends a step: that is half of it.
+            Update::ImplicitDrag => self.record_drag_at(0.5 * share, &self.particles.now().v.clone()),
+            Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => {
+                self.record_drag(share, |pairs, pool, pulls| pairs.pulls(pool, pulls));
+            }
+        }
+        if is_held {
+            self.hold_drag(held);
+        }
+    }
+
+    /// Records the drag of a midpoint update during a part `share` of the step, at the velocities at which it acted. Returns that with lines
+    /// of its own for the steps that hold it, if this step has none.
+    fn record_midpoint(&mut self, share: f64, is_held: bool) -> Option<Drag> {
+        let (lines, pairs) = (self.records_lines(), self.thermostat.pairs()?);
+        let (sum, mut v) = (pairs.drag_of_midpoint(), Vec::new());
+        if lines {
+            v.extend_from_slice(&self.particles.now().v);
+            pairs.velocities_of_midpoint(self.engine().pool(), &mut v);
+        }
+        let find = |pairs: &PairThermostat, pool: &Pool, pulls: Option<&mut Vec<Pulls>>| {
+            pairs.drags(pool, &v, pulls);
+            sum
+        };
+        if lines && !self.has_forces_here() {
+            self.record_drag(share, find);
+            return None;
+        }
+        let held = (is_held && self.holds_lines()).then(|| self.find_drag(share, true, find));
+        self.record_drag_in_forces(sum.map(|w| share * w), share, lines.then_some(v));
+        held
     }
 
     /// Finds the virial of an action of the thermostat, and leaves the velocities as they are.
