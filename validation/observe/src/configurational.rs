@@ -1,7 +1,6 @@
 //! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`; between reflecting surfaces with weights.
 
 use super::frame::{Frame, View};
-use psidpd_core::engine::pair_sums::ParticleSums;
 use psidpd_core::engine::{Face, PeriodicBox, Place, faces};
 use psidpd_core::model::Fluid;
 
@@ -64,7 +63,7 @@ fn weight(frame: &Frame, rounds: &[Face], range: f64, x: [f64; 3]) -> (f64, [f64
 /// Visits `w F·F` and `w ∇²U − ∇w·F` of each mobile particle, with its index. Where all particles count alike, and pairs of the run are in
 /// single precision, the second are shares of the sum, those of the energies of particles.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
-    if let Some(ParticleSums { forces, shares, .. }) = alike(frame) {
+    if let Some((forces, shares)) = alike(frame) {
         let squares = forces.iter().map(|f| f.iter().map(|f| f * f).sum());
         squares.zip(shares).enumerate().for_each(|(k, (square, share))| visit(k, [square, *share]));
         return;
@@ -83,11 +82,12 @@ fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     }
 }
 
-/// Forces and shares of particles that all have the weight 1; `None` if some do not, or if they have to be in double precision.
-fn alike<'a>(frame: &'a Frame) -> Option<&'a ParticleSums> {
-    let View { domain, dimensions, x, .. } = frame.view;
+/// Forces and shares of particles that all have the weight 1; `None` if some do not, if they have to be in double precision, or if the run
+/// has no such forces.
+fn alike<'a>(frame: &'a Frame) -> Option<(&'a [[f64; 3]], &'a [f64])> {
+    let View { domain, dimensions, x, forces, .. } = frame.view;
     let is_whole = frame.piece.is_none() && domain.periodic()[..dimensions] == [true; 3][..dimensions];
-    (is_whole && (0..x.len()).all(|k| frame.moves(k))).then(|| frame.sums())?
+    (is_whole && (0..x.len()).all(|k| frame.moves(k))).then(|| Some((forces?, &frame.sums()?.shares[..])))?
 }
 
 /// The terms of [`sums`] for each block of space. Blocks without particles are left out.

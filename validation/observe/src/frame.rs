@@ -32,6 +32,8 @@ pub struct View<'a> {
     pub images: &'a [[i32; 3]],
     /// Species are counted from 0.
     pub species: &'a [i32],
+    /// The conservative forces on the particles, if the run has these apart from others.
+    pub forces: Option<&'a [[f64; 3]]>,
     /// Tags are counted from 1.
     pub tags: &'a [i32],
     /// True for particles that never move; empty if all particles move.
@@ -97,6 +99,7 @@ impl<'a> Frame<'a> {
             frozen: still,
             v: &[],
             images: &[],
+            forces: None,
             tags: &[],
             flux: None,
             ..view

@@ -3,7 +3,7 @@
 use super::error::ObserveError;
 use super::flux::Recorded;
 use super::frame::{Frame, View};
-use super::meter::AnyMeter;
+use super::meter::{AnyMeter, Pairs};
 use super::observation::Observation;
 use super::order::{Order, Sight};
 use super::request::Observe;
@@ -78,6 +78,12 @@ impl Observers {
     /// What step `step` of stage `stage` must record of the momentum transport.
     pub fn wants_flux(&self, step: u64, stage: &str) -> Recorded {
         self.due(step, stage).map(|sampled| sampled.meter.flux()).max().unwrap_or_default()
+    }
+
+    /// Whether samples of step `step` of stage `stage` read the conservative forces of the run; not if they list all pairs, with forces.
+    pub fn wants_conservative_forces(&self, step: u64, stage: &str) -> bool {
+        let reads = |sampled: &Sampled| sampled.meter.pairs() == Pairs::SumsAndForces;
+        self.due(step, stage).any(reads) && self.wants_flux(step, stage) != Recorded::Lines
     }
 
     fn due(&self, step: u64, stage: &str) -> impl Iterator<Item = &Sampled> {

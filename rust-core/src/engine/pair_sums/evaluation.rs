@@ -15,7 +15,7 @@ use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Evaluates configurations of one fluid at one temperature.
 ///
@@ -30,7 +30,7 @@ pub struct Evaluator {
     ranges: Ranges,
     free_energy: FreeEnergy,
     work: Mutex<Work>,
-    loops: Mutex<Option<PairLoops>>,
+    loops: Mutex<PairLoops>,
 }
 
 /// The search for pairs in wide boxes, and arrays of pairs for reuse.
@@ -102,7 +102,7 @@ impl Evaluator {
         let free_energy = FreeEnergy::new(&fluid, usize::MAX).map_err(|_| TooLarge)?;
         let work = Mutex::new(Work { search: SweepPairs::new(fluid.dimensions), spare: Vec::new() });
         let ranges = Ranges::conservative(&fluid);
-        let loops = Mutex::default();
+        let loops = Mutex::new(PairLoops::new(InstructionSet::best(), fluid.dimensions));
         Ok(Evaluator { plan: Plan::whole(&fluid)?, ranges, free_energy, work, loops, fluid })
     }
 
@@ -125,12 +125,12 @@ impl Evaluator {
         Evaluation { energy, densities, psi, excess, planes, near_walls, range, shortest, reach }
     }
 
-    /// Sums over the pairs of each particle by the loops of the sweep, which take less time than [`Evaluator::evaluate`]. `None` where they
+    /// Sums over the pairs of each particle by loops like those of the sweep, which take less time than [`Evaluator::evaluate`]. `None` where they
     /// do not apply: with walls, potentials that are formulas or tables, more than two densities or ranges that differ by species, and in
     /// boxes less than twice as wide as the range.
     pub fn particle_sums(
         &self,
-        pool: &Arc<Pool>,
+        pool: &Pool,
         x: &[[f64; 3]],
         species: &[i32],
         domain: &PeriodicBox,
@@ -139,16 +139,13 @@ impl Evaluator {
         if !has_particle_sums(fluid) {
             return None;
         }
-        let mut kept = self.loops();
-        if kept.as_ref().is_none_or(|loops| !Arc::ptr_eq(loops.pool(), pool)) {
-            *kept = Some(PairLoops::new(InstructionSet::best(), fluid, pool).ok()?);
-        }
-        let (forces, sums) = kept.as_mut()?.find(&self.plan, fluid, (x, species), domain)?;
+        let mut loops = self.loops();
+        let sums = loops.find(pool, &self.plan, fluid, (x, species), domain)?;
         let mut densities = sums.densities(pool);
         self.add_own(species, &mut densities);
         let psi = self.psi_of(pool, species, &densities);
         let (shares, excess) = (sums.shares(pool, &psi), self.excess_of(species, &psi));
-        Some(ParticleSums { forces, shares, densities, excess })
+        Some(ParticleSums { shares, densities, excess })
     }
 
     /// Computes the energy `U` only.
@@ -236,7 +233,7 @@ impl Evaluator {
         self.work().spare.push(evaluation.planes);
     }
 
-    pub(super) fn loops(&self) -> MutexGuard<'_, Option<PairLoops>> {
+    pub(super) fn loops(&self) -> MutexGuard<'_, PairLoops> {
         self.loops.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

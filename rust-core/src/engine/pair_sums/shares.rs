@@ -1,25 +1,19 @@
-//! What each particle adds to the Laplacian of the energy, with the forces, by the loops of the sweep.
+//! What each particle adds to the Laplacian of the energy, by loops like those of the sweep.
 
 use super::free_energy::{Psi, times};
 use super::sweep_pairs::Ranges;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
-use crate::engine::request::Request;
-use crate::engine::sweep::{MARGIN, PairLists, Pool, Sweep};
+use crate::engine::sweep::{MARGIN, PairLists, Pool};
 use crate::model::Fluid;
-use crate::model::expression::TooLarge;
 use crate::model::pair::PairPotential;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::laplacians::{DensitySums, MOST_DENSITIES};
-use psidpd_passes::settings::{Precision, Settings};
-use psidpd_passes::tally::Want;
-use std::sync::Arc;
 
-/// Finds the forces of a fluid, and the sums over pairs that its Laplacian is made of.
+/// Finds the sums over pairs that the Laplacian of a fluid is made of.
 #[derive(Debug)]
 pub struct PairLoops {
-    sweep: Sweep,
     lists: PairLists,
     tags: Vec<i32>,
 }
@@ -27,8 +21,6 @@ pub struct PairLoops {
 /// Sums over the pairs of each particle, with pairs in single precision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleSums {
-    /// The force on each particle.
-    pub forces: Vec<[f64; 3]>,
     /// What each particle adds to the Laplacian `Σ_k ∇_k² U`:
     ///
     /// ```text
@@ -56,39 +48,27 @@ pub fn has_particle_sums(fluid: &Fluid) -> bool {
 }
 
 impl PairLoops {
-    pub fn new(set: InstructionSet, fluid: &Fluid, pool: &Arc<Pool>) -> Result<PairLoops, TooLarge> {
-        let (precision, instructions) = (Precision::Mixed, set.instructions());
-        let settings = Settings { precision, instructions, ..Settings::default() };
-        Ok(PairLoops {
-            sweep: Sweep::of_plan(Plan::new(fluid)?, settings, Arc::clone(pool)),
-            lists: PairLists::new(set, fluid.dimensions),
-            tags: Vec::new(),
-        })
+    pub fn new(set: InstructionSet, dimensions: usize) -> PairLoops {
+        PairLoops { lists: PairLists::new(set, dimensions), tags: Vec::new() }
     }
 
-    pub fn pool(&self) -> &Arc<Pool> {
-        self.sweep.pool()
-    }
-
-    /// Forces and sums; `None` if the box is too narrow or too long. `plan` has a pass for every density of the fluid.
+    /// The sums; `None` if the box is too narrow or too long. `plan` has a pass for every density of the fluid.
     pub fn find<'a>(
         &'a mut self,
+        pool: &Pool,
         plan: &Plan,
         fluid: &'a Fluid,
         (x, species): (&[[f64; 3]], &[i32]),
         domain: &PeriodicBox,
-    ) -> Option<(Vec<[f64; 3]>, Sums<'a>)> {
-        let PairLoops { sweep, lists, tags } = self;
+    ) -> Option<Sums<'a>> {
+        let PairLoops { lists, tags } = self;
         if tags.len() != x.len() {
             *tags = (1..=i32::try_from(x.len()).ok()?).collect();
         }
         let particles = Particles { owned: x.len(), x, tag: tags, kind: species };
         let range = [fluid.conservative_range(), MARGIN];
-        let sums = lists.sum_laplacians(&Arc::clone(sweep.pool()), domain, &particles, plan, range).ok()?;
-        let mut forces = vec![[0.0; 3]; x.len()];
-        let request = Request { particles, v: &[], step: None, want: Want::FORCES };
-        sweep.evaluate(domain, &request, &mut forces, false).ok()?;
-        Some((forces, Sums { sums, fluid, place: &lists.place }))
+        let sums = lists.sum_laplacians(pool, domain, &particles, plan, range).ok()?;
+        Some(Sums { sums, fluid, place: &lists.place })
     }
 }
 
@@ -216,8 +196,8 @@ range_B = 1.0
         Model::parse("m.toml", model).unwrap().at(0.7).unwrap()
     }
 
-    fn pool(threads: usize) -> Arc<Pool> {
-        Arc::new(Pool::new(NonZeroUsize::new(threads).unwrap()))
+    fn pool(threads: usize) -> Pool {
+        Pool::new(NonZeroUsize::new(threads).unwrap())
     }
 
     /// Particles at random in a box, which may be skew and open, at a density of four.
@@ -239,8 +219,8 @@ range_B = 1.0
         ((0..count).map(place).collect(), species, domain)
     }
 
-    /// Forces are those of the evaluation in double precision, and shares sum up to the Laplacian, on each instruction set; any number of
-    /// threads finds the same bits.
+    /// Shares sum up to the Laplacian of the evaluation in double precision, on each instruction set; any number of threads finds the same
+    /// bits.
     #[test]
     fn shares_sum_up_to_the_laplacian() {
         for (model, [skew, periodic]) in MODELS
@@ -254,18 +234,14 @@ range_B = 1.0
             let found = evaluator.particle_sums(&three, &x, &species, &domain);
             assert!(found.is_some(), "{}", fluid.title);
             let evaluation = evaluator.evaluate(&alone, &x, &species, &domain);
-            let (expected, laplacians) = evaluation.forces_and_laplacians(&alone, fluid);
-            let scale = expected.iter().flatten().map(|f| f * f).sum::<f64>() / x.len() as f64;
+            let laplacians = evaluation.laplacians(&alone, fluid);
             let sizes = laplacians.iter().map(|l| l.abs()).sum::<f64>();
             for (_, set) in Instructions::ALL {
                 let Some(set) = InstructionSet::new(set) else { continue };
                 for pool in [&alone, &three] {
-                    *evaluator.loops() = Some(PairLoops::new(set, fluid, pool).unwrap());
+                    *evaluator.loops() = PairLoops::new(set, fluid.dimensions);
                     let sums = evaluator.particle_sums(pool, &x, &species, &domain).unwrap();
-                    let ParticleSums { forces, shares, densities, excess } = &sums;
-                    for (f, g) in forces.as_flattened().iter().zip(expected.as_flattened()) {
-                        assert!((f - g).abs() < 1e-5 * scale.sqrt(), "{} {f} {g}", fluid.title);
-                    }
+                    let ParticleSums { shares, densities, excess } = &sums;
                     let [sum, truth] = [shares, &laplacians].map(|of| of.iter().sum::<f64>());
                     assert!((sum - truth).abs() < 2e-7 * sizes, "{} {sum} {truth}", fluid.title);
                     let of_particles = [(densities, &evaluation.densities), (excess, &evaluation.excess)];

@@ -71,8 +71,8 @@ fn bytes_per_particle(scene: &Scene) -> f64 {
     let sums = || is_periodic && scene.precision() == Precision::Mixed && has_sums();
     let observed = match scene.observe.pairs() {
         Pairs::Nothing => 0.0,
-        Pairs::Sums if sums() => SUMMED,
-        Pairs::Sums | Pairs::List => LISTED,
+        Pairs::Sums | Pairs::SumsAndForces if sums() => SUMMED,
+        Pairs::Sums | Pairs::SumsAndForces | Pairs::List => LISTED,
     };
     let evaluated = observed.max(if evaluates { EVALUATION * part } else { 0.0 });
     let cells = if scene.observe.of_liquids() { OF_LIQUIDS } else { 0.0 };

@@ -108,7 +108,11 @@ impl Runner<'_> {
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
         if self.observers.may_sample(number, &stage.name) {
-            self.observers.sample(self.course.whole()?.view(self.position.time), &stage.name);
+            let simulation = self.course.whole()?;
+            if self.observers.wants_conservative_forces(number, &stage.name) {
+                simulation.find_conservative_forces()?;
+            }
+            self.observers.sample(simulation.view(self.position.time), &stage.name);
         }
         if is_last {
             self.course.whole()?;

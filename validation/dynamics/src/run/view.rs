@@ -21,6 +21,7 @@ impl Simulation {
             v,
             images,
             species,
+            forces: self.known_conservative_forces(),
             tags,
             frozen: self.frozen(),
             temperature: self.temperature(),

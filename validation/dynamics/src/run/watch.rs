@@ -166,6 +166,9 @@ impl Watch {
         }
         if looks && looks_at_forces(stage, done) {
             let piece = piece(simulation, done);
+            if piece.is_none() {
+                simulation.find_conservative_forces()?;
+            }
             self.configurational.extend(configurational(simulation, piece.as_ref(), &mut self.evaluator));
             // Looks at a piece are rare among the steps of so many particles, so their memory is not kept.
             self.evaluator.take_if(|_| piece.is_some());

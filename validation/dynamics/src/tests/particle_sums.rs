@@ -3,8 +3,8 @@
 use super::support::{self, SET6};
 use crate::run::Simulation;
 use crate::scene::Scene;
-use psidpd_core::engine::Precision;
 use psidpd_core::engine::pair_sums::Evaluator;
+use psidpd_core::engine::{Precision, Settings};
 use psidpd_observe::Observation;
 use psidpd_observe::configurational::{sums, sums_of_blocks};
 use psidpd_observe::frame::{Frame, View};
@@ -20,7 +20,9 @@ fn crowd(model: &str, space: &str) -> (Scene, Simulation, Evaluator) {
          temperature = true\n"
     );
     let scene = support::scene(model, &text).unwrap();
-    let simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    let mut simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() }).unwrap();
+    simulation.find_conservative_forces().unwrap();
     let evaluator = Evaluator::new(scene.model.at(1.0).unwrap()).unwrap();
     (scene, simulation, evaluator)
 }

@@ -100,6 +100,9 @@ impl StepErrors {
                 }
                 kinetic.push(&[run.temperature() / kt]);
                 if conservative && sample % RARE == 0 {
+                    if run.find_conservative_forces().is_err() {
+                        return Ok(None);
+                    }
                     forces.push(&configurational::sums(&Frame::new(run.view(0.0), &evaluator)));
                 }
             }

@@ -42,6 +42,7 @@ pub fn show(
             v: &v,
             images: &images,
             species: &species,
+            forces: None,
             tags: &tags,
             frozen: &[],
             temperature: 0.0,

@@ -172,6 +172,10 @@ impl<'a> Sampler<'a> {
             if self.stopped.is_none() {
                 self.time += dt * every as f64;
                 self.sampled.push(&[self.run.temperature(), per_particle * self.run.potential_energy()]);
+                if self.observers.wants_conservative_forces(self.run.step_number(), stage) {
+                    let found = self.run.find_conservative_forces();
+                    self.note(found);
+                }
                 self.observers.sample(self.run.view(self.time), stage);
                 samples += 1;
             }

@@ -89,6 +89,8 @@ pub enum Pairs {
     Nothing,
     /// Sums over the pairs of each particle, [`Frame::sums`], or a list where there are none.
     Sums,
+    /// These, and the conservative forces, [`View::forces`](crate::frame::View::forces).
+    SumsAndForces,
     List,
 }
 

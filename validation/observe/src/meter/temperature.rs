@@ -24,7 +24,7 @@ impl Meter for Temperature {
         ..PLAIN
     };
 
-    const PAIRS: Pairs = Pairs::Sums;
+    const PAIRS: Pairs = Pairs::SumsAndForces;
 
     fn read(options: &Options) -> Result<Temperature, FileError> {
         let missing = configurational::missing(options.place.fluid, options.place.domain).unwrap_or("");

@@ -1,7 +1,9 @@
 //! Forces between particles: the engine of one model at one temperature, and the totals of its last evaluation.
 
+use super::conservative::Conservative;
 use super::particles::Particles;
 use super::{RunError, Simulation};
+use crate::particles::State;
 use psidpd_core::engine::{
     self, Engine, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally, Want,
 };
@@ -14,6 +16,8 @@ pub(super) struct Forces {
     pub tally: Tally,
     /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
     pub earlier_out_of_bounds: [u64; 2],
+    /// Those of this engine that are not counted.
+    besides_out_of_bounds: [u64; 2],
 }
 
 impl Forces {
@@ -24,6 +28,7 @@ impl Forces {
             model: model.clone(),
             tally: Tally::default(),
             earlier_out_of_bounds: [0; 2],
+            besides_out_of_bounds: [0; 2],
         })
     }
 
@@ -43,11 +48,25 @@ impl Forces {
             }
             self.check_width(&state.domain)?;
         }
-        let particles =
-            engine::Particles { owned: state.len(), x: &state.x, tag: &state.tag, kind: &state.species };
-        let request = Request { particles, v: &state.v, step, want };
+        let request = Request { particles: particles_of(state), v: &state.v, step, want };
         let failed = |source| RunError::Engine { step: number, source };
         self.tally = self.engine.forces(&state.domain, &request, force, false).map_err(failed)?;
+        Ok(())
+    }
+
+    /// Computes the conservative forces alone. Totals and counts stay those of [`Forces::compute`].
+    pub fn compute_besides(
+        &mut self,
+        state: &State,
+        number: u64,
+        force: &mut [[f64; 3]],
+    ) -> Result<(), RunError> {
+        let counted = self.engine.statistics().out_of_bounds;
+        let request = Request { particles: particles_of(state), v: &state.v, step: None, want: Want::FORCES };
+        let failed = |source| RunError::Engine { step: number, source };
+        self.engine.forces(&state.domain, &request, force, false).map_err(failed)?;
+        let now = self.engine.statistics().out_of_bounds;
+        (0..2).for_each(|k| self.besides_out_of_bounds[k] += now[k] - counted[k]);
         Ok(())
     }
 
@@ -74,14 +93,18 @@ impl Forces {
     pub fn renew(&mut self, kt: f64, settings: Settings) -> Result<(), RunError> {
         let out_of_bounds = self.out_of_bounds();
         self.engine.renew(&self.model.at(kt)?, settings)?;
-        self.earlier_out_of_bounds = out_of_bounds;
+        (self.earlier_out_of_bounds, self.besides_out_of_bounds) = (out_of_bounds, [0; 2]);
         Ok(())
     }
 
     pub fn out_of_bounds(&self) -> [u64; 2] {
         let now = self.engine.statistics().out_of_bounds;
-        std::array::from_fn(|k| self.earlier_out_of_bounds[k] + now[k])
+        std::array::from_fn(|k| self.earlier_out_of_bounds[k] + now[k] - self.besides_out_of_bounds[k])
     }
+}
+
+fn particles_of(state: &State) -> engine::Particles<'_> {
+    engine::Particles { owned: state.len(), x: &state.x, tag: &state.tag, kind: &state.species }
 }
 
 impl Simulation {
@@ -89,6 +112,7 @@ impl Simulation {
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
         self.forces.renew(self.kt(), settings)?;
         self.thermostat.follow(&self.forces);
+        self.conservative = Conservative::default();
         Ok(())
     }
 

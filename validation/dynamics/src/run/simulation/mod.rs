@@ -5,6 +5,7 @@
 //! integrator composes a step of the operators in `motion` and `thermostat`.
 
 mod cells;
+mod conservative;
 mod course;
 mod device;
 mod displaced;
@@ -25,6 +26,7 @@ pub(super) use thermostat::Heat;
 
 use super::{Integrator, RunError, State, reorder};
 use crate::checkpoint::Held;
+use conservative::Conservative;
 use external::External;
 use forces::Forces;
 use monte_carlo::MonteCarlo;
@@ -49,6 +51,7 @@ pub struct Simulation {
     particles: Particles,
     external: External,
     forces: Forces,
+    conservative: Conservative,
     thermostat: Thermostat,
     motion: Motion,
     monte_carlo: MonteCarlo,
@@ -92,6 +95,7 @@ impl Simulation {
             external: External::none(),
             thermostat: Thermostat::new(&forces),
             forces,
+            conservative: Conservative::default(),
             motion,
             monte_carlo: MonteCarlo::default(),
             seed,
@@ -110,6 +114,7 @@ impl Simulation {
             self.forces.renew(kt, self.settings())?;
             self.thermostat.follow(&self.forces);
             self.monte_carlo.energy = None;
+            self.conservative = Conservative::default();
         }
         Ok(())
     }

@@ -160,6 +160,7 @@ impl Simulation {
         self.compute(self.wants(want), None)?;
         self.add_external_forces();
         self.thermostat.in_forces = Some(false);
+        self.conservative.are_present(self.particles.moves());
         self.record_forces(self.tally().virial, None);
         Ok(())
     }

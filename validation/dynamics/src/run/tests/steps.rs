@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::checkpoint::Thermo;
+use crate::particles::{BodyForce, Tags};
 use crate::run::simulation::{Course, Task};
 use nalgebra::Matrix3;
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{PeriodicBox, Precision, Settings};
 use psidpd_observe::Recorded;
 use psidpd_observe::flux::Flux;
 
@@ -140,6 +141,73 @@ fn reading_changes_nothing() {
         }
         let (read, unread) = (read.ended().unwrap(), unread.ended().unwrap());
         assert!(read.state() == unread.state(), "{name}");
+    }
+}
+
+/// A liquid whose density leaves its bounds, with drag.
+const BOUNDED: &str = r#"
+title = "bounded"
+species = ["A"]
+[density.n]
+kernel = "wendland-c2"
+range = 1.0
+bounds = [3.0, 4.0]
+[excess_free_energy]
+A = "2*n + 0.3*n^2"
+[[thermostat]]
+gamma = 4.5
+range = 1.0
+"#;
+
+/// Conservative forces that are found for observables are those of the plain sums, with every integrator, with and without body forces and
+/// frozen particles. They change no bit of a run, no total and no count.
+#[test]
+fn finding_conservative_forces_changes_nothing() {
+    let model = Model::parse("m.toml", BOUNDED).unwrap();
+    let (state, settings) = (settled(), Settings { precision: Precision::Mixed, ..Settings::default() });
+    let push = BodyForce {
+        acceleration: [0.5, 0.0, -0.2],
+        reversed_along: None,
+        species: Vec::new(),
+        tags: Tags::Ranges(vec![1..=i32::MAX]),
+    };
+    for (pushed, (name, integrator)) in
+        [false, true].into_iter().flat_map(|p| Integrator::ALL.iter().map(move |i| (p, *i)))
+    {
+        let [mut found, mut plain, mut truth] =
+            [(); 3].map(|()| Simulation::new(&model, 1.0, state.clone(), 7).unwrap());
+        truth.use_pair_sums_only(true);
+        for run in [&mut found, &mut plain] {
+            if pushed {
+                run.set_frozen(&Tags::Ranges(vec![3..=9]));
+                run.set_body_forces(std::slice::from_ref(&push));
+            }
+            run.set_settings(settings).unwrap();
+            run.set_reordering(true);
+            run.prepare_for(integrator, 0.02, Want::TOTALS).unwrap();
+        }
+        let [mut found, mut plain] = [found, plain].map(Course::of);
+        for _ in 0..70 {
+            for run in [&mut found, &mut plain] {
+                let task = Task { want: Want::TOTALS, ..Task::default() };
+                run.make(0.02, integrator, task).unwrap();
+                run.whole().unwrap();
+            }
+            let now = found.whole().unwrap();
+            now.find_conservative_forces().unwrap();
+            truth.restore(0, &now.state().clone(), now.forces(), [0; 2]);
+            truth.compute(Want::FORCES, None).unwrap();
+            let scale = truth.forces().as_flattened().iter().map(|f| f * f).sum::<f64>().sqrt();
+            let forces = now.view(0.0).forces.unwrap();
+            for (found, expected) in forces.as_flattened().iter().zip(truth.forces().as_flattened()) {
+                assert!((found - expected).abs() < 1e-5 * scale, "{name}: {found} {expected}");
+            }
+        }
+        let [found, plain] = [&mut found, &mut plain].map(|run| run.whole().unwrap());
+        assert!(found.state() == plain.state() && found.forces() == plain.forces(), "{name}");
+        assert_eq!(format!("{:?}", found.tally()), format!("{:?}", plain.tally()), "{name}");
+        let counts = plain.out_of_bounds();
+        assert!(counts[0] > 0 && counts[1] > 0 && found.out_of_bounds() == counts, "{name}: {counts:?}");
     }
 }
 
