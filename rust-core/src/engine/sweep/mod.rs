@@ -42,6 +42,7 @@ use psidpd_passes::ground::box_geometry::BoxGeometry;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::ListTerms;
+use psidpd_passes::plane::pair_sums::Wide;
 use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::Tally;
 pub(super) use region::UNFIT;
@@ -354,6 +355,12 @@ impl Sweep {
     pub(super) fn lend_lists(&mut self, planes: &mut [PlanePairs]) {
         let lists = planes.iter_mut().map(|plane| std::mem::take(&mut plane.lists));
         with!(&mut self.workspace, m => m.lend_lists(lists));
+    }
+
+    /// See [`Workspace::exchange_memory`]. An evaluation that waits for [`Sweep::second`] cannot be completed any more.
+    pub(super) fn exchange_memory(&mut self, vectors: [&mut Vec<Wide>; 2]) {
+        self.ready = false;
+        with!(&mut self.workspace, m => m.exchange_memory(vectors));
     }
 
     /// The pairs that the last evaluation has listed, once.

@@ -8,6 +8,7 @@ mod fluid;
 mod forces;
 mod host;
 mod input;
+mod loan;
 mod prefetch;
 mod rim;
 mod scheduler;

@@ -85,7 +85,8 @@ impl PairThermostat {
         let tolerance = if noise { TOLERANCE } else { TOLERANCE_OF_DRAG };
         solution.progress = Progress::new(tolerance);
         for vectors in [&mut solution.residual, &mut solution.change] {
-            vectors.resize(lists.order().len(), Wide::ZERO);
+            // Memory of others may be longer.
+            vectors.resize(vectors.len().max(lists.order().len()), Wide::ZERO);
         }
         sums.gather(pool, lists.order(), v);
         let noise = if noise { noise_of(self.noise, labels, *kt) } else { None };

@@ -6,7 +6,7 @@
 //! noise among its forces or excluded pairs, the thermostat searches. Listed particles of a cell are in the order of the host's
 //! arrays, instead of that of their tags.
 
-use super::{Bodies, PairThermostat, Rank};
+use super::{Bodies, PairThermostat, Rank, Update};
 use crate::engine::error::EngineError;
 use crate::engine::facade::Engine;
 use crate::engine::plan::Plan;
@@ -63,6 +63,19 @@ impl PairThermostat {
     ) -> Result<(), EngineError> {
         let pool = Arc::clone(engine.pool());
         self.find_pairs_of_rank_among(engine.sweep_mut().listed_pairs(), &pool, rank, dt, virial)
+    }
+
+    /// As [`PairThermostat::act`], by the threads of `engine`, and in memory that only its evaluations need.
+    pub fn act_with(&mut self, engine: &mut Engine, update: Update, v: &mut [[f64; 3]]) -> [f64; 6] {
+        let pool = Arc::clone(engine.pool());
+        self.exchange_memory(engine);
+        let virial = self.act(&pool, update, v);
+        self.exchange_memory(engine);
+        virial
+    }
+
+    fn exchange_memory(&mut self, engine: &mut Engine) {
+        engine.sweep_mut().exchange_memory([&mut self.sums.all, &mut self.solution.change]);
     }
 
     /// Takes listed pairs, if they are those of this thermostat for a time `dt` between particles at `x`.

@@ -7,6 +7,7 @@ use super::particle_loops::Join;
 use crate::engine::sweep::{PlanePairs, Pool};
 use crate::engine::vectors;
 use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::pair_batch::room::resize;
 use psidpd_passes::plane::listed_noise::Drawn;
 pub use psidpd_passes::plane::pair_sums::Wide;
 use psidpd_passes::plane::pair_sums::{Noise, add_pairs};
@@ -105,7 +106,7 @@ pub fn fill<T: Copy + Default + Send>(
     order: &[u32],
     value: impl Fn(usize) -> T + Sync,
 ) {
-    to.resize(order.len(), T::default());
+    resize(to, order.len(), T::default());
     each_with(pool, to, order, |to, k| *to = value(k));
 }
 

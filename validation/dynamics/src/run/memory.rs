@@ -22,9 +22,9 @@ const SUMMED: f64 = 480.0;
 /// Bytes per particle of the cells for the test whether a liquid is a crystal: 10⁶ particles took 37 and 42.
 const OF_LIQUIDS: f64 = 45.0;
 
-/// Bytes per particle of a thermostat apart from the forces: the pairs, and vectors of the particles. 163 350 and 10⁶ particles took 297
-/// to 334.
-const APART: f64 = 340.0;
+/// Bytes per particle of a thermostat apart from the forces: the pairs, and vectors of the particles beside those in memory of the forces.
+/// 163 350 and 10⁶ particles took 221 to 245.
+const APART: f64 = 250.0;
 
 /// A checkpoint is made in memory, and a vector that grows has up to twice the length that it needs: runs at their peak had 2.8 times
 /// the samples of a map, and 3.8 times those of displacements.

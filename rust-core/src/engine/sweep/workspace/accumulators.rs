@@ -23,7 +23,7 @@ pub struct AccumulatorArrays {
     /// For each set of each plane: index of an accumulator minus index of its particle.
     offset: Vec<[isize; 2]>,
     /// Force sums, and density sums if there is one variable.
-    forces: Vec<Accumulator>,
+    pub forces: Vec<Accumulator>,
     /// Density sums, if there are several variables: `quads` for each particle.
     densities: Vec<Accumulator>,
     quads: usize,
@@ -81,7 +81,8 @@ impl AccumulatorArrays {
             }
         }
         self.quads = if variables > 1 { variables.div_ceil(4) } else { 0 };
-        self.forces.resize(end, Accumulator::default());
+        // A thermostat that has had the memory may have needed more.
+        self.forces.resize(end.max(self.forces.len()), Accumulator::default());
         self.densities.resize(self.quads * end, Accumulator::default());
     }
 

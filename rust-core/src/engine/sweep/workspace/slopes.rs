@@ -2,6 +2,7 @@
 
 use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
+use psidpd_passes::pair_batch::room::resize;
 use psidpd_passes::plane::slopes::{SLOPES_PER_BLOCK, Slopes};
 use psidpd_passes::simd::Scalar;
 use psidpd_threads::{Pool, SharedSlice, part};
@@ -33,10 +34,10 @@ impl<T: Scalar> SlopeArrays<T> {
     pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
         let total = order.particles() + order.copies();
         self.width = width;
-        self.rows.resize(width * total, 0.0);
+        resize(&mut self.rows, width * total, 0.0);
         self.stride = SLOPES_PER_BLOCK * (total + VECTOR_PADDING);
-        self.packed
-            .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
+        let blocks = if packs { width.div_ceil(SLOPES_PER_BLOCK) } else { 0 };
+        resize(&mut self.packed, blocks * self.stride, T::of(0.0));
     }
 
     /// Lends the slopes to the passes.

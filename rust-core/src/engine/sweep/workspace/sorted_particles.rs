@@ -6,6 +6,7 @@ use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
 use psidpd_passes::ground::arithmetic::PackedParticle;
 use psidpd_passes::ground::fixed_point::FixedPoint16;
+use psidpd_passes::pair_batch::room::resize;
 use psidpd_threads::SharedSlice;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
@@ -35,14 +36,14 @@ impl<R: PackedParticle> SortedParticles<R> {
         let total = order.particles() + order.copies();
         self.fixed16_scale = FixedPoint16::new(&order.geometry, &order.grid);
         for x in &mut self.x {
-            x.resize(total + VECTOR_PADDING, 0.0);
+            resize(x, total + VECTOR_PADDING, 0.0);
         }
         // A j-cluster of sixteen, and one that is not used, may begin after the last particle.
         for fixed16 in &mut self.fixed16 {
-            fixed16.resize(total + 4 * VECTOR_PADDING, 0);
+            resize(fixed16, total + 4 * VECTOR_PADDING, 0);
         }
-        self.packed.resize(total + VECTOR_PADDING, R::default());
-        self.species.resize(if multispecies { total + VECTOR_PADDING } else { 0 }, 0);
+        resize(&mut self.packed, total + VECTOR_PADDING, R::default());
+        resize(&mut self.species, if multispecies { total + VECTOR_PADDING } else { 0 }, 0);
     }
 
     /// Copies the first plane after the last, one period further.

@@ -14,10 +14,12 @@ pub fn request(particles: Particles) -> Request {
     Request { particles, v: &[], step: None, want: Want::FORCES }
 }
 
-fn compute_forces(engine: &mut Engine, cloud: &Cloud) {
+fn compute_forces(engine: &mut Engine, cloud: &Cloud) -> Vec<[f64; 3]> {
     let Cloud { x, tag, species, .. } = cloud;
     let request = request(Particles { x, tag, kind: species, owned: x.len() });
-    engine.forces(&cloud.domain, &request, &mut vec![[0.0; 3]; x.len()], false).unwrap();
+    let mut force = vec![[0.0; 3]; x.len()];
+    engine.forces(&cloud.domain, &request, &mut force, false).unwrap();
+    force
 }
 
 /// Velocities and virial after an action with listed pairs, and whether there were any.
@@ -25,7 +27,8 @@ fn act_on_listed(model: &str, cloud: &Cloud, engine: &mut Engine) -> (Vec<[f64; 
     act_again(&mut thermostat(model, 1.0, cloud.precision), cloud, engine)
 }
 
-/// The same with a thermostat that may have acted before.
+/// The same with a thermostat that may have acted before. In memory of the engine's evaluations it does the same as in its own, and
+/// gives it back; the forces are then the same.
 fn act_again(
     thermostat: &mut PairThermostat,
     cloud: &Cloud,
@@ -33,12 +36,16 @@ fn act_again(
 ) -> (Vec<[f64; 3]>, [f64; 6], bool) {
     let pool = engine.pool().clone();
     thermostat.ask(engine, DT);
-    compute_forces(engine, cloud);
+    let force = compute_forces(engine, cloud);
     thermostat.find_pairs_with(engine, &cloud.bodies(), DT, true).unwrap();
     let listed = thermostat.are_of_forces;
     thermostat.draw(11, 5, Stream(0), Law::Gaussian);
-    let mut v = cloud.v.clone();
-    let virial = thermostat.act(&pool, Update::Midpoint, &mut v);
+    let (mut v, mut same) = (cloud.v.clone(), cloud.v.clone());
+    let memory = engine.memory();
+    let virial = thermostat.act_with(engine, Update::Midpoint, &mut v);
+    assert!(engine.memory() >= memory);
+    assert!(virial == thermostat.act(&pool, Update::Midpoint, &mut same) && v == same);
+    assert!(force == compute_forces(engine, cloud));
     (v, virial, listed)
 }
 

@@ -237,10 +237,9 @@ impl Simulation {
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
         let what = (heat.time, want.virial, *number);
         let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
-        let pool = forces.engine.pool();
         pairs.draw(*seed, *number, heat.stream, heat.noise);
         let v = particles.velocities_mut();
-        let virial = pairs.act(pool, heat.update, v);
+        let virial = pairs.act_with(&mut forces.engine, heat.update, v);
         if !virial.iter().all(|w| w.is_finite()) {
             return Err(RunError::Impulses { step: *number });
         }
