@@ -23,10 +23,14 @@ impl Conservative {
 }
 
 impl Simulation {
-    /// Finds the conservative forces for observables that sum over pairs, if pairs are in mixed precision; trajectories, totals and counts do
-    /// not depend on it.
+    /// Finds the conservative forces for observables that sum over the pairs of particles, where these can; others evaluate forces
+    /// themselves. Trajectories, totals and counts do not depend on it.
     pub fn find_conservative_forces(&mut self) -> Result<(), RunError> {
-        if self.settings().precision == Precision::Double || self.known_conservative_forces().is_some() {
+        let all_move = self.external.frozen.is_empty();
+        let is_periodic = self.particles.now().domain.periodic()[..self.dimensions()].iter().all(|is| *is);
+        let sums = all_move && is_periodic && self.forces.has_particle_sums;
+        let is_mixed = self.settings().precision == Precision::Mixed;
+        if !(sums && is_mixed) || self.known_conservative_forces().is_some() {
             return Ok(());
         }
         let Simulation { particles, forces, conservative, number, .. } = self;

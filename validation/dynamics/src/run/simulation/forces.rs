@@ -4,6 +4,7 @@ use super::conservative::Conservative;
 use super::particles::Particles;
 use super::{RunError, Simulation};
 use crate::particles::State;
+use psidpd_core::engine::pair_sums::has_particle_sums;
 use psidpd_core::engine::{
     self, Engine, PeriodicBox, Precision, Request, Settings, Step, Surroundings, Tally, Want,
 };
@@ -18,13 +19,17 @@ pub(super) struct Forces {
     pub earlier_out_of_bounds: [u64; 2],
     /// Those of this engine that are not counted.
     besides_out_of_bounds: [u64; 2],
+    /// See [`has_particle_sums`].
+    pub has_particle_sums: bool,
 }
 
 impl Forces {
     pub fn new(model: &Model, kt: f64) -> Result<Forces, RunError> {
-        let settings = Settings { precision: Precision::Double, ..Settings::default() };
+        let (settings, fluid) =
+            (Settings { precision: Precision::Double, ..Settings::default() }, model.at(kt)?);
         Ok(Forces {
-            engine: Engine::new(&model.at(kt)?, settings)?,
+            engine: Engine::new(&fluid, settings)?,
+            has_particle_sums: has_particle_sums(&fluid),
             model: model.clone(),
             tally: Tally::default(),
             earlier_out_of_bounds: [0; 2],
@@ -92,7 +97,9 @@ impl Forces {
     /// Takes another temperature, or other settings.
     pub fn renew(&mut self, kt: f64, settings: Settings) -> Result<(), RunError> {
         let out_of_bounds = self.out_of_bounds();
-        self.engine.renew(&self.model.at(kt)?, settings)?;
+        let fluid = self.model.at(kt)?;
+        self.engine.renew(&fluid, settings)?;
+        self.has_particle_sums = has_particle_sums(&fluid);
         (self.earlier_out_of_bounds, self.besides_out_of_bounds) = (out_of_bounds, [0; 2]);
         Ok(())
     }
