@@ -16,8 +16,8 @@ const EVALUATION: f64 = 1200.0;
 /// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330.
 const LISTED: f64 = 1300.0;
 
-/// Bytes per particle where they sum them: `temperature` of 60 500 and of 282 000 particles took 480 and 390.
-const SUMMED: f64 = 480.0;
+/// Bytes per particle where they sum them: `temperature` of 60 500, 106 000 and 282 000 particles took 140 to 270.
+const SUMMED: f64 = 240.0;
 
 /// Bytes per particle of the cells for the test whether a liquid is a crystal: 10⁶ particles took 37 and 42.
 const OF_LIQUIDS: f64 = 45.0;
