@@ -73,6 +73,12 @@ impl Lines {
         }
     }
 
+    /// Adds the symmetric part of `Σ d ⊗ f` in the order xx, yy, zz, xy, xz, yz.
+    pub fn add_to(&self, sums: &mut [f64; 6]) {
+        let of_block = run_best(Sum { lines: self });
+        sums.iter_mut().zip(of_block).for_each(|(sum, add)| *sum += add);
+    }
+
     /// Becomes the lines between the particles of pairs, at most [`BLOCK`], which begin at the particles at `x`. `d` are the
     /// separations of the pairs, and `strengths` times `share` the forces divided by them. The particles lie at `displacements` from
     /// `x`, which are empty where they lie there.
@@ -98,6 +104,32 @@ impl Lines {
             }
             run_best(Join::<true> { lines: self, pairs });
         }
+    }
+}
+
+/// Number of lines in a vector.
+const LANES: usize = 8;
+
+struct Sum<'a> {
+    lines: &'a Lines,
+}
+
+impl Loop for Sum<'_> {
+    type Out = [f64; 6];
+
+    #[inline(always)]
+    fn run(self) -> [f64; 6] {
+        let Lines { count, d, f, .. } = self.lines;
+        COMPONENTS.map(|(a, b)| {
+            let [of_a, of_b] = [(a, b), (b, a)].map(|(a, b)| (&d[a][..*count], &f[b][..*count]));
+            let (mut lanes, mut rest) = ([0.0; LANES], 0.0);
+            for (d, f) in [of_a, of_b] {
+                let ((d, d_rest), (f, f_rest)) = (d.as_chunks::<LANES>(), f.as_chunks::<LANES>());
+                d.iter().zip(f).for_each(|(d, f)| (0..LANES).for_each(|k| lanes[k] += d[k] * f[k]));
+                rest += d_rest.iter().zip(f_rest).map(|(d, f)| d * f).sum::<f64>();
+            }
+            0.5 * (lanes.iter().sum::<f64>() + rest)
+        })
     }
 }
 
@@ -143,7 +175,7 @@ pub enum Recorded {
     Nothing,
     /// The sum over all lines.
     Sum,
-    /// The lines.
+    /// The lines, whose sum [`Frame::carried_pressure`](crate::frame::Frame::carried_pressure) takes.
     Lines,
 }
 
@@ -152,6 +184,7 @@ pub type OnWall = [f64; 4];
 
 #[derive(Debug, Clone, Default)]
 pub struct Flux {
+    pub recorded: Recorded,
     /// The paths of the particles.
     pub ways: Vec<Line>,
     /// The drag of the pairs, averaged over the step, of each action of a thermostat.
@@ -165,7 +198,7 @@ pub struct Flux {
 /// The drag of the pairs in one action of a thermostat, averaged over the step.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drag {
-    /// `Σ d ⊗ f` in the order xx, yy, zz, xy, xz, yz.
+    /// `Σ d ⊗ f` in the order xx, yy, zz, xy, xz, yz, if sums are recorded.
     pub sum: [f64; 6],
     /// The positions of the particles at the time, and the pairs, in parts that do not depend on the number of threads; none if only
     /// the sum is recorded.
@@ -198,6 +231,7 @@ mod arrays {
 pub struct Acted {
     /// The fraction of the step for which these forces acted.
     pub share: f64,
+    /// Their virial, if sums are recorded.
     pub virial: [f64; 6],
     /// The forces on walls of matter.
     pub on_walls: Vec<OnWall>,
@@ -239,7 +273,7 @@ impl Flux {
         sums
     }
 
-    /// The symmetric part of `Σ d ⊗ f` over all lines.
+    /// The symmetric part of `Σ d ⊗ f` over all lines, if the sum is recorded.
     pub fn sum(&self) -> [f64; 6] {
         let mut sum = [0.0; 6];
         for acted in &self.forces {

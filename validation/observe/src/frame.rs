@@ -1,6 +1,6 @@
 //! One configuration for the observables. Quantities that several observables need are computed once.
 
-use super::flux::{BLOCK, Carrier, Dragged, Flux, Line, Lines, Place, Pull};
+use super::flux::{BLOCK, Carrier, Dragged, Flux, Line, Lines, Place, Pull, Recorded};
 use super::options::Centre;
 use super::piece::{Piece, Whole};
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair, ParticleSums};
@@ -43,9 +43,9 @@ pub struct View<'a> {
     pub kinetic_energy: f64,
     /// The sums Σψ and Σφ of the potential energy, if the step requested energies.
     pub potential: [f64; 2],
-    /// The tensor `(Σ m v v + W)/V` in the order xx, yy, zz, xy, xz, yz, if the step requested a virial.
+    /// The tensor `(Σ m v v + W)/V` in the order xx, yy, zz, xy, xz, yz, if the step requested it.
     pub pressure: [f64; 6],
-    /// The tensor of pressure with conservative forces only.
+    /// The tensor of pressure with conservative forces only, if the step requested a virial.
     pub conservative_pressure: [f64; 6],
     /// The momentum transport in the step, if the step recorded it.
     pub flux: Option<&'a Flux>,
@@ -70,6 +70,8 @@ pub struct Frame<'a> {
     sums: OnceCell<Option<ParticleSums>>,
     /// The evaluations of forces that acted at positions other than the present ones.
     earlier: OnceCell<Vec<Option<Earlier>>>,
+    /// The symmetric part of `Σ d ⊗ f` over all lines, once they are added up.
+    of_lines: OnceCell<[f64; 6]>,
     /// Positions along one axis, most likely those of all profiles: the axis, the centre, and what `Across::fractions` found.
     pub(crate) fractions: OnceCell<(usize, Centre, Option<Vec<f64>>)>,
 }
@@ -87,8 +89,8 @@ const LINES: usize = 2048;
 impl<'a> Frame<'a> {
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
         let (evaluation, sums) = (OnceCell::new(), OnceCell::new());
-        let (earlier, fractions) = (OnceCell::new(), OnceCell::new());
-        Frame { view, evaluator, piece: None, evaluation, sums, earlier, fractions }
+        let (earlier, of_lines, fractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Frame { view, evaluator, piece: None, evaluation, sums, earlier, of_lines, fractions }
     }
 
     /// A piece of a configuration, or all of it.
@@ -177,18 +179,27 @@ impl<'a> Frame<'a> {
                     last.count += count;
                     last.parts.push(part);
                 }
-                _ => work.push(Work { carrier, count, parts: vec![part], sums: Vec::new() }),
+                _ => {
+                    work.push(Work { carrier, count, parts: vec![part], sums: Vec::new(), tensor: [0.0; 6] })
+                }
             }
         }
-        self.view.pool.each(&mut work, |Work { parts, sums, .. }| {
+        self.view.pool.each(&mut work, |Work { parts, sums, tensor, .. }| {
             sums.resize(width, 0.0);
             let (mut lines, mut arrays) = (Lines::default(), A::default());
-            parts.iter().for_each(|part| part.in_blocks(&mut lines, |lines| add(lines, &mut arrays, sums)));
+            let mut visit = |lines: &Lines| {
+                lines.add_to(tensor);
+                add(lines, &mut arrays, sums);
+            };
+            parts.iter().for_each(|part| part.in_blocks(&mut lines, &mut visit));
         });
         let mut all = [vec![0.0; width], vec![0.0; width]];
-        for Work { carrier, sums, .. } in &work {
+        let mut of_lines = [0.0; 6];
+        for Work { carrier, sums, tensor, .. } in &work {
             all[*carrier as usize].iter_mut().zip(sums).for_each(|(all, sum)| *all += sum);
+            of_lines.iter_mut().zip(tensor).for_each(|(all, sum)| *all += sum);
         }
+        self.of_lines.get_or_init(|| of_lines);
         Some(all)
     }
 
@@ -225,7 +236,16 @@ impl<'a> Frame<'a> {
 
     /// The pressure tensor of the momentum transport in the whole box; `None` if the step did not record it.
     pub fn carried_pressure(&self) -> Option<[f64; 6]> {
-        Some(self.view.flux?.sum().map(|sum| sum / self.volume()))
+        let flux = self.view.flux?;
+        let sum = match (flux.recorded, self.of_lines.get()) {
+            (Recorded::Nothing | Recorded::Sum, _) => flux.sum(),
+            (Recorded::Lines, Some(known)) => *known,
+            (Recorded::Lines, None) => {
+                self.sum_lines(0, |_, (), _| ())?;
+                *self.of_lines.get()?
+            }
+        };
+        Some(sum.map(|sum| sum / self.volume()))
     }
 
     pub fn mass(&self, particle: usize) -> f64 {
@@ -256,6 +276,8 @@ struct Work<'a> {
     count: usize,
     parts: Vec<Part<'a>>,
     sums: Vec<f64>,
+    /// The symmetric part of `Σ d ⊗ f`.
+    tensor: [f64; 6],
 }
 
 enum Part<'a> {

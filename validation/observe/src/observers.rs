@@ -75,6 +75,11 @@ impl Observers {
         want
     }
 
+    /// Whether samples of step `step` of stage `stage` read the pressure with drag and noise.
+    pub fn wants_pressure(&self, step: u64, stage: &str) -> bool {
+        self.due(step, stage).any(|sampled| sampled.meter.reads_pressure())
+    }
+
     /// What step `step` of stage `stage` must record of the momentum transport.
     pub fn wants_flux(&self, step: u64, stage: &str) -> Recorded {
         self.due(step, stage).map(|sampled| sampled.meter.flux()).max().unwrap_or_default()
@@ -123,8 +128,11 @@ impl Observers {
         if let Some(frame) = frame.as_ref().filter(|_| needs_lines) {
             frame.expect_lines();
         }
-        for observer in self.observers.iter_mut().filter(|o| due(o)) {
-            for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
+        // Those that walk along lines come first, and find the sum that others read.
+        for walks in [true, false] {
+            let observers = self.observers.iter_mut().filter(|o| due(o)).flat_map(|o| &mut o.stages);
+            let is_next = |s: &&mut Sampled| s.stage == stage && (s.meter.flux() == Recorded::Lines) == walks;
+            for sampled in observers.filter(is_next) {
                 let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));
                 sampled.left_out = sampled.left_out.saturating_add(u64::from(!taken));
             }

@@ -24,7 +24,7 @@ impl PairThermostat {
             sums.p.fill(Wide::ZERO);
         }
         sums.compute(pool, *set, planes, of_pairs);
-        let [of_drag, of_noise] = if self.wants_virial { self.virials(pool, noise) } else { [[0.0; 6]; 2] };
+        let [of_drag, of_noise] = if self.kept.virial { self.virials(pool, noise) } else { [[0.0; 6]; 2] };
         // Frozen particles receive forces like others; the integrator does not move them.
         add_to_host(pool, &self.lists.place, &self.sums.all, -2.0 / self.dt, force);
         std::array::from_fn(|c| of_drag[c] + of_noise[c])

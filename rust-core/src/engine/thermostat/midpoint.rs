@@ -125,14 +125,14 @@ impl PairThermostat {
 
     /// Whether anything is computed from the velocities in the middle of the update.
     pub(super) fn wants_middle(&self) -> bool {
-        self.wants_virial || self.on_fixed.is_asked
+        self.kept.virial || self.kept.middle || self.on_fixed.is_asked
     }
 
-    /// The virial of drag at the velocities that `p` has, and of noise; finds the forces on those of the first `owned` particles that have
+    /// The virial of drag at the velocities that `p` has, and of noise, if it is requested; finds the forces on those of the first `owned` particles that have
     /// infinite mass too, if these are asked for.
     pub(super) fn virial_of_vectors(&mut self, pool: &Pool, owned: usize, noise: bool) -> [f64; 6] {
         close(&self.planes, &mut self.sums.p);
-        let [drag, random] = self.virials(pool, noise);
+        let [drag, random] = if self.kept.virial { self.virials(pool, noise) } else { [[0.0; 6]; 2] };
         self.drag = drag;
         if noise {
             self.sum_forces_on_fixed(pool, owned);
@@ -145,8 +145,8 @@ impl PairThermostat {
         self.drag
     }
 
-    /// Sets `v`, in the order of the host, to the velocities at which drag acted in the last midpoint update, whose virial was requested;
-    /// those of particles that it left out stay.
+    /// Sets `v`, in the order of the host, to the velocities at which drag acted in the last midpoint update, which has kept them, or has
+    /// computed its virial; those of particles that it left out stay.
     pub fn velocities_of_midpoint(&self, pool: &Pool, v: &mut [[f64; 3]]) {
         each_of_host(pool, &self.lists.place, &self.sums.p, v, |v, p| *v = [p[0], p[1], p[2]]);
     }

@@ -111,8 +111,7 @@ pub struct PairThermostat {
     /// See [`PairThermostat::drag_of_midpoint`].
     drag: [f64; 6],
     effort: Effort,
-    /// Whether updates compute their virial.
-    wants_virial: bool,
+    kept: Kept,
     /// Whether the present pairs are those that an evaluation of forces has listed.
     are_of_forces: bool,
     on_fixed: OnFixed,
@@ -143,7 +142,7 @@ impl PairThermostat {
             impulses: Vec::new(),
             drag: [0.0; 6],
             effort: Effort::default(),
-            wants_virial: false,
+            kept: Kept::default(),
             are_of_forces: false,
             on_fixed: OnFixed::default(),
             exchange: Exchange::default(),
@@ -204,7 +203,7 @@ impl PairThermostat {
         self.has_pairs = false;
         particles.check(26)?;
         particles.check_images(around.images)?;
-        (self.dt, self.wants_virial, self.exchange) = (dt, virial, Exchange::default());
+        (self.dt, self.kept, self.exchange) = (dt, Kept { virial, middle: false }, Exchange::default());
         let mut is_long = false;
         self.noise = None;
         self.take(listed, particles.x, dt);
@@ -221,6 +220,11 @@ impl PairThermostat {
         fill(pool, &mut self.masses, order, |k| Mass::new(mass(k)));
         self.has_pairs = true;
         Ok(())
+    }
+
+    /// Sets what updates compute besides velocities, until the next search.
+    pub fn keep(&mut self, kept: Kept) {
+        self.kept = kept;
     }
 
     /// Stops a host that goes on after a search that has failed: some arrays may be those of other particles.
@@ -305,6 +309,15 @@ impl PairThermostat {
     pub fn effort(&self) -> Effort {
         self.effort
     }
+}
+
+/// What an update computes besides velocities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Kept {
+    /// Its virial, and for [`PairThermostat::pulls`] the impulses of a rule pair by pair.
+    pub virial: bool,
+    /// The velocities at which the midpoint rule has its drag, for [`PairThermostat::velocities_of_midpoint`].
+    pub middle: bool,
 }
 
 /// Temperature of the particles as the thermostat measures it, and its rate.

@@ -54,13 +54,11 @@ impl PairThermostat {
         reversed: bool,
         draws: bool,
     ) -> [f64; 6] {
-        let PairThermostat {
-            plan, planes, lists, labels, masses, kt, dt, noise, impulses, wants_virial, ..
-        } = self;
+        let PairThermostat { plan, planes, lists, labels, masses, kt, dt, noise, impulses, kept, .. } = self;
         let distances = &Distances::new(plan, *dt, &labels.species);
         impulses.resize_with(planes.len(), Vec::new);
         let (planes, kt) = (&planes[..], *kt);
-        let distances = wants_virial.then_some(distances);
+        let distances = kept.virial.then_some(distances);
         let (noise, law) = noise.expect("the noise of the pairs has been drawn");
         let [noise, of_chances] = noise.map(|noise| ListedNoise { noise, law, tags: &labels.tags });
         let of_chances = ListedNoise { law: Law::Uniform, ..of_chances };
@@ -83,7 +81,7 @@ impl PairThermostat {
                 let next = if plane.next.is_empty() { None } else { slices[above].take() };
                 let Some(impulses) = records[number].take() else { continue };
                 impulses.clear();
-                impulses.resize(if *wants_virial { plane.lists.own.count() } else { 0 }, 0.0);
+                impulses.resize(if kept.virial { plane.lists.own.count() } else { 0 }, 0.0);
                 shares.push(Share {
                     plane,
                     own,

@@ -59,7 +59,8 @@ impl Live {
     }
 
     /// Makes `steps` steps, with the totals after the last one. Beyond the end of the scene the steps are those of its last
-    /// stage. `stop` is asked before each step; the step after its first `true` is the last.
+    /// stage. `stop` is asked before each step; the step after its first `true` is the last, whose pressure has no drag and noise if the
+    /// thermostat does not act in it.
     pub fn run(&mut self, steps: u64, mut stop: impl FnMut() -> bool) -> Result<(), RunError> {
         for k in 1..=steps {
             if self.done == self.stage().steps && self.stage + 1 < self.scene.stages.len() {
@@ -69,7 +70,10 @@ impl Live {
             let last = stop() || k == steps;
             let want = if last { Want::TOTALS } else { Want::FORCES };
             let (dt, integrator) = (self.stage().dt, self.stage().integrator);
-            let task = Task { want, settles: self.scene.settles(self.stage, self.done), ..Task::default() };
+            // The pressure after the last step has the last action of the thermostat.
+            let impulses = last || steps - k < integrator.thermostat_every();
+            let settles = self.scene.settles(self.stage, self.done);
+            let task = Task { want, impulses, settles, ..Task::default() };
             let made = self.course.make(dt, integrator, task);
             if last || made.is_err() {
                 let whole = self.course.whole();

@@ -2,7 +2,7 @@
 
 use super::looks::interval_of_looks;
 use super::output::{Output, write_json, write_observations};
-use super::simulation::Task;
+use super::simulation::{Needed, Task};
 use super::watch::{Deviation, Thermometer, Watch};
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
@@ -88,14 +88,13 @@ impl Runner<'_> {
         // What the thermostat does in this step is asked for up to the step before it acts again.
         let period = stage.integrator.thermostat_every();
         let last = if number.is_multiple_of(period) { number + period - 1 } else { number };
-        let virial = |step| self.is_row(step) || self.observers.wants(step, &stage.name).virial;
+        let pressure = |step| self.is_row(step) || self.observers.wants_pressure(step, &stage.name);
         let flux = |step| self.observers.wants_flux(step, &stage.name);
-        let held_flux = (number + 1..=last).map(flux).max().unwrap_or_default();
         let task = Task {
             want,
-            flux: held_flux.max(flux(number)),
-            held_flux,
-            holds_impulses: (number + 1..=last).any(virial),
+            flux: flux(number),
+            held_drag: Needed::by((number + 1..=last).map(flux)),
+            impulses: (number..=last).any(pressure),
             settles: self.scene.settles(self.position.stage, self.position.done),
         };
         self.course.make(stage.dt, stage.integrator, task)?;

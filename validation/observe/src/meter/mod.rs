@@ -57,6 +57,9 @@ pub trait Meter: Sized {
     /// True if the observable needs motion in time, which Monte Carlo does not have.
     const OF_MOTION: bool = false;
 
+    /// Whether it reads [`View::pressure`](crate::frame::View::pressure), which has the virial of drag and noise.
+    const PRESSURE: bool = Self::NEEDS.virial;
+
     /// True if the results mean nothing for a crystal.
     const OF_LIQUIDS: bool = false;
 
@@ -119,6 +122,10 @@ macro_rules! meters {
 
             pub fn flux(&self) -> Recorded {
                 match self { $(AnyMeter::$variant(_) => <$meter as Meter>::FLUX),+ }
+            }
+
+            pub fn reads_pressure(&self) -> bool {
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::PRESSURE),+ }
             }
 
             pub fn of_liquids(&self) -> bool {

@@ -94,6 +94,7 @@ impl Meter for SurfaceTension {
 
     const NEEDS: Want = Want::TOTALS;
     const FLUX: Recorded = Recorded::Sum;
+    const PRESSURE: bool = false;
     const OF_LIQUIDS: bool = true;
     const PAIRS: Pairs = Pairs::List;
 

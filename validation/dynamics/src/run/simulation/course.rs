@@ -1,5 +1,6 @@
 //! The steps of a run one after the other, and the present one as a whole where it is read.
 
+use super::record::Needed;
 use super::{RunError, Simulation};
 use crate::integrator::Integrator;
 use crate::run::Thermo;
@@ -27,10 +28,10 @@ pub struct Task {
     pub want: Want,
     /// What is recorded of the transport of momentum.
     pub flux: Recorded,
-    /// What of that steps record before the thermostat acts again.
-    pub held_flux: Recorded,
-    /// Whether steps before the thermostat acts again ask for its virial.
-    pub holds_impulses: bool,
+    /// What steps need of the drag before the thermostat acts again.
+    pub held_drag: Needed,
+    /// Whether this step or these ask for the virial of the thermostat.
+    pub impulses: bool,
     /// Whether Monte Carlo tunes the length of its moves.
     pub settles: bool,
 }
@@ -42,10 +43,10 @@ impl Course {
 
     /// Makes one step of `dt`.
     pub fn make(&mut self, dt: f64, integrator: Integrator, task: Task) -> Result<(), RunError> {
-        let Task { want, flux, held_flux, holds_impulses, settles } = task;
+        let Task { want, flux, held_drag, impulses, settles } = task;
         self.want = want;
-        self.simulation.hold_impulses(holds_impulses);
-        self.simulation.record_and_hold_flux(flux, held_flux);
+        self.simulation.ask_for_impulses(Some(impulses));
+        self.simulation.record_and_hold_flux(flux, held_drag);
         self.simulation.set_settling(settles);
         self.simulation.begin_step(dt, integrator, want)
     }

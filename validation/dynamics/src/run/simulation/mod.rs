@@ -22,6 +22,7 @@ mod thermostat;
 mod walls;
 
 pub(super) use course::{Course, Task};
+pub(super) use record::Needed;
 pub(super) use thermostat::Heat;
 
 use super::{Integrator, RunError, State, reorder};
@@ -217,10 +218,10 @@ impl Simulation {
     ) -> Result<(), RunError> {
         let recorded = integrator.thermostat_every().min(steps);
         self.record_flux(Recorded::Nothing);
-        self.hold_impulses(false);
+        self.ask_for_impulses(Some(false));
         self.advance(steps - recorded, dt, integrator)?;
         self.record_flux(flux);
-        self.hold_impulses(true);
+        self.ask_for_impulses(Some(true));
         self.advance(recorded.saturating_sub(1), dt, integrator)?;
         self.step(dt, integrator, Want::TOTALS)
     }

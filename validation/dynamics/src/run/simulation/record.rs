@@ -12,14 +12,33 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Default)]
 pub struct Record {
     what: Recorded,
-    /// What of the drag the steps up to the next action of the thermostat need.
-    held: Recorded,
+    /// What the steps up to the next action of the thermostat need of the drag.
+    held: Needed,
     dt: f64,
     flux: Flux,
     /// Whether operators may add to the record.
     open: bool,
     /// Of the positions at which the forces acted that were recorded last, [`Particles::moves`]; `None` if they were computed for others.
     acted_at: Option<u64>,
+}
+
+/// What is needed of the drag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Needed {
+    pub sum: bool,
+    pub lines: bool,
+}
+
+impl Needed {
+    fn with(self, what: Recorded) -> Needed {
+        let Needed { sum, lines } = self;
+        Needed { sum: sum || what == Recorded::Sum, lines: lines || what == Recorded::Lines }
+    }
+
+    /// What steps need that record these.
+    pub fn by(all: impl IntoIterator<Item = Recorded>) -> Needed {
+        all.into_iter().fold(Needed::default(), Needed::with)
+    }
 }
 
 /// Arrays of earlier records, for reuse: new ones cost more than what fills them.
@@ -45,40 +64,48 @@ impl Spare {
 impl Simulation {
     /// Sets what later steps record of the transport of momentum. Trajectories do not depend on it.
     pub fn record_flux(&mut self, what: Recorded) {
-        self.record_and_hold_flux(what, what);
+        self.record_and_hold_flux(what, Needed::by([what]));
     }
 
-    /// As [`Simulation::record_flux`], where steps up to the next action of the thermostat record no more than `held`.
-    pub(super) fn record_and_hold_flux(&mut self, what: Recorded, held: Recorded) {
-        match what {
-            Recorded::Nothing => {
-                if let Some(record) = self.record.take() {
-                    self.spare.keep(record.flux);
-                }
+    /// As [`Simulation::record_flux`], where steps up to the next action of the thermostat need no more of the drag than `held`.
+    pub(super) fn record_and_hold_flux(&mut self, what: Recorded, held: Needed) {
+        if held.with(what) == Needed::default() {
+            if let Some(record) = self.record.take() {
+                self.spare.keep(record.flux);
             }
-            _ => {
-                let record = self.record.get_or_insert_default();
-                (record.what, record.held) = (what, held);
-            }
+        } else {
+            let record = self.record.get_or_insert_default();
+            (record.what, record.held) = (what, held);
         }
     }
 
     /// The transport of momentum in the present step, if it was recorded.
     pub fn flux(&self) -> Option<&Flux> {
-        self.record.as_deref().filter(|record| record.dt > 0.0).map(|record| &record.flux)
+        let recorded = |record: &&Record| record.dt > 0.0 && record.flux.recorded != Recorded::Nothing;
+        self.record.as_deref().filter(recorded).map(|record| &record.flux)
     }
 
     pub(super) fn is_recording(&self) -> bool {
         self.record.as_ref().is_some_and(|record| record.open)
     }
 
+    pub(super) fn records_sum(&self) -> bool {
+        self.is_recording() && self.record.as_ref().is_some_and(|record| record.what == Recorded::Sum)
+    }
+
     pub(super) fn records_lines(&self) -> bool {
         self.record.as_ref().is_some_and(|record| record.what == Recorded::Lines)
     }
 
-    /// Whether steps up to the next action of the thermostat need the lines of drag.
-    pub(super) fn holds_lines(&self) -> bool {
-        self.record.as_ref().is_some_and(|record| record.held == Recorded::Lines)
+    /// What the steps up to the next action of the thermostat need of the drag.
+    pub(super) fn held_drag(&self) -> Needed {
+        self.record.as_ref().filter(|record| record.open).map_or(Needed::default(), |record| record.held)
+    }
+
+    /// What this step and those need of it.
+    pub(super) fn needed_drag(&self) -> Needed {
+        let what = self.record.as_ref().filter(|record| record.open).map(|record| record.what);
+        self.held_drag().with(what.unwrap_or_default())
     }
 
     pub(super) fn open_record(&mut self, dt: f64) {
@@ -89,7 +116,8 @@ impl Simulation {
         let mut ways = std::mem::take(&mut self.spare.ways);
         ways.clear();
         // Between two actions the drag of the last goes on.
-        record.flux = Flux { ways, drag: self.thermostat.held_drag.clone(), ..Flux::default() };
+        let (recorded, drag) = (record.what, self.thermostat.held_drag.clone());
+        record.flux = Flux { recorded, ways, drag, ..Flux::default() };
         (record.dt, record.open, record.acted_at) = (dt, true, None);
     }
 
@@ -242,7 +270,7 @@ impl Simulation {
         share: f64,
         find: impl FnOnce(&PairThermostat, &Pool, Option<&mut Vec<Pulls>>) -> [f64; 6],
     ) {
-        let drag = self.find_drag(share, self.records_lines(), find);
+        let drag = self.find_drag(share, self.needed_drag().lines, find);
         if let Some(record) = &mut self.record {
             record.flux.drag.push(Arc::new(drag));
         }

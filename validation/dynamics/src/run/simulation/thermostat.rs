@@ -5,7 +5,7 @@ use super::forces::Forces;
 use super::particles::Particles;
 use super::{RunError, Simulation};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, Effort, PairThermostat, Pulls, Stream, Update, Warmth};
+use psidpd_core::engine::thermostat::{Bodies, Effort, Kept, PairThermostat, Pulls, Stream, Update, Warmth};
 use psidpd_core::engine::{Pool, Step, Want};
 use psidpd_observe::flux::Drag;
 use psidpd_observe::piece::Piece;
@@ -17,15 +17,14 @@ pub(super) struct Thermostat {
     pairs: Option<PairThermostat>,
     /// Iterations at earlier temperatures and settings.
     effort_before: Effort,
-    /// The positions of which the pairs are known, by their number, the time that drag and noise act for, and whether their virial was
-    /// requested.
-    found: Option<(u64, f64, bool)>,
+    /// The positions of which the pairs are known, by their number, and the time that drag and noise act for.
+    found: Option<(u64, f64)>,
     /// Virial of the mean force of drag and noise since they last acted, where they are apart from the forces.
     pub impulse_virial: [f64; 6],
     /// The mean drag of the pairs when it last acted, for records of the steps up to the next time.
     pub held_drag: Vec<Arc<Drag>>,
-    /// Whether steps before it acts again ask for that virial.
-    pub is_held: bool,
+    /// Whether this step, or one before it acts again, asks for that virial; `None` if it does where it asks for that of the forces.
+    pub is_asked: Option<bool>,
     /// Whether drag and noise are among the present forces, where they act; `None` if nobody has asked for these forces.
     pub in_forces: Option<bool>,
     kept_forces: Vec<[f64; 3]>,
@@ -50,7 +49,7 @@ impl Thermostat {
             found: None,
             impulse_virial: [0.0; 6],
             held_drag: Vec::new(),
-            is_held: false,
+            is_asked: None,
             in_forces: None,
             kept_forces: Vec::new(),
         }
@@ -79,16 +78,16 @@ impl Thermostat {
         effort
     }
 
-    /// Finds the pairs for a time `dt`, and returns them if the thermostat acts.
+    /// Finds the pairs for a time `dt`, and returns them if the thermostat acts; its updates compute what is `kept`.
     fn find_pairs(
         &mut self,
         particles: &Particles,
         external: &External,
         forces: &mut Forces,
-        (dt, virial, number): (f64, bool, u64),
+        (dt, kept, number): (f64, Kept, u64),
     ) -> Result<Option<&mut PairThermostat>, RunError> {
         let Some(pairs) = self.pairs.as_mut().filter(|_| self.on) else { return Ok(None) };
-        let found = Some((particles.moves(), dt, virial));
+        let found = Some((particles.moves(), dt));
         if self.found != found {
             let state = particles.now();
             forces.check_width(&state.domain)?;
@@ -101,9 +100,10 @@ impl Thermostat {
                 frozen: &external.frozen,
             };
             let failed = |source| RunError::Engine { step: number, source };
-            pairs.find_pairs_with(&mut forces.engine, &bodies, dt, virial).map_err(failed)?;
+            pairs.find_pairs_with(&mut forces.engine, &bodies, dt, false).map_err(failed)?;
             self.found = found;
         }
+        pairs.keep(kept);
         Ok(Some(pairs))
     }
 
@@ -146,7 +146,7 @@ impl Simulation {
         let lines = self.records_lines();
         if lines && !self.has_forces_here() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
-            thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
+            thermostat.find_pairs(particles, external, forces, (dt, Kept::default(), *number))?;
             self.record_drag_at(1.0, &self.particles.now().v.clone());
         } else {
             let v = lines.then(|| self.particles.now().v.clone());
@@ -170,19 +170,19 @@ impl Simulation {
         self.thermostat.on && self.thermostat.pairs.is_some()
     }
 
-    /// Sets whether steps before the thermostat acts again ask for its virial, which then is that of its mean force since it last
-    /// acted. Trajectories do not depend on it.
-    pub fn hold_impulses(&mut self, on: bool) {
-        self.thermostat.is_held = on;
+    /// Sets whether the next step, or one before the thermostat acts again, asks for its virial, which is that of its mean force since it
+    /// last acted; with `None` each step does that asks for the virial of forces. Trajectories do not depend on it.
+    pub fn ask_for_impulses(&mut self, on: Option<bool>) {
+        self.thermostat.is_asked = on;
     }
 
     /// What is asked of an action of the thermostat in a step that asks for `want`.
     pub(in crate::run) fn wants_of_heat(&self, want: Want) -> Want {
-        Want { virial: want.virial || self.thermostat.is_held, ..want }
+        Want { virial: self.thermostat.is_asked.unwrap_or(want.virial), ..want }
     }
 
     fn wants(&self, want: Want) -> Want {
-        Want { virial: want.virial || self.is_recording(), ..want }
+        Want { virial: want.virial || self.records_sum(), ..want }
     }
 
     /// All forces at the present positions but drag, noise for a step of `dt` among them.
@@ -193,9 +193,9 @@ impl Simulation {
         noise: Law,
     ) -> Result<(), RunError> {
         self.conservative_forces(want)?;
-        let want = self.wants(want);
+        let kept = Kept { virial: want.virial, middle: false };
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
-        if let Some(pairs) = thermostat.find_pairs(particles, external, forces, (dt, want.virial, *number))? {
+        if let Some(pairs) = thermostat.find_pairs(particles, external, forces, (dt, kept, *number))? {
             pairs.draw(*seed, *number, Stream(0), noise);
             thermostat.add_pair_forces(particles, external, forces, false);
         }
@@ -233,9 +233,12 @@ impl Simulation {
     /// Changes velocities by the thermostat, if it acts.
     pub(in crate::run) fn heat(&mut self, heat: Heat, want: Want, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let (want, recording) = (self.wants(want), self.is_recording());
+        let (needed, recording) = (self.needed_drag(), self.is_recording());
+        let is_of_pairs = !matches!(heat.update, Update::Midpoint | Update::ImplicitDrag);
+        let virial = want.virial || needed.sum || needed.lines && is_of_pairs;
+        let kept = Kept { virial, middle: needed.lines };
         let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
-        let what = (heat.time, want.virial, *number);
+        let what = (heat.time, kept, *number);
         let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
         pairs.draw(*seed, *number, heat.stream, heat.noise);
         let v = particles.velocities_mut();
@@ -279,9 +282,9 @@ impl Simulation {
     /// Records the drag of a midpoint update during a part `share` of the step, at the velocities at which it acted. Returns that with lines
     /// of its own for the steps that hold it, if this step has none.
     fn record_midpoint(&mut self, share: f64, is_held: bool) -> Option<Drag> {
-        let (lines, pairs) = (self.records_lines(), self.thermostat.pairs()?);
+        let (lines, needed, pairs) = (self.records_lines(), self.needed_drag(), self.thermostat.pairs()?);
         let (sum, mut v) = (pairs.drag_of_midpoint(), Vec::new());
-        if lines {
+        if needed.lines {
             v.extend_from_slice(&self.particles.now().v);
             pairs.velocities_of_midpoint(self.engine().pool(), &mut v);
         }
@@ -289,11 +292,11 @@ impl Simulation {
             pairs.drags(pool, &v, pulls);
             sum
         };
-        if lines && !self.has_forces_here() {
+        if needed.lines && !(lines && self.has_forces_here()) {
             self.record_drag(share, find);
             return None;
         }
-        let held = (is_held && self.holds_lines()).then(|| self.find_drag(share, true, find));
+        let held = (is_held && self.held_drag().lines).then(|| self.find_drag(share, true, find));
         self.record_drag_in_forces(sum.map(|w| share * w), share, lines.then_some(v));
         held
     }
@@ -341,7 +344,7 @@ impl Simulation {
     pub fn warmth(&mut self, dt: f64, piece: Option<&Piece>) -> Result<Option<Warmth>, RunError> {
         let Simulation { particles, external, forces, thermostat, number, .. } = self;
         let Some(piece) = piece else {
-            let pairs = thermostat.find_pairs(particles, external, forces, (dt, false, *number))?;
+            let pairs = thermostat.find_pairs(particles, external, forces, (dt, Kept::default(), *number))?;
             return Ok(pairs.and_then(|pairs| pairs.warmth(&particles.now().v, |_| 1.0)));
         };
         let Some(mut pairs) = pairs_of(forces).filter(|_| thermostat.on) else { return Ok(None) };

@@ -112,6 +112,51 @@ fn samples_do_not_depend_on_what_other_steps_record() {
     }
 }
 
+/// Samples of sums and of lines at different steps have the same bits as alone, in runs that ask for all totals: with actions of the
+/// thermostat that nobody samples, that one samples, and whose drag the next steps need as a sum, as lines, and as both.
+#[test]
+fn sums_and_lines_are_held_for_different_steps() {
+    for (name, integrator) in Integrator::ALL {
+        let every = if integrator.coupling().is_some() { "thermostat_every = 4\n" } else { "" };
+        for [of_sums, of_lines] in [[3, 5], [3, 4], [4, 3]] {
+            let scene = |observe: &str| {
+                let rest = format!(
+                    "[[stage]]\nname = \"run\"\nsteps = 11\ndt = 0.02\nintegrator = \"{name}\"\n{every}\
+                     [output]\nthermo = 0\n[observe]\n{observe}"
+                );
+                scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, &rest).unwrap()
+            };
+            let sums = format!("surface_tension = {{ every = {of_sums}, axis = \"z\" }}\n");
+            let lines = format!("stress_profile = {{ every = {of_lines}, axis = \"z\", bins = 5 }}\n");
+            let folder = tempfile::tempdir().unwrap();
+            let out = folder.path().join("out");
+            run_scene(&scene(&format!("{sums}{lines}")), &out, &mut |_| {}).unwrap();
+            let found = std::fs::read_to_string(out.join("observables.json")).unwrap();
+            let found: Vec<serde_json::Value> = serde_json::from_str(&found).unwrap();
+            for (observe, what) in [(sums, Recorded::Sum), (lines, Recorded::Lines)] {
+                let scene = scene(&observe);
+                let stage = &scene.stages[0];
+                let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
+                let mut run =
+                    scene.simulation_of_run(scene.initial_state(), std::num::NonZeroUsize::MIN).unwrap();
+                scene.enter(stage, &mut run).unwrap();
+                run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
+                run.record_flux(what);
+                for _ in 0..stage.steps {
+                    run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+                    observers.sample(run.view(run.step_number() as f64 * stage.dt), &stage.name);
+                }
+                let expected = observers.finish();
+                assert!(!expected.is_empty() && expected[0].samples > 1);
+                for expected in expected {
+                    let expected = serde_json::to_value(expected).unwrap();
+                    assert!(found.contains(&expected), "{name} {of_sums} {of_lines}: {expected} {found:?}");
+                }
+            }
+        }
+    }
+}
+
 /// Steps that nobody samples record nothing, and the sample has the thermostat's last action all the same.
 #[test]
 fn a_sample_has_the_last_action() {

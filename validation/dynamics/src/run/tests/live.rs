@@ -79,6 +79,32 @@ fn pieces_of_a_run_end_as_the_run() {
     }
 }
 
+/// Between two actions of the thermostat the pressure has the mean force of the last, however many steps were made at once.
+#[test]
+fn pressures_do_not_depend_on_pieces() {
+    for (name, every) in [("aboba", 3), ("force-gradient", 2), ("two-stage", 1)] {
+        let stages = format!(
+            "[[stage]]\nname = \"a\"\nsteps = 12\ndt = 0.02\nintegrator = \"{name}\"\nthermostat_every = {every}\n\
+             [output]\nthermo = 1\n"
+        );
+        let scene = scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, &stages).unwrap();
+        for steps in 5..=8 {
+            let [mut one, mut pieces] = [0, 1].map(|_| Live::new(scene.clone(), NonZeroUsize::MIN).unwrap());
+            one.run(steps, || false).unwrap();
+            (0..steps).for_each(|_| pieces.run(1, || false).unwrap());
+            let tensors = [&one, &pieces].map(|live| live.simulation().pressure_tensor());
+            let rest = one.simulation().conservative_pressure_tensor();
+            assert!(tensors[0] != rest, "{name} {steps}");
+            for (found, expected) in tensors[0].iter().zip(tensors[1]) {
+                assert!(
+                    (found - expected).abs() < 1e-9 * (1.0 + expected.abs()),
+                    "{name} {steps}: {tensors:?}"
+                );
+            }
+        }
+    }
+}
+
 /// The step after the first `true` is the last, and the run then goes on as if it had not stopped.
 #[test]
 fn a_stop_ends_after_the_step() {
