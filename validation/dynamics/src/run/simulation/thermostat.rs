@@ -292,7 +292,7 @@ impl Simulation {
             pairs.drags(pool, &v, pulls);
             sum
         };
-        if needed.lines && !(lines && self.has_forces_here()) {
+        if lines && !self.has_forces_here() {
             self.record_drag(share, find);
             return None;
         }
