@@ -57,13 +57,18 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
                 if k == 0 {
                     run.record_flux(observers.wants_flux(step, &stage.name));
+                    run.ask_for_impulses(Some(observers.wants_pressure(step, &stage.name)));
                     run.step(dt, integrator, observers.wants(step, &stage.name))?;
+                    if observers.wants_conservative_forces(step, &stage.name) {
+                        run.find_conservative_forces()?;
+                    }
                     let mut view = run.view(round as f64);
                     view.step = step;
                     observers.sample(view, &stage.name);
                 }
                 spent[k] = begin.elapsed().as_secs_f64() / if k == 0 { 1.0 } else { PLAIN as f64 };
                 run.record_flux(Recorded::Nothing);
+                run.ask_for_impulses(None);
             }
             if round > FIRST {
                 times.iter_mut().zip(spent).for_each(|(times, spent)| times.push(spent));
