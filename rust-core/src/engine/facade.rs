@@ -173,7 +173,7 @@ impl Engine {
         let (a, b) = (sums.excess_pass.out_of_bounds, sweep.out_of_bounds());
         let c = self.device.as_ref().map_or([0; 2], |device| device.out_of_bounds());
         Statistics {
-            times: sweep.times(),
+            times: self.sweep.times(),
             counts: sums.counts + sweep.counts(),
             out_of_bounds: [a[0] + b[0] + c[0], a[1] + b[1] + c[1]],
         }

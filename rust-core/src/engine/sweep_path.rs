@@ -9,10 +9,11 @@ use super::particles::Particles;
 use super::plan::Plan;
 use super::request::Request;
 use super::surroundings::{Around, SpecialPair, Surroundings};
-use super::sweep::Sweep;
+use super::sweep::{Sweep, Times, lap};
 use super::walls;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
+use std::time::Instant;
 
 /// The forces of one fluid by a sweep, with special pairs and long pairs.
 #[derive(Debug)]
@@ -22,6 +23,8 @@ pub struct SweepPath {
     /// The sweep of this plan, or of what it is without long pairs.
     pub sweep: Sweep,
     pub long: Option<LongPairs>,
+    /// Seconds spent on long pairs since the engine was made.
+    time_of_long: f64,
     pub special: Vec<SpecialPair>,
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
@@ -38,6 +41,7 @@ impl SweepPath {
             plan: sweep.plan.clone(),
             sweep,
             long: None,
+            time_of_long: 0.0,
             special: Vec::new(),
             excludes_special: true,
             corrections: Corrections::default(),
@@ -58,6 +62,12 @@ impl SweepPath {
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
         self.sweep.fits(domain)
             && self.long.as_ref().is_none_or(|long| long.fit(self.plan.dimensions, domain))
+    }
+
+    /// Times of the parts of evaluations, since the engine was made.
+    pub fn times(&self) -> Times {
+        let times = self.sweep.times();
+        Times { first: times.first + self.time_of_long, ..times }
     }
 
     /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
@@ -173,9 +183,11 @@ impl Evaluate for SweepPath {
         self.begin(Around { domain, images: &[] }, request)?;
         let mut tally = self.sweep.evaluate(domain, request, force, add)?;
         if let Some(long) = &mut self.long {
+            let mut since = Instant::now();
             let of = (&**self.sweep.pool(), self.sweep.set(), &self.plan);
             let particles = (&request.particles, self.sweep.sorted());
             tally += long.add_forces(of, domain, particles, request.want, force)?;
+            lap(&mut since, &mut self.time_of_long);
         }
         if self.corrections.pairs.len() > 0 {
             self.sweep.fetch_slopes(request.particles.owned);

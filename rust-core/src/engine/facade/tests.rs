@@ -326,3 +326,22 @@ fn a_configuration_is_evaluated_at_a_stroke() {
         assert!(engine.evaluate(&x, &cloud.domain, &cloud.kind[1..]).is_err());
     }
 }
+
+/// Time that long pairs take is that of finding pairs and their forces.
+#[test]
+fn the_time_of_long_pairs_is_that_of_pairs() {
+    let text = "title = \"m\"\nspecies = [\"S\", \"B\"]\n[[pair]]\nbetween = [\"S\", \"S\"]\nform = \"soft\"\nstrength = 25.0\n\
+        range = 1.0\n[[pair]]\nbetween = [\"B\", \"B\"]\nform = \"soft\"\nstrength = 9.0\nrange = 2.5\n\
+        [[pair]]\nbetween = [\"S\", \"B\"]\nform = \"soft\"\nstrength = 9.0\nrange = 1.7\n";
+    let fluid = Model::parse("m", text).unwrap().at(1.0).unwrap();
+    for every in [2, 50] {
+        let mut cloud = Cloud::new([9.0; 3], 2000, 1);
+        cloud.kind = (1..=2000).map(|k| i32::from(k % every == 0)).collect();
+        let mut engine = Engine::new(&fluid, Settings::default()).unwrap();
+        engine.evaluate(&cloud.x, &cloud.domain, &cloud.kind).unwrap();
+        let (all, of_sweep) = (engine.statistics().times, engine.sweep.sweep.times());
+        assert_eq!(engine.potentials_apart() > 0, every == 50);
+        assert_eq!(all.first > of_sweep.first, every == 50, "{all:?} {of_sweep:?}");
+        assert_eq!(Times { first: of_sweep.first, ..all }, of_sweep);
+    }
+}

@@ -24,7 +24,7 @@ pub(super) use listed_pairs::ListedFor;
 pub(super) use pair_lists::{PairLists, PlanePairs};
 pub(super) use places::{Images, MARGIN, Places};
 pub use psidpd_threads::{Pool, ThreadCount, part};
-pub use times::Times;
+pub use times::{Times, lap};
 
 use super::counts::PassCounts;
 use super::error::EngineError;
@@ -49,7 +49,6 @@ pub(super) use region::UNFIT;
 use region::{can_stretch, is_open, region};
 use std::sync::Arc;
 use std::time::Instant;
-use times::lap;
 pub(super) use workspace::Sorted;
 use workspace::{ForceSink, Input, Workspace};
 
