@@ -58,6 +58,8 @@ class Simulation:
         The stages of the scene follow each other; further steps are like those of the last stage. `callback` is called
         with the simulation after every `every` steps of this call and after the last; an exception of it ends the
         call. Ctrl-C ends it after the present step and raises KeyboardInterrupt; the simulation can go on from there.
+        The pressure then lacks drag and noise until the thermostat acts again, if `thermostat_every` is above 1 and it does not
+        act in that step.
 
         Raises RunStoppedError where the physics fails.
         """

@@ -24,7 +24,7 @@ pub struct SweepPath {
     pub sweep: Sweep,
     pub long: Option<LongPairs>,
     /// Seconds spent on long pairs since the engine was made.
-    time_of_long: f64,
+    time_of_long_pairs: f64,
     pub special: Vec<SpecialPair>,
     /// Whether the sweep leaves the special pairs out.
     excludes_special: bool,
@@ -41,7 +41,7 @@ impl SweepPath {
             plan: sweep.plan.clone(),
             sweep,
             long: None,
-            time_of_long: 0.0,
+            time_of_long_pairs: 0.0,
             special: Vec::new(),
             excludes_special: true,
             corrections: Corrections::default(),
@@ -67,7 +67,7 @@ impl SweepPath {
     /// Times of the parts of evaluations, since the engine was made.
     pub fn times(&self) -> Times {
         let times = self.sweep.times();
-        Times { first: times.first + self.time_of_long, ..times }
+        Times { first: times.first + self.time_of_long_pairs, ..times }
     }
 
     /// Maps types to species, as [`Engine::map_kinds`](super::Engine::map_kinds).
@@ -187,7 +187,7 @@ impl Evaluate for SweepPath {
             let of = (&**self.sweep.pool(), self.sweep.set(), &self.plan);
             let particles = (&request.particles, self.sweep.sorted());
             tally += long.add_forces(of, domain, particles, request.want, force)?;
-            lap(&mut since, &mut self.time_of_long);
+            lap(&mut since, &mut self.time_of_long_pairs);
         }
         if self.corrections.pairs.len() > 0 {
             self.sweep.fetch_slopes(request.particles.owned);

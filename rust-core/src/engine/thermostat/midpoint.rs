@@ -128,8 +128,8 @@ impl PairThermostat {
         self.kept.virial || self.kept.middle || self.on_fixed.is_asked
     }
 
-    /// The virial of drag at the velocities that `p` has, and of noise, if it is requested; finds the forces on those of the first `owned` particles that have
-    /// infinite mass too, if these are asked for.
+    /// The virial of drag at the velocities that `p` has, and of noise, if it is requested; finds the forces on those of the first `owned`
+    /// particles that have infinite mass too, if these are asked for.
     pub(super) fn virial_of_vectors(&mut self, pool: &Pool, owned: usize, noise: bool) -> [f64; 6] {
         close(&self.planes, &mut self.sums.p);
         let [drag, random] = if self.kept.virial { self.virials(pool, noise) } else { [[0.0; 6]; 2] };

@@ -2,7 +2,7 @@
 
 use super::looks::interval_of_looks;
 use super::output::{Output, write_json, write_observations};
-use super::simulation::{Needed, Task};
+use super::simulation::{NeededDrag, Task};
 use super::watch::{Deviation, Thermometer, Watch};
 use super::{Advice, Outcome, Progress, RunError, Runner, Summary, Sums, Timing};
 use crate::checkpoint::{BeforeEnd, Position};
@@ -93,7 +93,7 @@ impl Runner<'_> {
         let task = Task {
             want,
             flux: flux(number),
-            held_drag: Needed::by((number + 1..=last).map(flux)),
+            drag_needed_later: NeededDrag::by((number + 1..=last).map(flux)),
             impulses: (number..=last).any(pressure),
             settles: self.scene.settles(self.position.stage, self.position.done),
         };

@@ -1,6 +1,6 @@
 //! The steps of a run one after the other, and the present one as a whole where it is read.
 
-use super::record::Needed;
+use super::record::NeededDrag;
 use super::{RunError, Simulation};
 use crate::integrator::Integrator;
 use crate::run::Thermo;
@@ -29,7 +29,7 @@ pub struct Task {
     /// What is recorded of the transport of momentum.
     pub flux: Recorded,
     /// What steps need of the drag before the thermostat acts again.
-    pub held_drag: Needed,
+    pub drag_needed_later: NeededDrag,
     /// Whether this step or these ask for the virial of the thermostat.
     pub impulses: bool,
     /// Whether Monte Carlo tunes the length of its moves.
@@ -43,10 +43,10 @@ impl Course {
 
     /// Makes one step of `dt`.
     pub fn make(&mut self, dt: f64, integrator: Integrator, task: Task) -> Result<(), RunError> {
-        let Task { want, flux, held_drag, impulses, settles } = task;
+        let Task { want, flux, drag_needed_later, impulses, settles } = task;
         self.want = want;
         self.simulation.ask_for_impulses(Some(impulses));
-        self.simulation.record_and_hold_flux(flux, held_drag);
+        self.simulation.record_and_hold_flux(flux, drag_needed_later);
         self.simulation.set_settling(settles);
         self.simulation.begin_step(dt, integrator, want)
     }

@@ -22,7 +22,7 @@ mod thermostat;
 mod walls;
 
 pub(super) use course::{Course, Task};
-pub(super) use record::Needed;
+pub(super) use record::NeededDrag;
 pub(super) use thermostat::Heat;
 
 use super::{Integrator, RunError, State, reorder};

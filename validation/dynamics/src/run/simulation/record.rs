@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub struct Record {
     what: Recorded,
     /// What the steps up to the next action of the thermostat need of the drag.
-    held: Needed,
+    later: NeededDrag,
     dt: f64,
     flux: Flux,
     /// Whether operators may add to the record.
@@ -22,22 +22,22 @@ pub struct Record {
     acted_at: Option<u64>,
 }
 
-/// What is needed of the drag.
+/// What steps need of the drag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Needed {
+pub struct NeededDrag {
     pub sum: bool,
     pub lines: bool,
 }
 
-impl Needed {
-    fn with(self, what: Recorded) -> Needed {
-        let Needed { sum, lines } = self;
-        Needed { sum: sum || what == Recorded::Sum, lines: lines || what == Recorded::Lines }
+impl NeededDrag {
+    fn with(self, what: Recorded) -> NeededDrag {
+        let NeededDrag { sum, lines } = self;
+        NeededDrag { sum: sum || what == Recorded::Sum, lines: lines || what == Recorded::Lines }
     }
 
     /// What steps need that record these.
-    pub fn by(all: impl IntoIterator<Item = Recorded>) -> Needed {
-        all.into_iter().fold(Needed::default(), Needed::with)
+    pub fn by(all: impl IntoIterator<Item = Recorded>) -> NeededDrag {
+        all.into_iter().fold(NeededDrag::default(), NeededDrag::with)
     }
 }
 
@@ -64,18 +64,18 @@ impl Spare {
 impl Simulation {
     /// Sets what later steps record of the transport of momentum. Trajectories do not depend on it.
     pub fn record_flux(&mut self, what: Recorded) {
-        self.record_and_hold_flux(what, Needed::by([what]));
+        self.record_and_hold_flux(what, NeededDrag::by([what]));
     }
 
-    /// As [`Simulation::record_flux`], where steps up to the next action of the thermostat need no more of the drag than `held`.
-    pub(super) fn record_and_hold_flux(&mut self, what: Recorded, held: Needed) {
-        if held.with(what) == Needed::default() {
+    /// As [`Simulation::record_flux`], where steps up to the next action of the thermostat need no more of the drag than `later`.
+    pub(super) fn record_and_hold_flux(&mut self, what: Recorded, later: NeededDrag) {
+        if later.with(what) == NeededDrag::default() {
             if let Some(record) = self.record.take() {
                 self.spare.keep(record.flux);
             }
         } else {
             let record = self.record.get_or_insert_default();
-            (record.what, record.held) = (what, held);
+            (record.what, record.later) = (what, later);
         }
     }
 
@@ -85,27 +85,31 @@ impl Simulation {
         self.record.as_deref().filter(recorded).map(|record| &record.flux)
     }
 
+    /// The record that operators add to.
+    fn recording(&self) -> Option<&Record> {
+        self.record.as_deref().filter(|record| record.open)
+    }
+
     pub(super) fn is_recording(&self) -> bool {
-        self.record.as_ref().is_some_and(|record| record.open)
+        self.recording().is_some()
     }
 
     pub(super) fn records_sum(&self) -> bool {
-        self.is_recording() && self.record.as_ref().is_some_and(|record| record.what == Recorded::Sum)
+        self.recording().is_some_and(|record| record.what == Recorded::Sum)
     }
 
     pub(super) fn records_lines(&self) -> bool {
-        self.record.as_ref().is_some_and(|record| record.what == Recorded::Lines)
+        self.recording().is_some_and(|record| record.what == Recorded::Lines)
     }
 
     /// What the steps up to the next action of the thermostat need of the drag.
-    pub(super) fn held_drag(&self) -> Needed {
-        self.record.as_ref().filter(|record| record.open).map_or(Needed::default(), |record| record.held)
+    pub(super) fn drag_needed_later(&self) -> NeededDrag {
+        self.recording().map_or(NeededDrag::default(), |record| record.later)
     }
 
     /// What this step and those need of it.
-    pub(super) fn needed_drag(&self) -> Needed {
-        let what = self.record.as_ref().filter(|record| record.open).map(|record| record.what);
-        self.held_drag().with(what.unwrap_or_default())
+    pub(super) fn drag_needed(&self) -> NeededDrag {
+        self.recording().map_or(NeededDrag::default(), |record| record.later.with(record.what))
     }
 
     pub(super) fn open_record(&mut self, dt: f64) {
@@ -270,7 +274,7 @@ impl Simulation {
         share: f64,
         find: impl FnOnce(&PairThermostat, &Pool, Option<&mut Vec<Pulls>>) -> [f64; 6],
     ) {
-        let drag = self.find_drag(share, self.needed_drag().lines, find);
+        let drag = self.find_drag(share, self.drag_needed().lines, find);
         if let Some(record) = &mut self.record {
             record.flux.drag.push(Arc::new(drag));
         }

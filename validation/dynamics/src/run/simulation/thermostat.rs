@@ -233,7 +233,7 @@ impl Simulation {
     /// Changes velocities by the thermostat, if it acts.
     pub(in crate::run) fn heat(&mut self, heat: Heat, want: Want, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        let (needed, recording) = (self.needed_drag(), self.is_recording());
+        let (needed, recording) = (self.drag_needed(), self.is_recording());
         let is_of_pairs = !matches!(heat.update, Update::Midpoint | Update::ImplicitDrag);
         let virial = want.virial || needed.sum || needed.lines && is_of_pairs;
         let kept = Kept { virial, middle: needed.lines };
@@ -282,7 +282,7 @@ impl Simulation {
     /// Records the drag of a midpoint update during a part `share` of the step, at the velocities at which it acted. Returns that with lines
     /// of its own for the steps that hold it, if this step has none.
     fn record_midpoint(&mut self, share: f64, is_held: bool) -> Option<Drag> {
-        let (lines, needed, pairs) = (self.records_lines(), self.needed_drag(), self.thermostat.pairs()?);
+        let (lines, needed, pairs) = (self.records_lines(), self.drag_needed(), self.thermostat.pairs()?);
         let (sum, mut v) = (pairs.drag_of_midpoint(), Vec::new());
         if needed.lines {
             v.extend_from_slice(&self.particles.now().v);
@@ -296,7 +296,7 @@ impl Simulation {
             self.record_drag(share, find);
             return None;
         }
-        let held = (is_held && self.held_drag().lines).then(|| self.find_drag(share, true, find));
+        let held = (is_held && self.drag_needed_later().lines).then(|| self.find_drag(share, true, find));
         self.record_drag_in_forces(sum.map(|w| share * w), share, lines.then_some(v));
         held
     }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::integrator::Coupling;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_observe::{Observers, Recorded};
+use psidpd_observe::{Observation, Observers, Recorded};
 
 const PAIR: &str = "title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n";
 
@@ -81,6 +81,21 @@ fn rows_do_not_depend_on_other_rows() {
     }
 }
 
+/// What the observables of a scene find where every step is recorded and asked for all totals.
+fn sampled(scene: &Scene, what: Recorded) -> Vec<Observation> {
+    let stage = &scene.stages[0];
+    let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
+    let mut run = scene.simulation_of_run(scene.initial_state(), std::num::NonZeroUsize::MIN).unwrap();
+    scene.enter(stage, &mut run).unwrap();
+    run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
+    run.record_flux(what);
+    for _ in 0..stage.steps {
+        run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+        observers.sample(run.view(run.step_number() as f64 * stage.dt), &stage.name);
+    }
+    observers.finish()
+}
+
 /// A sample has the same bits whether steps around it are recorded or not: at every fifth step, with an action at every fourth, all
 /// phases are sampled, one at a time.
 #[test]
@@ -96,17 +111,7 @@ fn samples_do_not_depend_on_what_other_steps_record() {
         let out = folder.path().join("out");
         run_scene(&scene, &out, &mut |_| {}).unwrap();
         let found = std::fs::read_to_string(out.join("observables.json")).unwrap();
-        let stage = &scene.stages[0];
-        let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
-        let mut run = scene.simulation_of_run(scene.initial_state(), std::num::NonZeroUsize::MIN).unwrap();
-        scene.enter(stage, &mut run).unwrap();
-        run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
-        run.record_flux(Recorded::Lines);
-        for _ in 0..stage.steps {
-            run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
-            observers.sample(run.view(run.step_number() as f64 * stage.dt), &stage.name);
-        }
-        let expected = serde_json::to_value(observers.finish()).unwrap();
+        let expected = serde_json::to_value(sampled(&scene, Recorded::Lines)).unwrap();
         let found: serde_json::Value = serde_json::from_str(&found).unwrap();
         assert!(expected == found, "{integrator} {every}: {expected} {found}");
     }
@@ -134,19 +139,7 @@ fn sums_and_lines_are_held_for_different_steps() {
             let found = std::fs::read_to_string(out.join("observables.json")).unwrap();
             let found: Vec<serde_json::Value> = serde_json::from_str(&found).unwrap();
             for (observe, what) in [(sums, Recorded::Sum), (lines, Recorded::Lines)] {
-                let scene = scene(&observe);
-                let stage = &scene.stages[0];
-                let mut observers = Observers::new(&scene.observe, [stage.name.as_str()]);
-                let mut run =
-                    scene.simulation_of_run(scene.initial_state(), std::num::NonZeroUsize::MIN).unwrap();
-                scene.enter(stage, &mut run).unwrap();
-                run.prepare_for(stage.integrator, stage.dt, Want::TOTALS).unwrap();
-                run.record_flux(what);
-                for _ in 0..stage.steps {
-                    run.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
-                    observers.sample(run.view(run.step_number() as f64 * stage.dt), &stage.name);
-                }
-                let expected = observers.finish();
+                let expected = sampled(&scene(&observe), what);
                 assert!(!expected.is_empty() && expected[0].samples > 1);
                 for expected in expected {
                     let expected = serde_json::to_value(expected).unwrap();
