@@ -82,11 +82,11 @@ impl Lines {
     /// Becomes the lines between the particles of pairs, at most [`BLOCK`], which begin at the particles at `x`. `d` are the
     /// separations of the pairs, and `strengths` times `share` the forces divided by them. The particles lie at `displacements` from
     /// `x`, which are empty where they lie there.
-    pub fn join(
+    pub fn join<D: Copy + Into<f64>, S: Copy + Into<f64>>(
         &mut self,
         particles: impl Iterator<Item = [usize; 2]>,
         (x, displacements): (&[[f64; 3]], &[[f64; 3]]),
-        pairs: Pull,
+        pairs: Pull<D, S>,
     ) {
         self.parallel = displacements.is_empty();
         self.count = pairs.strengths.len();
@@ -94,7 +94,7 @@ impl Lines {
             for (k, [i, _]) in particles.enumerate() {
                 (0..3).for_each(|c| self.from[c][k] = x[i][c]);
             }
-            run_best(Join::<false> { lines: self, pairs });
+            run_best(Join::<D, S, false> { lines: self, pairs });
         } else {
             for (k, [i, j]) in particles.enumerate() {
                 let (of_i, of_j) = (displacements[i], displacements[j]);
@@ -102,7 +102,7 @@ impl Lines {
                     (self.from[c][k], self.d[c][k]) = (x[i][c], of_i[c] - of_j[c]);
                 }
             }
-            run_best(Join::<true> { lines: self, pairs });
+            run_best(Join::<D, S, true> { lines: self, pairs });
         }
     }
 }
@@ -133,21 +133,21 @@ impl Loop for Sum<'_> {
     }
 }
 
-/// Pairs and forces on them.
+/// Pairs and forces on them, in either precision.
 #[derive(Debug, Clone, Copy)]
-pub struct Pull<'a> {
-    pub d: [&'a [f64]; 3],
-    pub strengths: &'a [f64],
+pub struct Pull<'a, D = f64, S = f64> {
+    pub d: [&'a [D]; 3],
+    pub strengths: &'a [S],
     pub share: f64,
 }
 
 /// Sets `d` and `f` of lines between pairs; `d` holds the displacements, if there are any.
-struct Join<'a, const DISPLACED: bool> {
+struct Join<'a, D, S, const DISPLACED: bool> {
     lines: &'a mut Lines,
-    pairs: Pull<'a>,
+    pairs: Pull<'a, D, S>,
 }
 
-impl<const DISPLACED: bool> Loop for Join<'_, DISPLACED> {
+impl<D: Copy + Into<f64>, S: Copy + Into<f64>, const DISPLACED: bool> Loop for Join<'_, D, S, DISPLACED> {
     type Out = ();
 
     #[inline(always)]
@@ -155,6 +155,7 @@ impl<const DISPLACED: bool> Loop for Join<'_, DISPLACED> {
         let Join { lines: Lines { d, f, .. }, pairs: Pull { d: of_pairs, strengths, share } } = self;
         for ((d, f), of_pair) in d.iter_mut().zip(f).zip(of_pairs) {
             for (((d, f), of_pair), strength) in d.iter_mut().zip(f).zip(of_pair).zip(strengths) {
+                let (of_pair, strength): (f64, f64) = ((*of_pair).into(), (*strength).into());
                 *d = of_pair - if DISPLACED { *d } else { 0.0 };
                 *f = share * strength * of_pair;
             }

@@ -3,7 +3,9 @@
 use super::flux::{BLOCK, Carrier, Dragged, Flux, Line, Lines, Place, Pull, Recorded};
 use super::options::Centre;
 use super::piece::{Piece, Whole};
-use psidpd_core::engine::pair_sums::{Evaluation, Evaluator, Pair, ParticleSums};
+use psidpd_core::engine::pair_sums::{
+    Evaluation, Evaluator, NearWall, Pair, PairBlock, ParticleSums, Wanted,
+};
 use psidpd_core::engine::thermostat::Pulls;
 use psidpd_core::engine::{PeriodicBox, Pool, Precision};
 use psidpd_core::model::Model;
@@ -78,10 +80,13 @@ pub struct Frame<'a> {
 
 /// Forces that acted at other positions than the present ones.
 struct Earlier {
-    evaluation: Evaluation,
+    found: Found,
     /// The displacement of each particle for which the forces were computed; empty without one.
     displacements: Vec<[f64; 3]>,
 }
+
+/// What is found where pairs are not expected.
+const SHARES: Wanted = Wanted { shares: true, pairs: false };
 
 /// The least number of lines, if there are so many, that a thread adds to sums of its own.
 const LINES: usize = 2048;
@@ -117,24 +122,37 @@ impl<'a> Frame<'a> {
         self.evaluation.get_or_init(|| self.evaluator.evaluate(pool, x, species, domain))
     }
 
-    /// Sums over the pairs of each particle, which take less time than [`Frame::evaluation`]; `None` if there is one already, if pairs of the
-    /// run are in double precision, and where [`Evaluator::particle_sums`] has none.
+    /// Sums over the pairs of each particle with their shares in the Laplacian, which take less time than [`Frame::evaluation`]; `None` beside
+    /// one that was there before, if pairs of the run are in double precision, and where [`Evaluator::particle_sums`] has none.
     pub fn sums(&self) -> Option<&ParticleSums> {
+        self.sums_with(SHARES).filter(|sums| sums.found.shares)
+    }
+
+    /// The sums that were found first, which may lack what is `wanted` now.
+    fn sums_with(&self, wanted: Wanted) -> Option<&ParticleSums> {
         let View { pool, precision, x, species, domain, .. } = self.view;
-        if precision == Precision::Double || self.evaluation.get().is_some() {
+        let is_late = self.sums.get().is_none() && self.evaluation.get().is_some();
+        if precision == Precision::Double || is_late {
             return None;
         }
-        self.sums.get_or_init(|| self.evaluator.particle_sums(pool, x, species, domain)).as_ref()
+        self.sums.get_or_init(|| self.evaluator.particle_sums(pool, x, species, domain, wanted)).as_ref()
+    }
+
+    /// The pairs with the forces that act now.
+    fn acting(&self, shares: bool) -> Acting<'_> {
+        let sums = self.sums_with(Wanted { shares, pairs: true });
+        let sums = sums.filter(|sums| sums.found.pairs);
+        sums.map_or_else(|| Acting::Double(self.evaluation()), Acting::Single)
     }
 
     /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub fn densities(&self) -> &[f64] {
-        self.sums().map_or_else(|| &self.evaluation().densities[..], |sums| &sums.densities)
+        self.sums_with(SHARES).map_or_else(|| &self.evaluation().densities[..], |sums| &sums.densities)
     }
 
     /// Sum `Σ ψ` over the particles of each species.
     pub fn excess(&self) -> &[f64] {
-        self.sums().map_or_else(|| &self.evaluation().excess[..], |sums| &sums.excess)
+        self.sums_with(SHARES).map_or_else(|| &self.evaluation().excess[..], |sums| &sums.excess)
     }
 
     /// Adds up `width` numbers over all lines of momentum transport in the step: over those of particles, and over those of pairs;
@@ -161,16 +179,23 @@ impl<'a> Frame<'a> {
             parts.extend(drag.pairs.iter().map(of_pairs));
         }
         for (acted, earlier) in flux.forces.iter().zip(earlier) {
+            let (x, species) = match &acted.at {
+                Some(Place { x, species, .. }) => (&x[..], &species[..]),
+                None => (self.view.x, self.view.species),
+            };
             let forces = Forces {
                 share: acted.share,
-                evaluation: earlier.as_ref().map_or_else(|| self.evaluation(), |earlier| &earlier.evaluation),
-                x: acted.at.as_ref().map_or(self.view.x, |at| &at.x),
+                acting: earlier.as_ref().map_or_else(|| self.acting(false), Earlier::acting),
+                x,
+                species,
                 displacements: earlier.as_ref().map_or(&[][..], |earlier| &earlier.displacements),
                 drag: acted.dragged.as_ref().map(|dragged| (self.evaluator, dragged)),
             };
-            let of_pairs = forces.evaluation.parts().enumerate();
+            let of_pairs = forces.acting.parts().into_iter().enumerate();
             parts.extend(of_pairs.map(|(part, count)| (Part::Forces(forces, part), Carrier::Pair, count)));
-            parts.push((Part::Walls(forces), Carrier::Pair, forces.evaluation.near_walls.len()));
+            if let Acting::Double(Evaluation { near_walls, .. }) = forces.acting {
+                parts.push((Part::Walls(forces, near_walls), Carrier::Pair, near_walls.len()));
+            }
         }
         let mut work: Vec<Work> = Vec::new();
         for (part, carrier, count) in parts {
@@ -204,33 +229,38 @@ impl<'a> Frame<'a> {
     }
 
     fn earlier(&self, at: &Place) -> Earlier {
-        let View { pool, domain, .. } = self.view;
-        let to = at.displaced.as_deref().unwrap_or(&[]);
+        let View { pool, domain, precision, .. } = self.view;
+        let Place { x, species, displaced } = at;
+        let (to, acted) = (displaced.as_deref().unwrap_or(&[]), displaced.as_ref().unwrap_or(x));
+        let wanted = Wanted { shares: false, pairs: true };
+        let sums = (precision != Precision::Double)
+            .then(|| self.evaluator.particle_sums(pool, acted, species, domain, wanted));
+        let evaluate = || Found::Double(self.evaluator.evaluate(pool, acted, species, domain));
         Earlier {
-            evaluation: self.evaluator.evaluate(
-                pool,
-                at.displaced.as_ref().unwrap_or(&at.x),
-                &at.species,
-                domain,
-            ),
+            found: sums.flatten().map_or_else(evaluate, Found::Single),
             // A displaced particle may have crossed a face of the box.
-            displacements: to.iter().zip(&at.x).map(|(to, x)| domain.minimum_image(*to, *x)).collect(),
+            displacements: to.iter().zip(x).map(|(to, x)| domain.minimum_image(*to, *x)).collect(),
         }
     }
 
-    /// Computes the present forces if [`Frame::sum_lines`] will need them; then pairs need no search of their own.
-    pub fn expect_lines(&self) {
+    /// Finds the present pairs with forces if [`Frame::sum_lines`] will need them, and `shares` in the Laplacian besides where these are
+    /// read; then nothing else needs a search of its own.
+    pub fn expect_lines(&self, shares: bool) {
         if self.view.flux.is_some_and(|flux| flux.forces.iter().any(|acted| acted.at.is_none())) {
-            self.evaluation();
+            self.acting(shares);
         }
     }
 
     /// Calls `visit` with every pair of particles closer than `range`, each once.
     pub fn for_each_pair(&self, range: f64, visit: impl FnMut(Pair)) {
         let View { pool, x, domain, .. } = self.view;
-        match self.evaluation.get().and_then(|done| done.pairs_within(range)) {
-            Some(pairs) => pairs.for_each(visit),
-            None => self.evaluator.for_each_pair(pool, x, domain, range, visit),
+        let sums = self.sums.get().and_then(Option::as_ref).filter(|sums| sums.has_pairs_within(range));
+        if let Some(pairs) = self.evaluation.get().and_then(|done| done.pairs_within(range)) {
+            pairs.for_each(visit);
+        } else if let Some(sums) = sums {
+            sums.for_each_pair(range, visit);
+        } else {
+            self.evaluator.for_each_pair(pool, x, domain, range, visit);
         }
     }
 
@@ -264,9 +294,45 @@ impl<'a> Frame<'a> {
 
 impl Drop for Frame<'_> {
     fn drop(&mut self) {
-        let earlier = self.earlier.take().unwrap_or_default().into_iter().flatten();
-        let earlier = earlier.map(|earlier| earlier.evaluation);
-        self.evaluation.take().into_iter().chain(earlier).for_each(|done| self.evaluator.recycle(done));
+        let earlier = self.earlier.take().unwrap_or_default().into_iter().flatten().map(|earlier| earlier.found);
+        let present = self.evaluation.take().map(Found::Double);
+        let sums = self.sums.take().flatten().map(Found::Single);
+        earlier.chain(present).chain(sums).for_each(|found| match found {
+            Found::Single(sums) => self.evaluator.recycle_sums(sums),
+            Found::Double(evaluation) => self.evaluator.recycle(evaluation),
+        });
+    }
+}
+
+/// Pairs with forces, in either precision.
+enum Found {
+    Single(ParticleSums),
+    Double(Evaluation),
+}
+
+impl Earlier {
+    fn acting(&self) -> Acting<'_> {
+        match &self.found {
+            Found::Single(sums) => Acting::Single(sums),
+            Found::Double(evaluation) => Acting::Double(evaluation),
+        }
+    }
+}
+
+/// Pairs with forces that acted.
+#[derive(Clone, Copy)]
+enum Acting<'a> {
+    Single(&'a ParticleSums),
+    Double(&'a Evaluation),
+}
+
+impl Acting<'_> {
+    /// The number of pairs in each part.
+    fn parts(&self) -> Vec<usize> {
+        match self {
+            Acting::Single(sums) => sums.parts().collect(),
+            Acting::Double(evaluation) => evaluation.parts().collect(),
+        }
     }
 }
 
@@ -287,20 +353,45 @@ enum Part<'a> {
         pairs: &'a Pulls,
         x: &'a [[f64; 3]],
     },
-    /// A part of the pairs of an evaluation.
+    /// A part of the pairs with forces.
     Forces(Forces<'a>, usize),
     /// The forces of walls, along the lines from their surfaces to the particles.
-    Walls(Forces<'a>),
+    Walls(Forces<'a>, &'a [NearWall]),
 }
 
-/// Forces of an evaluation that acted, for a share of the step, on particles at `x`.
+/// Forces that acted, for a share of the step, on particles at `x`.
 #[derive(Clone, Copy)]
 struct Forces<'a> {
     share: f64,
-    evaluation: &'a Evaluation,
+    acting: Acting<'a>,
     x: &'a [[f64; 3]],
+    species: &'a [i32],
     displacements: &'a [[f64; 3]],
     drag: Option<(&'a Evaluator, &'a Dragged)>,
+}
+
+impl Forces<'_> {
+    /// Passes the lines of pairs on.
+    fn along<'b, T: Copy + Into<f64> + 'b>(
+        &self,
+        blocks: impl Iterator<Item = PairBlock<'b, T>>,
+        lines: &mut Lines,
+        mut visit: impl FnMut(&Lines),
+    ) {
+        let Forces { share, x, species, displacements, drag, .. } = *self;
+        for block in blocks {
+            let (particles, d, places) = (block.particles(), block.d, (x, displacements));
+            if let Some((evaluator, Dragged { share: of_drag, v })) = drag {
+                // Both with their shares of the step.
+                let both = evaluator.strengths_with_drag(&block, species, v, [share, *of_drag]);
+                let strengths = &both[..block.strengths.len()];
+                lines.join(particles, places, Pull { d, strengths, share: 1.0 });
+            } else {
+                lines.join(particles, places, Pull { d, strengths: block.strengths, share });
+            }
+            visit(lines);
+        }
+    }
 }
 
 impl Part<'_> {
@@ -318,24 +409,12 @@ impl Part<'_> {
                     visit(lines);
                 }
             }
-            Part::Forces(Forces { share, evaluation, x, displacements, drag }, part) => {
-                // Both with their shares of the step.
-                let with_drag = drag.map(|(evaluator, Dragged { share: of_drag, v })| {
-                    evaluator.strengths_with_drag(evaluation, part, [share, *of_drag], v)
-                });
-                let mut with_drag = with_drag.as_ref().map(|strengths| strengths.chunks(BLOCK));
-                for block in evaluation.blocks_of(part) {
-                    let (strengths, share) = match with_drag.as_mut().and_then(Iterator::next) {
-                        Some(strengths) => (strengths, 1.0),
-                        None => (block.strengths, share),
-                    };
-                    let pull = Pull { d: block.d, strengths, share };
-                    lines.join(block.particles(), (x, displacements), pull);
-                    visit(lines);
-                }
-            }
-            Part::Walls(Forces { share, evaluation, x, displacements, .. }) => {
-                let all = evaluation.near_walls.iter().map(|near| {
+            Part::Forces(forces, part) => match forces.acting {
+                Acting::Single(sums) => forces.along(sums.blocks_of(part), lines, visit),
+                Acting::Double(evaluation) => forces.along(evaluation.blocks_of(part), lines, visit),
+            },
+            Part::Walls(Forces { share, x, displacements, .. }, near_walls) => {
+                let all = near_walls.iter().map(|near| {
                     let mut d = displacements.get(near.particle).map_or([0.0; 3], |by| by.map(|by| -by));
                     d.iter_mut().zip(near.line()).for_each(|(d, line)| *d += line);
                     let f = near.force().map(|f| share * f);

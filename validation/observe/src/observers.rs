@@ -85,10 +85,9 @@ impl Observers {
         self.due(step, stage).map(|sampled| sampled.meter.flux()).max().unwrap_or_default()
     }
 
-    /// Whether samples of step `step` of stage `stage` read the conservative forces of the run; not if they list all pairs, with forces.
+    /// Whether samples of step `step` of stage `stage` read the conservative forces of the run.
     pub fn wants_conservative_forces(&self, step: u64, stage: &str) -> bool {
-        let reads = |sampled: &Sampled| sampled.meter.pairs() == Pairs::SumsAndForces;
-        self.due(step, stage).any(reads) && self.wants_flux(step, stage) != Recorded::Lines
+        self.due(step, stage).any(|sampled| sampled.meter.pairs() == Pairs::SumsAndForces)
     }
 
     fn due(&self, step: u64, stage: &str) -> impl Iterator<Item = &Sampled> {
@@ -123,10 +122,14 @@ impl Observers {
             self.fluid = fluid.map(|fluid| (view.kt, fluid));
         }
         let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(view, fluid));
-        let mut meters = self.observers.iter().filter(|o| due(o)).flat_map(|o| &o.stages);
-        let needs_lines = meters.any(|s| s.stage == stage && s.meter.flux() == Recorded::Lines);
-        if let Some(frame) = frame.as_ref().filter(|_| needs_lines) {
-            frame.expect_lines();
+        let (mut lines, mut shares) = (false, false);
+        let of_stage = self.observers.iter().filter(|o| due(o)).flat_map(|o| &o.stages);
+        for Sampled { meter, .. } in of_stage.filter(|sampled| sampled.stage == stage) {
+            lines |= meter.flux() == Recorded::Lines;
+            shares |= meter.pairs() == Pairs::SumsAndForces;
+        }
+        if let Some(frame) = frame.as_ref().filter(|_| lines) {
+            frame.expect_lines(shares);
         }
         // Those that walk along lines come first, and find the sum that others read.
         for walks in [true, false] {

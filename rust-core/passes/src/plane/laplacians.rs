@@ -1,5 +1,5 @@
 //! Sums over the pairs of a plane that the Laplacian of the energy is made of: first and second derivatives of densities and pair
-//! potentials.
+//! potentials; and the pairs themselves, with what their forces are made of.
 
 use super::list::{Computed, PairsAt, VectorsOfPairs};
 use super::traversal::{BatchVisitor, each_batch};
@@ -39,6 +39,27 @@ impl DensitySums {
     }
 }
 
+/// Pairs of particles of a plane with each other and with the next plane, as parallel arrays.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PairTerms {
+    /// The first and the second particle, counted from the first of the plane, and on through the next plane.
+    pub particles: [Vec<u32>; 2],
+    /// The components of `r_i − r_j`.
+    pub d: [Vec<f32>; 3],
+    /// `w′/r` of each density.
+    pub weights: [Vec<f32>; MOST_DENSITIES],
+    /// `φ′/r`, summed over all pair potentials.
+    pub potential: Vec<f32>,
+}
+
+impl PairTerms {
+    /// Removes all pairs.
+    pub fn clear(&mut self) {
+        self.particles.iter_mut().for_each(Vec::clear);
+        self.d.iter_mut().chain(&mut self.weights).chain([&mut self.potential]).for_each(Vec::clear);
+    }
+}
+
 /// Particles in the order of cells without ghosts, and what acts between them.
 #[derive(Clone, Copy)]
 pub struct LaplacianInputs<'a> {
@@ -48,6 +69,8 @@ pub struct LaplacianInputs<'a> {
     pub terms: &'a Terms<f32>,
     /// The number of dimensions less one.
     pub rest: f64,
+    /// Whether second derivatives are summed.
+    pub second: bool,
 }
 
 impl LaplacianInputs<'_> {
@@ -68,11 +91,11 @@ pub struct LaplacianBuffers {
 #[derive(Debug, Default)]
 struct BatchArrays {
     i_particles: IParticles<f32>,
-    /// The components of `r_i − r_j`, the distance and its inverse, and the Laplacian of the potentials.
-    pairs: [Vec<f32>; 6],
+    /// The components of `r_i − r_j`, the distance and its inverse, and `∇²φ` and `φ′/r` of the potentials.
+    pairs: [Vec<f32>; 7],
     species_pair: Vec<u32>,
-    /// Of each density `w′` and `∇²w`.
-    weights: [[Vec<f32>; 2]; MOST_DENSITIES],
+    /// Of each density `w′`, `∇²w` and `w′/r`.
+    weights: [[Vec<f32>; 3]; MOST_DENSITIES],
     /// Of each density the quads that are subtracted from the [`DensitySums`] of second particles.
     quads: [[Vec<[f32; 4]>; 2]; MOST_DENSITIES],
     /// Sums over the pairs before.
@@ -93,10 +116,24 @@ impl BatchArrays {
             self.running.resize(room, Accumulator::default());
         }
     }
+
+    /// Adds the pairs of a batch to those of a plane that begins with the particle `first`.
+    #[inline(always)]
+    fn append_to(&self, kept: &mut PairTerms, batch: Batch, first: usize, densities: usize) {
+        let PairTerms { particles: [i, j], d, weights, potential } = kept;
+        let (from, count) = (batch.first - first, batch.count);
+        i.extend(batch.i_in_batch[..count].iter().map(|m| from as u32 + u32::from(*m)));
+        j.extend(batch.j_offsets[..count].iter().map(|j| (j >> OFFSET_BITS) - first as u32));
+        d.iter_mut().zip(&self.pairs).for_each(|(to, of)| to.extend_from_slice(&of[..count]));
+        let of_densities = weights.iter_mut().zip(&self.weights).take(densities);
+        of_densities.for_each(|(to, [.., of])| to.extend_from_slice(&of[..count]));
+        potential.extend_from_slice(&self.pairs[6][..count]);
+    }
 }
 
 /// Adds the pairs of a plane with each other and with the next plane to the sums of both particles. These are those of the plane's
-/// particles and then those of the next: for each particle and species of the other [`LaplacianInputs::width`] sums.
+/// particles and then those of the next: for each particle and species of the other [`LaplacianInputs::width`] sums. The pairs are added to
+/// `kept`; a few may be a little beyond the range, without weight and potential.
 ///
 /// # Safety
 /// Arrays have the sizes that [`SortedCells`] states, and are filled; no thread writes them. There are sums for all these particles.
@@ -106,9 +143,10 @@ pub unsafe fn sum_laplacians(
     plane: usize,
     buffers: &mut LaplacianBuffers,
     sums: &mut [DensitySums],
+    kept: Option<&mut PairTerms>,
 ) {
     assert!(inputs.terms.passes.len() <= MOST_DENSITIES, "room for every density");
-    let task = SumPairs { inputs, plane, buffers, sums };
+    let task = SumPairs { inputs, plane, buffers, sums, kept };
     // SAFETY: the caller's promise is that of the loop.
     unsafe {
         match inputs.terms.species {
@@ -123,6 +161,7 @@ struct SumPairs<'a> {
     plane: usize,
     buffers: &'a mut LaplacianBuffers,
     sums: &'a mut [DensitySums],
+    kept: Option<&'a mut PairTerms>,
 }
 
 struct WithSpecies<'a, const MULTISPECIES: bool>(SumPairs<'a>);
@@ -132,7 +171,7 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let SumPairs { inputs, plane, buffers, sums } = self.0;
+        let SumPairs { inputs, plane, buffers, sums, kept } = self.0;
         let LaplacianBuffers { search, batch } = buffers;
         // SAFETY: the caller of `sum_laplacians` promises filled arrays; a plane has a first column.
         unsafe {
@@ -140,7 +179,7 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
             let first = inputs.cells.column(plane, 0)[0];
             let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
             let sums = sums.as_mut_ptr();
-            let mut adder = Adder::<I, MULTISPECIES> { inputs, metric, first, sums, arrays: batch };
+            let mut adder = Adder::<I, MULTISPECIES> { inputs, metric, first, sums, arrays: batch, kept };
             each_batch::<I, _>(&inputs.cells, plane, 0..columns, I::F32::LANES, search, &mut adder);
         }
     }
@@ -153,6 +192,7 @@ struct Adder<'a, I: Isa, const MULTISPECIES: bool> {
     first: usize,
     sums: *mut DensitySums,
     arrays: &'a mut BatchArrays,
+    kept: Option<&'a mut PairTerms>,
 }
 
 impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Adder<'_, I, MULTISPECIES> {
@@ -164,7 +204,7 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Adder<'_, I, MULTISPE
             let Some(batch) = Batch::of_group(search, slots) else { return };
             self.arrays.reserve(batch.count);
             self.measure(batch);
-            let LaplacianInputs { terms, rest, .. } = self.inputs;
+            let LaplacianInputs { terms, rest, second, .. } = self.inputs;
             let BatchArrays { pairs, weights, quads, .. } = &mut *self.arrays;
             let count = batch.count;
             let mut d = 0;
@@ -177,7 +217,12 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Adder<'_, I, MULTISPE
                 pass.kernel.visit(OfDensity::<I::F32> { pass, rest, pairs, count, weights, quads, of });
                 d += 1;
             }
-            self.second(batch.count);
+            if let Some(kept) = &mut self.kept {
+                self.arrays.append_to(kept, batch, self.first, terms.passes.len());
+            }
+            if *second {
+                self.second(count);
+            }
             if MULTISPECIES {
                 self.add(batch);
             } else {
@@ -198,8 +243,8 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
     #[inline(always)]
     unsafe fn measure(&mut self, batch: Batch) {
         let LaplacianInputs { packed, terms, rest, .. } = self.inputs;
-        let BatchArrays { i_particles, pairs: [x, y, z, r, inverse, potential], species_pair: kinds, .. } =
-            &mut *self.arrays;
+        let BatchArrays { i_particles, pairs, species_pair: kinds, .. } = &mut *self.arrays;
+        let [x, y, z, r, inverse, laplacian, potential] = pairs;
         // SAFETY: tables are padded to a vector; the caller promises the rest.
         unsafe {
             let packed = packed.as_ptr();
@@ -211,13 +256,14 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
             let mut k = 0;
             while k < batch.count {
                 let PairsAt { geometry, species_pair } = computed.at(k);
-                let mut sum = zero;
+                let mut sums = [zero; 2];
                 let mut t = 0;
                 while t < terms.soft.len() {
                     let term = terms.soft.get_unchecked(t);
                     let strength = entry::<I, MULTISPECIES>(&term.strength, species_pair);
                     let inverse_range = entry::<I, MULTISPECIES>(&term.inverse_range, species_pair);
-                    sum = sum + soft(&geometry, [strength, inverse_range], rest);
+                    let of_term = soft(&geometry, [strength, inverse_range], rest);
+                    sums = [sums[0] + of_term[0], sums[1] + of_term[1]];
                     t += 1;
                 }
                 t = 0;
@@ -227,12 +273,14 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
                     let attraction = entry::<I, MULTISPECIES>(&term.attraction, species_pair);
                     let inverse_a = entry::<I, MULTISPECIES>(&term.repulsion_inverse_range, species_pair);
                     let inverse_b = entry::<I, MULTISPECIES>(&term.attraction_inverse_range, species_pair);
-                    sum = sum + spline(&geometry, [repulsion, inverse_a], rest);
-                    sum = sum - spline(&geometry, [attraction, inverse_b], rest);
+                    let a = spline(&geometry, [repulsion, inverse_a], rest);
+                    let b = spline(&geometry, [attraction, inverse_b], rest);
+                    sums = [sums[0] + a[0] - b[0], sums[1] + a[1] - b[1]];
                     t += 1;
                 }
                 let point = I::F32::constant(AT_ONE_POINT);
-                sum.where_below(point, geometry.r).store(potential.as_mut_ptr().add(k));
+                sums[0].where_below(point, geometry.r).store(laplacian.as_mut_ptr().add(k));
+                sums[1].where_below(point, geometry.r).store(potential.as_mut_ptr().add(k));
                 geometry.d[0].store(x.as_mut_ptr().add(k));
                 geometry.d[1].store(y.as_mut_ptr().add(k));
                 geometry.d[2].store(z.as_mut_ptr().add(k));
@@ -299,8 +347,10 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
                     let (to, quads) = (sums.densities(2 * d), first.as_mut_ptr().cast());
                     scatter_quads::<I, Mixed>(to, quads, quads, running, [1.0, 1.0, 1.0, -1.0], batch.into());
                 }
-                let (to, quads) = (sums.densities(2 * d + 1), second.as_mut_ptr().cast());
-                scatter_quads::<I, Mixed>(to, quads, quads, running, [-1.0; 4], batch.into());
+                if self.inputs.second {
+                    let (to, quads) = (sums.densities(2 * d + 1), second.as_mut_ptr().cast());
+                    scatter_quads::<I, Mixed>(to, quads, quads, running, [-1.0; 4], batch.into());
+                }
                 d += 1;
             }
         }
@@ -343,10 +393,12 @@ impl<I: Isa, const MULTISPECIES: bool> Adder<'_, I, MULTISPECIES> {
                         quad.mul_add(sign, I::Quad::load(to)).store(to);
                         I::Quad::load(other).sub(quad).store(other);
                     }
-                    let quad = <Mixed as Arithmetic<I>>::load_quad(second.as_ptr().add(p).cast());
-                    let (to, other) = ((*here).second.as_mut_ptr(), (*there).second.as_mut_ptr());
-                    I::Quad::load(to).sub(quad).store(to);
-                    I::Quad::load(other).sub(quad).store(other);
+                    if self.inputs.second {
+                        let quad = <Mixed as Arithmetic<I>>::load_quad(second.as_ptr().add(p).cast());
+                        let (to, other) = ((*here).second.as_mut_ptr(), (*there).second.as_mut_ptr());
+                        I::Quad::load(to).sub(quad).store(to);
+                        I::Quad::load(other).sub(quad).store(other);
+                    }
                     d += 1;
                 }
             }
@@ -370,38 +422,42 @@ unsafe fn entry<I: Isa, const MULTISPECIES: bool>(
     unsafe { TableLookup::<I::F32>::new(table).lookup::<MULTISPECIES>(of) }
 }
 
-/// The Laplacian of `½ a R (1 − r/R)²`, of its strength `a` and `1/R`.
+/// `∇²φ` and `φ′/r` of `½ a R (1 − r/R)²`, of its strength `a` and `1/R`.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`.
 #[inline(always)]
-unsafe fn soft<R: Reals>(geometry: &PairGeometry<R>, [strength, inverse_range]: [R; 2], rest: R) -> R {
+unsafe fn soft<R: Reals>(geometry: &PairGeometry<R>, [strength, inverse_range]: [R; 2], rest: R) -> [R; 2] {
     let (one, s) = (R::constant(1.0), geometry.r * inverse_range);
-    let slope = strength * (s - one);
+    let per_length = strength * (s - one) * geometry.inverse;
     // SAFETY: the caller fulfils the contract of `simd`.
-    unsafe { (rest * slope).mul_add(geometry.inverse, strength * inverse_range).where_below(s, one) }
+    unsafe {
+        let laplacian = rest.mul_add(per_length, strength * inverse_range);
+        [laplacian.where_below(s, one), per_length.where_below(s, one)]
+    }
 }
 
-/// The Laplacian of `a W(r/R)` with the cubic spline, of `a` and `1/R`.
+/// `∇²φ` and `φ′/r` of `a W(r/R)` with the cubic spline, of `a` and `1/R`.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`.
 #[inline(always)]
-unsafe fn spline<R: Reals>(geometry: &PairGeometry<R>, [strength, inverse_range]: [R; 2], rest: R) -> R {
-    let s = geometry.r * inverse_range;
-    let slope = rest * CubicSpline::slope(s) * geometry.inverse;
-    let laplacian = strength * inverse_range * (CubicSpline::curvature(s) * inverse_range + slope);
+unsafe fn spline<R: Reals>(geometry: &PairGeometry<R>, [strength, inverse_range]: [R; 2], rest: R) -> [R; 2] {
+    let (one, s) = (R::constant(1.0), geometry.r * inverse_range);
+    let factor = strength * inverse_range;
+    let per_length = factor * CubicSpline::slope(s) * geometry.inverse;
+    let bend = factor * CubicSpline::curvature(s) * inverse_range;
     // SAFETY: the caller fulfils the contract of `simd`.
-    unsafe { laplacian.where_below(s, R::constant(1.0)) }
+    unsafe { [rest.mul_add(per_length, bend).where_below(s, one), per_length.where_below(s, one)] }
 }
 
-/// Writes the first quad, `w′` and `∇²w` of a density.
+/// Writes the first quad, `w′`, `∇²w` and `w′/r` of a density.
 struct OfDensity<'a, R: Reals> {
     pass: &'a Pass<f32>,
     rest: f64,
-    pairs: &'a [Vec<f32>; 6],
+    pairs: &'a [Vec<f32>; 7],
     count: usize,
-    weights: &'a mut [Vec<f32>; 2],
+    weights: &'a mut [Vec<f32>; 3],
     quads: &'a mut Vec<[f32; 4]>,
     of: std::marker::PhantomData<R>,
 }
@@ -411,8 +467,8 @@ impl<R: Reals<Scalar = f32>> ShapeVisitor for OfDensity<'_, R> {
 
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        let OfDensity { pass, rest, pairs: [x, y, z, r, inverse, _], count, weights, quads, .. } = self;
-        let [slopes, laplacians] = weights;
+        let OfDensity { pass, rest, pairs: [x, y, z, r, inverse, ..], count, weights, quads, .. } = self;
+        let [slopes, laplacians, per_lengths] = weights;
         // SAFETY: `Adder::visit` alone creates this visitor, with arrays of whole vectors; its caller fulfils the contract of `simd`.
         unsafe {
             let (value, inverse_range) = (R::splat(-pass.value), R::splat(pass.inverse_range));
@@ -426,6 +482,7 @@ impl<R: Reals<Scalar = f32>> ShapeVisitor for OfDensity<'_, R> {
                 let bend = (second * S::curvature(s)).where_below(s, one).where_below(point, r);
                 let per_length = slope * inverse;
                 slope.store(slopes.as_mut_ptr().add(k));
+                per_length.store(per_lengths.as_mut_ptr().add(k));
                 rest.mul_add(per_length, bend).store(laplacians.as_mut_ptr().add(k));
                 let d = [R::load(x.as_ptr().add(k)), R::load(y.as_ptr().add(k)), R::load(z.as_ptr().add(k))];
                 // The sign of the weight is opposite to that of the gradient, which the other particle has with the opposite sign.

@@ -1,68 +1,69 @@
 //! The drag between the pairs of an evaluation, for a thermostat that acts at the same positions as the conservative forces.
 
-use super::evaluation::{Evaluation, Evaluator};
-use super::plane_list::PlaneList;
+use super::evaluation::Evaluator;
+use super::pair_block::PairBlock;
+use super::pairs::BLOCK;
 use crate::engine::plan::ThermostatPlan;
 use crate::engine::vectors::{Loop, run_best};
 
 impl Evaluator {
-    /// The forces of the pairs of a part and the drag `−γ w_R² (ê·v_ij)` at the velocities `v` of the particles, with their `shares`, divided
-    /// by distances as [`PairBlock::strengths`](super::PairBlock::strengths). No pair with drag is missing if
+    /// The forces of a block of pairs and the drag `−γ w_R² (ê·v_ij)` at the velocities `v` of particles of these `species`, with their
+    /// `shares`, divided by distances as [`PairBlock::strengths`]. No pair with drag is missing if
     /// [`Plan::drag_is_within_forces`](crate::engine::Plan::drag_is_within_forces).
-    pub fn strengths_with_drag(
+    pub fn strengths_with_drag<T: Copy + Into<f64>>(
         &self,
-        evaluation: &Evaluation,
-        part: usize,
-        shares: [f64; 2],
+        block: &PairBlock<T>,
+        species: &[i32],
         v: &[[f64; 3]],
-    ) -> Vec<f64> {
-        let plane = &evaluation.planes[part];
+        shares: [f64; 2],
+    ) -> [f64; BLOCK] {
         let [share, of_drag] = shares;
-        let mut strengths: Vec<f64> = plane.strengths.iter().map(|strength| share * strength).collect();
+        let mut strengths = [0.0; BLOCK];
+        strengths.iter_mut().zip(block.strengths).for_each(|(to, of)| *to = share * (*of).into());
         if let Some(plan) = &self.plan.thermostat {
-            let v: Vec<[f64; 3]> = plane.hosts.iter().map(|k| v[*k as usize]).collect();
             let kinds = self.fluid.species.len();
-            run_best(Drag { plan, kinds, plane, share: of_drag, v: &v, strengths: &mut strengths });
+            run_best(Drag { plan, kinds, block, share: of_drag, species, v, strengths: &mut strengths });
         }
         strengths
     }
 }
 
-/// Adds a share of drag to the forces of the pairs of a plane, whose particles have the velocities `v` by their local numbers.
-struct Drag<'a> {
+/// Adds a share of drag to the forces of pairs.
+struct Drag<'a, T> {
     plan: &'a ThermostatPlan,
     kinds: usize,
-    plane: &'a PlaneList,
+    block: &'a PairBlock<'a, T>,
     share: f64,
+    species: &'a [i32],
     v: &'a [[f64; 3]],
-    strengths: &'a mut [f64],
+    strengths: &'a mut [f64; BLOCK],
 }
 
-impl Loop for Drag<'_> {
+impl<T: Copy + Into<f64>> Loop for Drag<'_, T> {
     type Out = ();
 
     #[inline(always)]
     fn run(self) {
-        let Drag { plan: ThermostatPlan { gamma, range, exponent, .. }, kinds, plane, share, v, strengths } =
-            self;
-        let list = &plane.list;
+        let Drag { plan, kinds, block, share, species, v, strengths } = self;
+        let ThermostatPlan { gamma, range, exponent, .. } = plan;
         let is_linear = exponent.iter().all(|exponent| *exponent == 1.0);
-        let [x, y, z] = list.d.each_ref();
-        let particles = list.i.iter().zip(&list.j).zip(list.species_i.iter().zip(&list.species_j));
-        let pairs = particles.zip(x.iter().zip(y).zip(z)).zip(&list.r);
-        for (strength, ((((i, j), (a, b)), ((x, y), z)), r)) in strengths.iter_mut().zip(pairs) {
-            let (v_i, v_j) = (v[*i as usize], v[*j as usize]);
-            let kinds = *a as usize * kinds + *b as usize;
+        let [x, y, z] = block.d;
+        for (((strength, [i, j]), (x, y)), z) in
+            strengths.iter_mut().zip(block.particles()).zip(x.iter().zip(y)).zip(z)
+        {
+            let d: [f64; 3] = [(*x).into(), (*y).into(), (*z).into()];
+            let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            let kinds = species[i] as usize * kinds + species[j] as usize;
             let (gamma, range) = (gamma[kinds], range[kinds]);
-            let dot = x * (v_i[0] - v_j[0]) + y * (v_i[1] - v_j[1]) + z * (v_i[2] - v_j[2]);
+            let dot = d[0] * (v[i][0] - v[j][0]) + d[1] * (v[i][1] - v[j][1]) + d[2] * (v[i][2] - v[j][2]);
             // w_R/r, if w_R is linear in r.
             let weight = (range - r) / (range * r);
             let mut drag = share * gamma * weight * weight * dot;
-            if !is_linear && *r < range {
+            if !is_linear && r < range {
                 drag *= (1.0 - r / range).powf(2.0 * exponent[kinds] - 2.0);
             }
             // A pair at zero distance has no direction.
-            *strength -= if (*r < range) & (*r > 0.0) { drag } else { 0.0 };
+            *strength -= if (r < range) & (r > 0.0) { drag } else { 0.0 };
         }
     }
 }
@@ -101,7 +102,37 @@ gamma = 0.0
 range = 1.0
 "#;
 
-    /// Each pair has the drag of its species by the definition, besides its conservative force, in their shares; two at one place have none.
+    /// Compares a block with the definition, and returns how many pairs have drag.
+    fn check<T: Copy + Into<f64>>(
+        evaluator: &Evaluator,
+        block: &PairBlock<T>,
+        (species, v): (&[i32], &[[f64; 3]]),
+        exponent: f64,
+    ) -> usize {
+        let found = evaluator.strengths_with_drag(block, species, v, [0.7, 0.4]);
+        let mut slowed = 0;
+        for (k, [i, j]) in block.particles().enumerate() {
+            let (d, conservative): ([f64; 3], f64) = (block.d.map(|d| d[k].into()), block.strengths[k].into());
+            let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+            let (gamma, range, exponent) = match species[i] + species[j] {
+                0 => (4.5, 0.7, 1.0),
+                1 => (9.0, 1.0, exponent),
+                _ => (0.0, 0.0, 1.0),
+            };
+            let mut expected = 0.7 * conservative;
+            if r < range && r > 0.0 {
+                let along = (0..3).map(|c| d[c] / r * (v[i][c] - v[j][c])).sum::<f64>();
+                expected -= 0.4 * gamma * (1.0 - r / range).powf(2.0 * exponent) * along / r;
+                slowed += 1;
+            }
+            let scale = 1.0 + expected.abs() + conservative.abs();
+            assert!((found[k] - expected).abs() < 1e-13 * scale, "{i} {j} {r}: {} {expected}", found[k]);
+        }
+        slowed
+    }
+
+    /// Each pair has the drag of its species by the definition, besides its conservative force, in their shares, in both precisions; two at one
+    /// place have none.
     #[test]
     fn pairs_have_their_drag() {
         for (model, exponent) in [(MODEL.to_owned(), 0.5), (MODEL.replace("exponent = 0.5", ""), 1.0)] {
@@ -116,29 +147,14 @@ range = 1.0
             let domain = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [true; 3]).unwrap();
             let (evaluator, pool) = (Evaluator::new(fluid).unwrap(), Pool::new(NonZeroUsize::MIN));
             let evaluation = evaluator.evaluate(&pool, &x, &species, &domain);
+            let bodies = (&species[..], &v[..]);
             let mut slowed = 0;
-            for (part, count) in evaluation.parts().enumerate() {
-                let found = evaluator.strengths_with_drag(&evaluation, part, [0.7, 0.4], &v);
-                let blocks = evaluation.blocks_of(part).flat_map(|block| {
-                    let at = |k: usize| ([0, 1, 2].map(|c| block.d[c][k]), block.r[k], block.strengths[k]);
-                    block.particles().enumerate().map(|(k, ij)| (ij, at(k))).collect::<Vec<_>>()
-                });
-                assert_eq!(found.len(), count);
-                for (([i, j], (d, r, conservative)), found) in blocks.zip(found) {
-                    let (gamma, range, exponent) = match species[i] + species[j] {
-                        0 => (4.5, 0.7, 1.0),
-                        1 => (9.0, 1.0, exponent),
-                        _ => (0.0, 0.0, 1.0),
-                    };
-                    let mut expected = 0.7 * conservative;
-                    if r < range && r > 0.0 {
-                        let along = (0..3).map(|c| d[c] / r * (v[i][c] - v[j][c])).sum::<f64>();
-                        expected -= 0.4 * gamma * (1.0 - r / range).powf(2.0 * exponent) * along / r;
-                        slowed += 1;
-                    }
-                    let scale = 1.0 + expected.abs() + conservative.abs();
-                    assert!((found - expected).abs() < 1e-13 * scale, "{i} {j} {r}: {found} {expected}");
-                }
+            for block in (0..evaluation.parts().count()).flat_map(|part| evaluation.blocks_of(part)) {
+                slowed += check(&evaluator, &block, bodies, exponent);
+                let single = |of: &[f64]| -> Vec<f32> { of.iter().map(|of| *of as f32).collect() };
+                let (d, strengths) = (block.d.map(single), single(block.strengths));
+                let (PairBlock { hosts, pairs, .. }, d) = (block, d.each_ref().map(|d| &d[..]));
+                check(&evaluator, &PairBlock { hosts, pairs, d, strengths: &strengths }, bodies, exponent);
             }
             assert!(slowed > 500);
         }

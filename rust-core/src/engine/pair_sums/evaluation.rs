@@ -3,8 +3,9 @@
 
 use super::free_energy::{Psi, psi};
 use super::in_box::{BoxSearch, Pair};
-use super::plane_list::{PairBlock, PlaneList, merge};
-use super::shares::{PairLoops, ParticleSums, has_particle_sums};
+use super::pair_block::PairBlock;
+use super::plane_list::{PlaneList, merge};
+use super::shares::{PairLoops, ParticleSums, Wanted, has_particle_sums};
 use super::sweep_pairs::{Ranges, SweepPairs};
 use crate::engine::components::COMPONENTS;
 use crate::engine::plan::Plan;
@@ -125,27 +126,32 @@ impl Evaluator {
         Evaluation { energy, densities, psi, excess, planes, near_walls, range, shortest, reach }
     }
 
-    /// Sums over the pairs of each particle by loops like those of the sweep, which take less time than [`Evaluator::evaluate`]. `None` where they
-    /// do not apply: with walls, potentials that are formulas or tables, more than two densities or ranges that differ by species, and in
-    /// boxes less than twice as wide as the range.
+    /// Sums over the pairs of each particle, and the pairs, by loops like those of the sweep, which take less time than [`Evaluator::evaluate`].
+    /// `None` where they do not apply: with walls, potentials that are formulas or tables, more than two densities or ranges that differ by
+    /// species, and in boxes less than twice as wide as the range.
     pub fn particle_sums(
         &self,
         pool: &Pool,
         x: &[[f64; 3]],
         species: &[i32],
         domain: &PeriodicBox,
+        wanted: Wanted,
     ) -> Option<ParticleSums> {
         let fluid = &self.fluid;
         if !has_particle_sums(fluid) {
             return None;
         }
         let mut loops = self.loops();
-        let sums = loops.find(pool, &self.plan, fluid, (x, species), domain)?;
-        let mut densities = sums.densities(pool);
+        let mut found = loops.find(pool, &self.plan, fluid, (x, species), domain, wanted)?;
+        let mut densities = found.densities(pool);
         self.add_own(species, &mut densities);
         let psi = self.psi_of(pool, species, &densities);
-        let (shares, excess) = (sums.shares(pool, &psi), self.excess_of(species, &psi));
-        Some(ParticleSums { shares, densities, excess })
+        let shares = if wanted.shares { found.shares(pool, &psi) } else { Vec::new() };
+        let mut planes = std::mem::take(&mut found.planes);
+        pool.each(&mut planes, |plane| plane.find(fluid, species, &psi));
+        let excess = self.excess_of(species, &psi);
+        let range = fluid.conservative_range();
+        Some(ParticleSums { shares, densities, excess, found: wanted, planes, range })
     }
 
     /// Computes the energy `U` only.
@@ -231,6 +237,11 @@ impl Evaluator {
     /// Keeps the arrays of an evaluation for reuse: allocating new ones costs more than filling them.
     pub fn recycle(&self, evaluation: Evaluation) {
         self.work().spare.push(evaluation.planes);
+    }
+
+    /// Keeps the arrays of pairs for reuse.
+    pub fn recycle_sums(&self, sums: ParticleSums) {
+        self.loops().spare.push(sums.planes);
     }
 
     pub(super) fn loops(&self) -> MutexGuard<'_, PairLoops> {

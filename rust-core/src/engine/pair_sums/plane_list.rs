@@ -6,6 +6,7 @@
 use super::densities::add_density;
 use super::forces::{Block, ForceInput};
 use super::in_box::Pair;
+use super::pair_block::PairBlock;
 use super::pairs::{BLOCK, PairList};
 use crate::engine::plan::Plan;
 use crate::engine::sweep::{Images, Places, PlanePairs};
@@ -32,28 +33,6 @@ pub struct PlaneList {
     sums: Vec<f64>,
     /// Energy of the pairs.
     energy: f64,
-}
-
-/// A block of the pairs of a plane with their conservative forces.
-#[derive(Debug, Clone, Copy)]
-pub struct PairBlock<'a> {
-    hosts: &'a [u32],
-    pairs: [&'a [u32]; 2],
-    /// The components of `r_i − r_j`.
-    pub d: [&'a [f64]; 3],
-    /// The distances.
-    pub r: &'a [f64],
-    /// The force on particle `i`, divided by `d`.
-    pub strengths: &'a [f64],
-}
-
-impl PairBlock<'_> {
-    /// The particles `i` and `j` of each pair, with the indices of the host.
-    #[inline(always)]
-    pub fn particles(&self) -> impl Iterator<Item = [usize; 2]> {
-        let PairBlock { hosts, pairs: [i, j], .. } = *self;
-        i.iter().zip(j).map(|(i, j)| [i, j].map(|k| hosts[*k as usize] as usize))
-    }
 }
 
 impl PlaneList {
@@ -140,19 +119,10 @@ impl PlaneList {
         }
     }
 
-    /// The pairs with their forces in blocks of at most [`BLOCK`]. Those a little beyond the range have no force.
+    /// The pairs with their forces in blocks. Those a little beyond the range have no force.
     pub fn blocks(&self) -> impl Iterator<Item = PairBlock<'_>> {
-        let PlaneList { hosts, list, strengths, .. } = self;
-        (0..list.len()).step_by(BLOCK).map(move |from| {
-            let pairs = from..(from + BLOCK).min(list.len());
-            PairBlock {
-                hosts,
-                pairs: [&list.i, &list.j].map(|of| &of[pairs.clone()]),
-                d: list.d.each_ref().map(|d| &d[pairs.clone()]),
-                r: &list.r[pairs.clone()],
-                strengths: &strengths[pairs],
-            }
-        })
+        let PlaneList { hosts, list: PairList { i, j, d, .. }, strengths, .. } = self;
+        PairBlock::all(hosts, [i, j], d.each_ref().map(|d| &d[..]), strengths)
     }
 
     /// The pairs within `range`. Particles have the indices of the host.

@@ -1,10 +1,13 @@
-//! What each particle adds to the Laplacian of the energy, by loops like those of the sweep.
+//! What each particle adds to the Laplacian of the energy, and the forces of pairs, by loops like those of the sweep.
 
 use super::free_energy::{Psi, times};
+use super::in_box::Pair;
+use super::pair_block::PairBlock;
+use super::plane_forces::PlaneForces;
 use super::sweep_pairs::Ranges;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::{MARGIN, PairLists, Pool};
+use crate::engine::sweep::{MARGIN, PairLists, PlaneTerms, Pool, Sought};
 use crate::model::Fluid;
 use crate::model::pair::PairPotential;
 use psidpd_passes::domain::PeriodicBox;
@@ -16,9 +19,20 @@ use psidpd_passes::plane::laplacians::{DensitySums, MOST_DENSITIES};
 pub struct PairLoops {
     lists: PairLists,
     tags: Vec<i32>,
+    /// Arrays of pairs for reuse.
+    pub spare: Vec<Vec<PlaneForces>>,
 }
 
-/// Sums over the pairs of each particle, with pairs in single precision.
+/// What [`Evaluator::particle_sums`](super::Evaluator::particle_sums) finds besides densities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wanted {
+    /// [`ParticleSums::shares`]
+    pub shares: bool,
+    /// The pairs with their forces.
+    pub pairs: bool,
+}
+
+/// Sums over the pairs of each particle, and the pairs, in single precision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleSums {
     /// What each particle adds to the Laplacian `Σ_k ∇_k² U`:
@@ -34,6 +48,33 @@ pub struct ParticleSums {
     pub densities: Vec<f64>,
     /// Sum `Σ ψ` over the particles of each species.
     pub excess: Vec<f64>,
+    /// What has been found of shares and pairs.
+    pub found: Wanted,
+    pub(super) planes: Vec<PlaneForces>,
+    /// Range of the conservative interactions.
+    pub(super) range: f64,
+}
+
+impl ParticleSums {
+    /// The number of pairs in each of the parts that they are in, as [`Evaluation::parts`](super::Evaluation::parts).
+    pub fn parts(&self) -> impl Iterator<Item = usize> {
+        self.planes.iter().map(PlaneForces::len)
+    }
+
+    /// The pairs of a part with their forces, as [`Evaluation::blocks_of`](super::Evaluation::blocks_of).
+    pub fn blocks_of(&self, part: usize) -> impl Iterator<Item = PairBlock<'_, f32>> {
+        self.planes[part].blocks()
+    }
+
+    /// Whether the pairs closer than a range are there.
+    pub fn has_pairs_within(&self, range: f64) -> bool {
+        self.found.pairs && range <= self.range
+    }
+
+    /// Calls `visit` with the pairs closer than a range that are there.
+    pub fn for_each_pair(&self, range: f64, mut visit: impl FnMut(Pair)) {
+        self.planes.iter().for_each(|plane| plane.for_each_pair(range, &mut visit));
+    }
 }
 
 /// Whether [`Evaluator::particle_sums`](super::Evaluator::particle_sums) can do a fluid, in wide boxes.
@@ -49,10 +90,11 @@ pub fn has_particle_sums(fluid: &Fluid) -> bool {
 
 impl PairLoops {
     pub fn new(set: InstructionSet, dimensions: usize) -> PairLoops {
-        PairLoops { lists: PairLists::new(set, dimensions), tags: Vec::new() }
+        PairLoops { lists: PairLists::new(set, dimensions), tags: Vec::new(), spare: Vec::new() }
     }
 
-    /// The sums; `None` if the box is too narrow or too long. `plan` has a pass for every density of the fluid.
+    /// The sums, and the pairs without their forces; `None` if the box is too narrow or too long. `plan` has a pass for every density of the
+    /// fluid.
     pub fn find<'a>(
         &'a mut self,
         pool: &Pool,
@@ -60,15 +102,22 @@ impl PairLoops {
         fluid: &'a Fluid,
         (x, species): (&[[f64; 3]], &[i32]),
         domain: &PeriodicBox,
+        wanted: Wanted,
     ) -> Option<Sums<'a>> {
-        let PairLoops { lists, tags } = self;
+        let PairLoops { lists, tags, spare } = self;
         if tags.len() != x.len() {
             *tags = (1..=i32::try_from(x.len()).ok()?).collect();
         }
         let particles = Particles { owned: x.len(), x, tag: tags, kind: species };
         let range = [fluid.conservative_range(), MARGIN];
-        let sums = lists.sum_laplacians(pool, domain, &particles, plan, range).ok()?;
-        Some(Sums { sums, fluid, place: &lists.place })
+        let mut planes = if wanted.pairs { spare.pop().unwrap_or_default() } else { Vec::new() };
+        let mut pairs: Vec<PlaneTerms> =
+            planes.iter_mut().map(|plane| std::mem::take(&mut plane.terms)).collect();
+        let sought = Sought { second: wanted.shares, pairs: wanted.pairs.then_some(&mut pairs) };
+        let sums = lists.sum_laplacians(pool, domain, &particles, plan, range, sought).ok()?;
+        planes.resize_with(pairs.len(), PlaneForces::default);
+        planes.iter_mut().zip(pairs).for_each(|(plane, pairs)| plane.terms = pairs);
+        Some(Sums { sums, fluid, place: &lists.place, planes })
     }
 }
 
@@ -77,6 +126,8 @@ pub struct Sums<'a> {
     sums: Vec<DensitySums>,
     fluid: &'a Fluid,
     place: &'a [u32],
+    /// The pairs, if they are wanted.
+    pub planes: Vec<PlaneForces>,
 }
 
 impl Sums<'_> {
@@ -130,12 +181,13 @@ impl Sums<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::pair_sums::Evaluator;
+    use crate::engine::pair_sums::{Evaluation, Evaluator};
     use crate::model::Model;
     use crate::model::wall::{Surface, Wall};
     use nalgebra::Matrix3;
     use psidpd_passes::noise::threefry2x32;
     use psidpd_passes::settings::Instructions;
+    use std::collections::BTreeMap;
     use std::num::NonZeroUsize;
 
     /// Two densities of two species, one with a self term, and potentials of all forms with loops.
@@ -219,10 +271,57 @@ range_B = 1.0
         ((0..count).map(place).collect(), species, domain)
     }
 
-    /// Shares sum up to the Laplacian of the evaluation in double precision, on each instruction set; any number of threads finds the same
-    /// bits.
+    const ALL: Wanted = Wanted { shares: true, pairs: true };
+
+    /// Pairs by particles, the smaller index first: `r_i − r_j`, and the force on particle `i`.
+    type Forces = BTreeMap<[usize; 2], [[f64; 3]; 2]>;
+
+    fn forces<'a, T: Copy + Into<f64> + 'a>(blocks: impl Iterator<Item = PairBlock<'a, T>>) -> Forces {
+        let mut all = Forces::new();
+        for block in blocks {
+            for (k, [i, j]) in block.particles().enumerate() {
+                let sign = if i < j { 1.0 } else { -1.0 };
+                let d = block.d.map(|d| sign * d[k].into());
+                let known = all.insert([i.min(j), i.max(j)], [d, d.map(|d| d * block.strengths[k].into())]);
+                assert!(known.is_none(), "{i} {j} twice");
+            }
+        }
+        all
+    }
+
+    /// The pairs and their forces are those of an evaluation; few have no force in either.
+    fn assert_same_pairs(sums: &ParticleSums, evaluation: &Evaluation, title: &str) {
+        let found = forces((0..sums.parts().count()).flat_map(|part| sums.blocks_of(part)));
+        let truth = forces((0..evaluation.parts().count()).flat_map(|part| evaluation.blocks_of(part)));
+        assert_eq!(found.len(), sums.parts().sum::<usize>(), "{title}");
+        let strongest = truth.values().flat_map(|[_, f]| f).fold(0.0f64, |most, f| most.max(f.abs()));
+        let mut count = 0;
+        for (pair, [d, f]) in &truth {
+            let Some([of_d, of_f]) = found.get(pair) else {
+                assert!(f.iter().all(|f| f.abs() < 1e-3 * strongest), "{title}: {pair:?} is missing");
+                continue;
+            };
+            for c in 0..3 {
+                assert!((of_d[c] - d[c]).abs() < 3e-6, "{title} {pair:?}: {of_d:?} {d:?}");
+                assert!((of_f[c] - f[c]).abs() < 3e-6 * strongest, "{title} {pair:?}: {of_f:?} {f:?}");
+            }
+            count += 1;
+        }
+        let near = sums.range * (1.0 - 1e-5);
+        let [mut within, mut expected] = [0; 2];
+        sums.for_each_pair(near, |pair| {
+            let d = found[&[pair.i.min(pair.j), pair.i.max(pair.j)]][0].map(f64::abs);
+            assert!(pair.r < near && pair.d.map(f64::abs) == d, "{title}: {pair:?} {d:?}");
+            within += 1;
+        });
+        evaluation.pairs_within(near).unwrap().for_each(|_| expected += 1);
+        assert!(within == expected && count >= within && sums.has_pairs_within(near), "{title} {within}");
+    }
+
+    /// Shares sum up to the Laplacian of the evaluation in double precision, on each instruction set, and forces are the same; any number of
+    /// threads finds the same bits, also of shares or pairs alone.
     #[test]
-    fn shares_sum_up_to_the_laplacian() {
+    fn sums_and_pairs_are_those_of_the_evaluation() {
         for (model, [skew, periodic]) in MODELS
             .into_iter()
             .flat_map(|model| [[false, true], [true, true], [false, false]].map(|shape| (model, shape)))
@@ -231,7 +330,7 @@ range_B = 1.0
             let fluid = &evaluator.fluid;
             let (x, species, domain) = crowd(fluid, skew, periodic);
             let (alone, three) = (pool(1), pool(3));
-            let found = evaluator.particle_sums(&three, &x, &species, &domain);
+            let found = evaluator.particle_sums(&three, &x, &species, &domain, ALL);
             assert!(found.is_some(), "{}", fluid.title);
             let evaluation = evaluator.evaluate(&alone, &x, &species, &domain);
             let laplacians = evaluation.laplacians(&alone, fluid);
@@ -240,8 +339,9 @@ range_B = 1.0
                 let Some(set) = InstructionSet::new(set) else { continue };
                 for pool in [&alone, &three] {
                     *evaluator.loops() = PairLoops::new(set, fluid.dimensions);
-                    let sums = evaluator.particle_sums(pool, &x, &species, &domain).unwrap();
-                    let ParticleSums { shares, densities, excess } = &sums;
+                    let sums = evaluator.particle_sums(pool, &x, &species, &domain, ALL).unwrap();
+                    let ParticleSums { shares, densities, excess, .. } = &sums;
+                    assert_same_pairs(&sums, &evaluation, &fluid.title);
                     let [sum, truth] = [shares, &laplacians].map(|of| of.iter().sum::<f64>());
                     assert!((sum - truth).abs() < 2e-7 * sizes, "{} {sum} {truth}", fluid.title);
                     let of_particles = [(densities, &evaluation.densities), (excess, &evaluation.excess)];
@@ -252,8 +352,16 @@ range_B = 1.0
                             fluid.title
                         );
                     }
+                    for found in [Wanted { pairs: false, ..ALL }, Wanted { shares: false, ..ALL }] {
+                        let part = evaluator.particle_sums(pool, &x, &species, &domain, found).unwrap();
+                        let shares = if found.shares { sums.shares.clone() } else { Vec::new() };
+                        let planes = if found.pairs { sums.planes.clone() } else { Vec::new() };
+                        let expected = ParticleSums { shares, planes, found, ..sums.clone() };
+                        assert!(part == expected, "{} {found:?}", fluid.title);
+                        evaluator.recycle_sums(part);
+                    }
                     if set.instructions() == InstructionSet::best().instructions() {
-                        assert_eq!(Some(&sums), found.as_ref(), "{}", fluid.title);
+                        assert!(Some(&sums) == found.as_ref(), "{}", fluid.title);
                     }
                 }
             }
@@ -288,7 +396,7 @@ range_B = 1.0
             (three, &wide, false),
         ] {
             let evaluator = Evaluator::new(fluid(&model)).unwrap();
-            let found = evaluator.particle_sums(&pool(1), &x, &[0, 1], domain);
+            let found = evaluator.particle_sums(&pool(1), &x, &[0, 1], domain, ALL);
             assert_eq!(found.is_some(), expected, "{model}");
         }
         let wall = Wall {

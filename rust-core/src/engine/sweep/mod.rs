@@ -21,7 +21,7 @@ mod times;
 mod workspace;
 
 pub(super) use listed_pairs::ListedFor;
-pub(super) use pair_lists::{PairLists, PlanePairs};
+pub(super) use pair_lists::{PairLists, PlanePairs, PlaneTerms, Sought};
 pub(super) use places::{Images, MARGIN, Places};
 pub use psidpd_threads::{Pool, ThreadCount, part};
 pub use times::{Times, lap};

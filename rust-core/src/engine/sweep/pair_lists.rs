@@ -21,7 +21,9 @@ use psidpd_passes::ground::arithmetic::MixedParticle;
 use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::distances::{DistanceInputs, ShellCounts, Shells, count_pairs};
-use psidpd_passes::plane::laplacians::{DensitySums, LaplacianBuffers, LaplacianInputs, sum_laplacians};
+use psidpd_passes::plane::laplacians::{
+    DensitySums, LaplacianBuffers, LaplacianInputs, PairTerms, sum_laplacians,
+};
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, ListTerms, list_pairs};
 use psidpd_threads::{Pool, part, take};
 
@@ -33,6 +35,23 @@ const MOST_MARGIN: f64 = 1e-2;
 
 /// The largest fraction by which the range may be shortened in a box hardly twice as wide.
 const MOST_LOSS: f64 = 1e-3;
+
+/// Pairs of the particles of a plane of cells with each other and with the next plane.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PlaneTerms {
+    /// The host's index of each particle of the plane, and then of the next.
+    pub hosts: Vec<u32>,
+    pub pairs: PairTerms,
+}
+
+/// What [`PairLists::sum_laplacians`] finds besides densities and their gradients.
+#[derive(Debug)]
+pub struct Sought<'a> {
+    /// Whether it sums second derivatives.
+    pub second: bool,
+    /// The pairs of all planes.
+    pub pairs: Option<&'a mut Vec<PlaneTerms>>,
+}
 
 const FAR_APART: EngineError = EngineError::Host(
     "particles are so far apart, or the box is so long, that the pairs of the thermostat cannot be found",
@@ -183,6 +202,7 @@ impl PairLists {
         particles: &Particles,
         plan: &Plan,
         [range, margin]: [f64; 2],
+        sought: Sought,
     ) -> Result<Vec<DensitySums>, EngineError> {
         let input =
             Input { particles: *particles, species_of_type: &plan.species_of_type, ..Input::default() };
@@ -196,12 +216,15 @@ impl PairLists {
         let PairLists { cells, particles, of_laplacians, .. } = self;
         let (cells, shared) = (&*cells, particles.share());
         let cells_of_all = sorted_cells(set, cells, &shared);
-        let inputs = &LaplacianInputs { cells: cells_of_all, packed: shared.packed, terms, rest };
-        let of_each = inputs.width() * terms.species;
+        let Sought { second, mut pairs } = sought;
+        let inputs = &LaplacianInputs { cells: cells_of_all, packed: shared.packed, terms, rest, second };
+        let (of_each, is_kept) = (inputs.width() * terms.species, pairs.is_some());
         // Each plane has sums of its own for its particles and for those of the next, so that threads do not matter.
-        let mut planes: Vec<(PlanePairs, Vec<DensitySums>)> = Vec::new();
-        planes.resize_with(cells.grid.planes, Default::default);
-        let (count, threads) = (planes.len(), pool.threads());
+        let (count, threads) = (cells.grid.planes, pool.threads());
+        let mut kept = pairs.as_deref_mut().map(std::mem::take).unwrap_or_default();
+        kept.resize_with(count, PlaneTerms::default);
+        let mut planes: Vec<_> =
+            kept.into_iter().map(|kept| (PlanePairs::default(), Vec::new(), kept)).collect();
         let mut rest = &mut planes[..];
         let of_thread = |(t, buffers): (usize, _)| {
             let numbers = part(count, t, threads);
@@ -209,19 +232,26 @@ impl PairLists {
         };
         let mut work: Vec<_> = of_laplacians.iter_mut().enumerate().map(of_thread).collect();
         pool.each(&mut work, |(planes, numbers, buffers)| {
-            for (number, (plane, sums)) in numbers.clone().zip(planes.iter_mut()) {
+            for (number, (plane, sums, kept)) in numbers.clone().zip(planes.iter_mut()) {
                 plane.lie_in(cells, number);
                 sums.resize((plane.own.len() + plane.next.len()) * of_each, DensitySums::default());
+                let kept = is_kept.then(|| {
+                    let of_plane = plane.own.clone().chain(plane.next.clone());
+                    kept.hosts.clear();
+                    kept.hosts.extend(of_plane.map(|k| cells.order[k]));
+                    kept.pairs.clear();
+                    &mut kept.pairs
+                });
                 // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
-                unsafe { sum_laplacians(set, inputs, number, buffers, sums) };
+                unsafe { sum_laplacians(set, inputs, number, buffers, sums, kept) };
             }
         });
         let mut all = vec![DensitySums::default(); cells.particles() * of_each];
         let mut rest = &mut all[..];
         let mut work: Vec<_> = (0..count)
             .map(|number| {
-                let (plane, own) = &planes[number];
-                let (before, theirs) = &planes[number.checked_sub(1).unwrap_or(count - 1)];
+                let (plane, own, _) = &planes[number];
+                let (before, theirs, _) = &planes[number.checked_sub(1).unwrap_or(count - 1)];
                 let of_own = plane.own.len() * of_each;
                 let of_next =
                     if before.next == plane.own { &theirs[before.own.len() * of_each..] } else { &[] };
@@ -232,6 +262,9 @@ impl PairLists {
             to.copy_from_slice(own);
             to.iter_mut().zip(of_next.iter()).for_each(|(to, add)| to.add(add));
         });
+        if let Some(pairs) = pairs {
+            *pairs = planes.into_iter().map(|(.., kept)| kept).collect();
+        }
         Ok(all)
     }
 

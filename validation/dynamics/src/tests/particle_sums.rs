@@ -4,10 +4,10 @@ use super::support::{self, SET6};
 use crate::run::Simulation;
 use crate::scene::Scene;
 use psidpd_core::engine::pair_sums::Evaluator;
-use psidpd_core::engine::{Precision, Settings};
-use psidpd_observe::Observation;
+use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_observe::configurational::{sums, sums_of_blocks};
 use psidpd_observe::frame::{Frame, View};
+use psidpd_observe::{Observation, Observers, Recorded};
 
 const MIXTURE: &str = include_str!("../../../models/huggins.toml");
 const PLANE: &str = include_str!("../../../models/binary-2d.toml");
@@ -71,7 +71,53 @@ fn sums_of_particles_are_those_of_an_evaluation() {
             }
         }
         assert!(count >= 8, "{space}: {count}");
-        quick.evaluation();
-        assert!(quick.sums().is_none());
+        let late = frame(mixed);
+        late.evaluation();
+        assert!(late.sums().is_none(), "{space}");
+    }
+}
+
+/// Profiles of stress, properties of a drop and clusters agree, from drag in the forces and apart from them, forces at displaced positions,
+/// and a temperature that needs sums besides.
+#[test]
+fn lines_of_sums_are_those_of_an_evaluation() {
+    const ATTRACTIVE: &str = include_str!("../../../models/spline-attractive.toml");
+    for (model, kt, density) in
+        [(SET6, 1.0, 6.0), (MIXTURE, 1.0, 5.0), (TWO_DENSITIES, 1.0, 6.0), (ATTRACTIVE, 0.5, 12.5)]
+    {
+        for integrator in ["velocity-verlet", "force-gradient", "aboba"] {
+            let text = format!(
+                "model = \"m.toml\"\nkT = {kt:?}\nseed = 5\nbox = [8.0, 9.0, 7.0]\n[initial]\nkind = \"sphere\"\nradius = 2.5\n\
+                 density = {density:?}\n[[stage]]\nname = \"a\"\nsteps = 4\ndt = 0.005\nintegrator = \"{integrator}\"\n\
+                 [observe]\nevery = 4\nstress_profile = {{ bins = 14 }}\ndrop = {{ bins = 14 }}\nclusters = true\ntemperature = true\n"
+            );
+            let scene = support::scene(model, &text).unwrap();
+            let mut simulation =
+                Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+            simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() }).unwrap();
+            simulation.prepare(0.005, Want::FORCES).unwrap();
+            for k in 0..4 {
+                simulation.record_flux(if k == 3 { Recorded::Lines } else { Recorded::Nothing });
+                simulation.step(0.005, scene.stages[0].integrator, Want::TOTALS).unwrap();
+            }
+            simulation.find_conservative_forces().unwrap();
+            let [quick, exact] = [Precision::Mixed, Precision::Double].map(|precision| {
+                let mut observers = Observers::new(&scene.observe, ["a"]);
+                observers.sample(View { precision, ..simulation.view(0.02) }, "a");
+                observers.finish()
+            });
+            let mut count = 0;
+            for (a, b) in quick.iter().zip(&exact) {
+                for (a, b) in a.columns.iter().zip(&b.columns) {
+                    let most = b.values.iter().fold(1.0f64, |most, b| most.max(b.abs()));
+                    for (of_a, of_b) in a.values.iter().zip(&b.values) {
+                        let is_close = (of_a - of_b).abs() < 2e-5 * most || of_a.is_nan() && of_b.is_nan();
+                        assert!(is_close, "{kt} {density} {integrator} {}: {of_a} {of_b}", a.name);
+                    }
+                    count += a.values.len();
+                }
+            }
+            assert!(count > 100, "{integrator} {count}");
+        }
     }
 }
