@@ -294,7 +294,8 @@ impl<'a> Frame<'a> {
 
 impl Drop for Frame<'_> {
     fn drop(&mut self) {
-        let earlier = self.earlier.take().unwrap_or_default().into_iter().flatten().map(|earlier| earlier.found);
+        let earlier =
+            self.earlier.take().unwrap_or_default().into_iter().flatten().map(|earlier| earlier.found);
         let present = self.evaluation.take().map(Found::Double);
         let sums = self.sums.take().flatten().map(Found::Single);
         earlier.chain(present).chain(sums).for_each(|found| match found {

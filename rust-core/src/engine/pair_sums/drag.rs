@@ -112,7 +112,8 @@ range = 1.0
         let found = evaluator.strengths_with_drag(block, species, v, [0.7, 0.4]);
         let mut slowed = 0;
         for (k, [i, j]) in block.particles().enumerate() {
-            let (d, conservative): ([f64; 3], f64) = (block.d.map(|d| d[k].into()), block.strengths[k].into());
+            let (d, conservative): ([f64; 3], f64) =
+                (block.d.map(|d| d[k].into()), block.strengths[k].into());
             let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
             let (gamma, range, exponent) = match species[i] + species[j] {
                 0 => (4.5, 0.7, 1.0),

@@ -241,7 +241,9 @@ impl Evaluator {
 
     /// Keeps the arrays of pairs for reuse.
     pub fn recycle_sums(&self, sums: ParticleSums) {
-        self.loops().spare.push(sums.planes);
+        if sums.found.pairs {
+            self.loops().spare.push(sums.planes);
+        }
     }
 
     pub(super) fn loops(&self) -> MutexGuard<'_, PairLoops> {

@@ -352,13 +352,14 @@ range_B = 1.0
                             fluid.title
                         );
                     }
+                    // In arrays that have been in use.
+                    evaluator.recycle_sums(sums.clone());
                     for found in [Wanted { pairs: false, ..ALL }, Wanted { shares: false, ..ALL }] {
                         let part = evaluator.particle_sums(pool, &x, &species, &domain, found).unwrap();
                         let shares = if found.shares { sums.shares.clone() } else { Vec::new() };
                         let planes = if found.pairs { sums.planes.clone() } else { Vec::new() };
                         let expected = ParticleSums { shares, planes, found, ..sums.clone() };
                         assert!(part == expected, "{} {found:?}", fluid.title);
-                        evaluator.recycle_sums(part);
                     }
                     if set.instructions() == InstructionSet::best().instructions() {
                         assert!(Some(&sums) == found.as_ref(), "{}", fluid.title);

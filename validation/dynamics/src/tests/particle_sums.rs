@@ -118,6 +118,14 @@ fn lines_of_sums_are_those_of_an_evaluation() {
                 }
             }
             assert!(count > 100, "{integrator} {count}");
+            // One search has all that is expected, if forces act at the positions of the sample.
+            let evaluator = Evaluator::new(scene.model.at(kt).unwrap()).unwrap();
+            for shares in [false, true] {
+                let mixed = View { precision: Precision::Mixed, ..simulation.view(0.02) };
+                let frame = Frame::new(mixed, &evaluator);
+                frame.expect_lines(shares);
+                assert_eq!(frame.sums().is_some(), shares || integrator == "aboba", "{integrator}");
+            }
         }
     }
 }
