@@ -122,8 +122,8 @@ impl<'a> Frame<'a> {
         self.evaluation.get_or_init(|| self.evaluator.evaluate(pool, x, species, domain))
     }
 
-    /// Sums over the pairs of each particle with their shares in the Laplacian, which take less time than [`Frame::evaluation`]; `None` beside
-    /// one that was there before, if pairs of the run are in double precision, and where [`Evaluator::particle_sums`] has none.
+    /// Sums over the pairs of each particle with their shares in the Laplacian, which take less time than [`Frame::evaluation`]; `None` if that was
+    /// there before, if pairs of the run are in double precision, and where [`Evaluator::particle_sums`] has none.
     pub fn sums(&self) -> Option<&ParticleSums> {
         self.sums_with(SHARES).filter(|sums| sums.found.shares)
     }

@@ -16,7 +16,7 @@ pub struct PairBlock<'a, T = f64> {
 }
 
 impl<'a, T> PairBlock<'a, T> {
-    /// All pairs of a plane in blocks of at most [`BLOCK`], whose arrays are those of a block.
+    /// All pairs of a plane in blocks of at most [`BLOCK`], from the arrays of the plane.
     pub fn all(
         hosts: &'a [u32],
         pairs: [&'a [u32]; 2],
