@@ -126,7 +126,7 @@ pub struct Sums<'a> {
     sums: Vec<DensitySums>,
     fluid: &'a Fluid,
     place: &'a [u32],
-    /// The pairs, if they are wanted.
+    /// The pairs, if asked for.
     pub planes: Vec<PlaneForces>,
 }
 
