@@ -130,12 +130,17 @@ impl<'a> Frame<'a> {
 
     /// The sums that were found first, which may lack what is `wanted` now.
     fn sums_with(&self, wanted: Wanted) -> Option<&ParticleSums> {
-        let View { pool, precision, x, species, domain, .. } = self.view;
-        let is_late = self.sums.get().is_none() && self.evaluation.get().is_some();
-        if precision == Precision::Double || is_late {
+        if self.sums.get().is_none() && self.evaluation.get().is_some() {
             return None;
         }
-        self.sums.get_or_init(|| self.evaluator.particle_sums(pool, x, species, domain, wanted)).as_ref()
+        self.sums.get_or_init(|| self.find_sums(self.view.x, self.view.species, wanted)).as_ref()
+    }
+
+    /// Sums over the pairs of particles at `x`, unless pairs of the run are in double precision.
+    fn find_sums(&self, x: &[[f64; 3]], species: &[i32], wanted: Wanted) -> Option<ParticleSums> {
+        let View { pool, precision, domain, .. } = self.view;
+        let is_mixed = precision == Precision::Mixed;
+        is_mixed.then(|| self.evaluator.particle_sums(pool, x, species, domain, wanted))?
     }
 
     /// The pairs with the forces that act now.
@@ -229,15 +234,13 @@ impl<'a> Frame<'a> {
     }
 
     fn earlier(&self, at: &Place) -> Earlier {
-        let View { pool, domain, precision, .. } = self.view;
+        let View { pool, domain, .. } = self.view;
         let Place { x, species, displaced } = at;
         let (to, acted) = (displaced.as_deref().unwrap_or(&[]), displaced.as_ref().unwrap_or(x));
-        let wanted = Wanted { shares: false, pairs: true };
-        let sums = (precision != Precision::Double)
-            .then(|| self.evaluator.particle_sums(pool, acted, species, domain, wanted));
+        let sums = self.find_sums(acted, species, Wanted { shares: false, pairs: true });
         let evaluate = || Found::Double(self.evaluator.evaluate(pool, acted, species, domain));
         Earlier {
-            found: sums.flatten().map_or_else(evaluate, Found::Single),
+            found: sums.map_or_else(evaluate, Found::Single),
             // A displaced particle may have crossed a face of the box.
             displacements: to.iter().zip(x).map(|(to, x)| domain.minimum_image(*to, *x)).collect(),
         }

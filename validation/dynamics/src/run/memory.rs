@@ -13,8 +13,8 @@ use psidpd_observe::Pairs;
 /// 20 000, whose arrays are not kept, 900 and 1000.
 const EVALUATION: f64 = 1200.0;
 
-/// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330, and where it sums them
-/// `stress_profile` of 60 500 took 720 with velocity Verlet and 1280 with force-gradient.
+/// Bytes per particle where observables list all pairs: `temperature` of 6 050 to 282 000 particles took 1250 to 1330. `stress_profile` of
+/// 60 500, with pairs in single precision, took 720 with velocity Verlet and 1280 with force-gradient.
 const LISTED: f64 = 1300.0;
 
 /// Bytes per particle where they sum them: `temperature` of 60 500, 106 000 and 282 000 particles took 140 to 270.
